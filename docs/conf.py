@@ -63,4 +63,6 @@ def _pages(part: str) -> tuple[str, list[str]]:
 
 def _tree(title: str, pages: list[str]) -> str:
     listed = [str((ROOT / "docs" / page).resolve().relative_to(ROOT)) for page in pages]
-    return "\n".join(["```{toctree}", ":hidden:", f":caption: {title}", "", *listed, "```"])
+    return "\n".join(
+        ["```{toctree}", ":hidden:", f":caption: {title}", "", *listed, "```"]
+    )

@@ -61,7 +61,9 @@ def solved(one: FlowCase, cases: Path) -> WallStress:
     return WallStress.from_csv(cases / one.name / WALL_STRESS)
 
 
-def windward_mean(one: FlowCase, stress: WallStress, measure: Measure = "wall") -> float:
+def windward_mean(
+    one: FlowCase, stress: WallStress, measure: Measure = "wall"
+) -> float:
     """Mean friction velocity of the windward face over the undisturbed one."""
     face = one.height_m / np.sin(np.radians(one.slope_deg))
     on = (stress.s_m > 0) & (stress.s_m < face)
@@ -76,27 +78,39 @@ def change(new: float, old: float) -> str:
 
 def meshes(cases: Path) -> None:
     """Windward mean, its change on a finer mesh and with a lower first cell."""
-    print("\n| slope | z0, m | u*/u*_0 | mesh twice as fine | first cell halved: wall | Eq. 10 |")
+    print(
+        "\n| slope | z0, m | u*/u*_0 | mesh twice as fine | first cell halved: wall | Eq. 10 |"
+    )
     print("|---|---|---|---|---|---|")
     for slope in SLOPES:
         for roughness in ROUGHNESS:
             one = flow(slope, roughness)
             fine = other(one, cells_per_face=2 * one.settings.cells_per_face)
             low = other(one, first_cell_height=one.first_cell_m / 2)
-            mean, eq10 = (windward_mean(one, solved(one, cases), m) for m in ("wall", "eq10"))
+            mean, eq10 = (
+                windward_mean(one, solved(one, cases), m) for m in ("wall", "eq10")
+            )
             cells = [
                 change(windward_mean(fine, solved(fine, cases)), mean),
                 change(windward_mean(low, solved(low, cases)), mean),
                 change(windward_mean(low, solved(low, cases), "eq10"), eq10),
             ]
-            print(f"| {slope:g} | {roughness:g} | {mean:.3f} | {' | '.join(cells)} |", flush=True)
+            print(
+                f"| {slope:g} | {roughness:g} | {mean:.3f} | {' | '.join(cells)} |",
+                flush=True,
+            )
 
 
 def similarity(cases: Path) -> None:
     """Change of u*/u*_0 with the speed at the lid."""
     print("\n| slope | z0, m | U_e, m/s | windward mean | largest change on the face |")
     print("|---|---|---|---|---|")
-    for slope, roughness in ((15.0, 3.333e-5), (30.0, 3.333e-5), (15.0, 3.3e-6), (30.0, 1e-4)):
+    for slope, roughness in (
+        (15.0, 3.333e-5),
+        (30.0, 3.333e-5),
+        (15.0, 3.3e-6),
+        (30.0, 1e-4),
+    ):
         one = flow(slope, roughness)
         stress = solved(one, cases)
         face = HEIGHT / np.sin(np.radians(slope))
@@ -104,26 +118,37 @@ def similarity(cases: Path) -> None:
         for speed in (5.0, 20.0):
             other_case = other(one, speed=speed)
             faster = solved(other_case, cases)
-            ratio = faster.ustar_over_ustar0_wall[on] / stress.ustar_over_ustar0_wall[on]
+            ratio = (
+                faster.ustar_over_ustar0_wall[on] / stress.ustar_over_ustar0_wall[on]
+            )
             mean = change(windward_mean(other_case, faster), windward_mean(one, stress))
             most = f"{100 * np.abs(ratio - 1).max():.2f} %"
-            print(f"| {slope:g} | {roughness:g} | {speed:g} | {mean} | {most} |", flush=True)
+            print(
+                f"| {slope:g} | {roughness:g} | {speed:g} | {mean} | {most} |",
+                flush=True,
+            )
 
 
 def levels(cases: Path) -> None:
     """Cost of coarser and finer meshes, and what they do to u*^2 on grains of 1 mm."""
-    print("\n| mesh | slope | z0, m | cells | iterations | solver, core s | mean | worst grain |")
+    print(
+        "\n| mesh | slope | z0, m | cells | iterations | solver, core s | mean | worst grain |"
+    )
     print("|---|---|---|---|---|---|---|---|")
     for name, change_of in LEVELS.items():
         for slope in (15.0, 30.0):
             for roughness in ROUGHNESS:
                 standard = flow(slope, roughness)
                 one = other(standard, **change_of)
-                new, old = (on_grains(each, solved(each, cases)) for each in (one, standard))
+                new, old = (
+                    on_grains(each, solved(each, cases)) for each in (one, standard)
+                )
                 worst = f"{100 * np.abs(new / old - 1).max():.1f} %"
                 cost = " | ".join(spent(cases / one.name))
                 mean = change(new.mean(), old.mean())
-                print(f"| {name} | {slope:g} | {roughness:g} | {cost} | {mean} | {worst} |")
+                print(
+                    f"| {name} | {slope:g} | {roughness:g} | {cost} | {mean} | {worst} |"
+                )
 
 
 def on_grains(one: FlowCase, stress: WallStress) -> FloatArray:
@@ -146,19 +171,31 @@ def spent(directory: Path) -> tuple[str, str, str]:
 
 def models(cases: Path) -> None:
     """What turbulence models and schemes give."""
-    print("\n| changed | 15 deg | 30 deg | separated, 15 and 30 deg, h |\n|---|---|---|---|")
+    print(
+        "\n| changed | 15 deg | 30 deg | separated, 15 and 30 deg, h |\n|---|---|---|---|"
+    )
     for changed in MODELS:
         piles = [other(flow(slope, 3.333e-5), **changed) for slope in (15.0, 30.0)]
-        means = " | ".join(f"{windward_mean(one, solved(one, cases)):.3f}" for one in piles)
+        means = " | ".join(
+            f"{windward_mean(one, solved(one, cases)):.3f}" for one in piles
+        )
         bubbles = (bubble(solved(one, cases), HEIGHT) for one in piles)
-        name = ", ".join(f"{key} = {value}" for key, value in changed.items()) or "nothing"
-        print(f"| {name} | {means} | {', '.join(f'{b[1] if b else 0:.1f}' for b in bubbles)} |")
+        name = (
+            ", ".join(f"{key} = {value}" for key, value in changed.items()) or "nothing"
+        )
+        print(
+            f"| {name} | {means} | {', '.join(f'{b[1] if b else 0:.1f}' for b in bubbles)} |"
+        )
 
 
 def linear_theory(cases: Path) -> None:
     """Linear theory against the solved flow: errors of u* in per cent."""
     at = np.array([0.05, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98])
-    print("\n| slope | z0, m | solved | mean |", " | ".join(f"at {part:g}" for part in at), "|")
+    print(
+        "\n| slope | z0, m | solved | mean |",
+        " | ".join(f"at {part:g}" for part in at),
+        "|",
+    )
     print("|---" * (4 + len(at)) + "|")
     for slope in SLOPES:
         for roughness in ROUGHNESS:
@@ -171,7 +208,10 @@ def linear_theory(cases: Path) -> None:
             ratios = np.sqrt(found.mean_over(places, HEIGHT / 40)) / theirs
             whole = windward_mean(one, found) / mean
             cells = (f"{100 * ratio - 100:+.0f}" for ratio in (whole, *ratios))
-            print(f"| {slope:g} | {roughness:g} | {mean:.3f} | {' | '.join(cells)} |", flush=True)
+            print(
+                f"| {slope:g} | {roughness:g} | {mean:.3f} | {' | '.join(cells)} |",
+                flush=True,
+            )
 
 
 def waves(cases: Path) -> None:
@@ -182,7 +222,9 @@ def waves(cases: Path) -> None:
             one = wavy(slope, 1 / ratio)
             assert one.line
             found = (solved(one, cases), theory.waves(one.line, 1 / ratio))
-            numbers = (f"{a:.2f} | {b:.2f}" for a, b in (phases(one, each) for each in found))
+            numbers = (
+                f"{a:.2f} | {b:.2f}" for a, b in (phases(one, each) for each in found)
+            )
             print(f"| {slope:g} | {ratio:g} | {' | '.join(numbers)} |", flush=True)
 
 
@@ -206,7 +248,9 @@ def phases(one: FlowCase, stress: WallStress) -> tuple[float, float]:
     tau = stress.mean_over((s[1:] + s[:-1]) / 2, np.diff(s))
     phase = 2 * np.pi * (edges[1:] + edges[:-1]) / 2 - np.pi
     steepness = np.pi * one.height_m
-    a, b = (2 * np.mean(tau * wave) / steepness for wave in (np.cos(phase), -np.sin(phase)))
+    a, b = (
+        2 * np.mean(tau * wave) / steepness for wave in (np.cos(phase), -np.sin(phase))
+    )
     return float(a), float(b)
 
 

@@ -50,7 +50,9 @@ has the value that was run. Whether a file writes a default or leaves it out is 
 intervals; a parenthesis leaves out the end. The [limits](#limits) are what a study refuses within
 the ranges.
 """
-DAMPED = ", ".join(f"{step:g} up to a damping of {most:g}" for most, step in limits.TIMESTEPS)
+DAMPED = ", ".join(
+    f"{step:g} up to a damping of {most:g}" for most, step in limits.TIMESTEPS
+)
 LOW, HIGH = limits.PILE_SLOPES_DEG
 LIMITS = {
     "grain.sizes": (
@@ -96,7 +98,12 @@ LIMITS = {
     "grain.cohesion": ("by DEM", "the method `auto`, `peeling` or `pivot`"),
 }
 """What is refused within the ranges of the fields, and the remedy."""
-SIGNS = {Gt: ("gt", "({:g},"), Ge: ("ge", "[{:g},"), Lt: ("lt", "{:g})"), Le: ("le", "{:g}]")}
+SIGNS = {
+    Gt: ("gt", "({:g},"),
+    Ge: ("ge", "[{:g},"),
+    Lt: ("lt", "{:g})"),
+    Le: ("le", "{:g}]"),
+}
 COLUMNS = "| field | symbol, unit, range | default | meaning | scope | column |"
 
 
@@ -108,7 +115,9 @@ def text() -> str:
         if part == "bed":
             about = "One grain on two others, or a pile of grains."
         lines.append(f"## `[{part}]`\n\n{about}\n\n{COLUMNS}\n{'|---' * 6}|")
-        rows = (_row(each) for each in fields.FIELDS if each.name.startswith(f"{part}."))
+        rows = (
+            _row(each) for each in fields.FIELDS if each.name.startswith(f"{part}.")
+        )
         lines += [*(f"| {' | '.join(row)} |" for row in rows), ""]
     lines.append("## Limits\n\n| field | refused | remedy |\n|---|---|---|")
     lines += [f"| `{name}` | {' | '.join(words)} |" for name, words in LIMITS.items()]
@@ -118,10 +127,17 @@ def text() -> str:
 def _row(quantity: Quantity) -> list[str]:
     part, _, name = quantity.name.partition(".")
     field, info = fields.PARTS[part].model_fields[name], quantity.info
-    words = info.choices or {w: w for w in get_args(field.annotation) if isinstance(w, str)}
-    listed = [f'`"{w}"`' + (f": {m}" if m.lower() != w.lower() else "") for w, m in words.items()]
+    words = info.choices or {
+        w: w for w in get_args(field.annotation) if isinstance(w, str)
+    }
+    listed = [
+        f'`"{w}"`' + (f": {m}" if m.lower() != w.lower() else "")
+        for w, m in words.items()
+    ]
     value = BED.get(name, field.default) if part == "bed" else field.default
-    default = f"`{list(value) if isinstance(value, tuple) else value!r}`".replace("'", '"')
+    default = f"`{list(value) if isinstance(value, tuple) else value!r}`".replace(
+        "'", '"'
+    )
     if value is PydanticUndefined:
         default = "required"
     elif value is None:
@@ -130,13 +146,15 @@ def _row(quantity: Quantity) -> list[str]:
     role = "" if info.about == "question" else f"*{info.about}*"
     return [
         f"`{name}`",
-        ", ".join(filter(None, (info.symbol, info.unit, " ".join(bounds(field))))).replace(
-            "*", r"\*"
-        ),
+        ", ".join(
+            filter(None, (info.symbol, info.unit, " ".join(bounds(field))))
+        ).replace("*", r"\*"),
         default,
         "<br>".join([quantity.meaning, *listed]).replace("*", r"\*"),
         ", ".join(filter(None, (scope, role))),
-        "" if quantity.column == name else f"`{quantity.column}`".replace("`-`", "none"),
+        ""
+        if quantity.column == name
+        else f"`{quantity.column}`".replace("`-`", "none"),
     ]
 
 

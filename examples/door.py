@@ -37,7 +37,10 @@ class Bed:
         rows = table(case / "grains.csv")
         self.is_pivot = self.scene["kind"] == "pivot"
         if self.is_pivot:
-            rows = [{**row, "kind": row["kind"].replace("mobile", "counted")} for row in rows]
+            rows = [
+                {**row, "kind": row["kind"].replace("mobile", "counted")}
+                for row in rows
+            ]
         # LAMMPS wants the highest id never to leave
         order = {"counted": 0, "fixed": 2}
         self.grains = sorted(rows, key=lambda row: order.get(row["kind"], 1))
@@ -90,7 +93,8 @@ class Bed:
     def flow(self):
         """The flow of each load step, m/s."""
         return [
-            float(row["ustar_m_s" if self.is_pivot else "ustar0_m_s"]) for row in self.load_steps
+            float(row["ustar_m_s" if self.is_pivot else "ustar0_m_s"])
+            for row in self.load_steps
         ]
 
     def force(self, load_step):
@@ -100,15 +104,23 @@ class Bed:
                 float(self.load_steps[load_step]["fx_n"]),
                 float(self.load_steps[load_step]["fz_n"]),
             )
-            return [own if row["kind"] == "counted" else (0.0, 0.0) for row in self.grains]
+            return [
+                own if row["kind"] == "counted" else (0.0, 0.0) for row in self.grains
+            ]
         if self.given is not None:
-            return [self.given.get((load_step, row["id"]), (0.0, 0.0)) for row in self.grains]
+            return [
+                self.given.get((load_step, row["id"]), (0.0, 0.0))
+                for row in self.grains
+            ]
         return [self._pushed(row, self.flow[load_step]) for row in self.grains]
 
     def _pushed(self, row, ustar0):
         if row["kind"] not in ("counted", "pushed"):
             return 0.0, 0.0
-        ratio, slope = float(row["ustar_over_ustar0"]), math.radians(float(row["slope_deg"]))
+        ratio, slope = (
+            float(row["ustar_over_ustar0"]),
+            math.radians(float(row["slope_deg"])),
+        )
         drag, lift = forces(self.scene, abs(ratio) * ustar0)
         drag = math.copysign(drag, ratio)
         x, z = math.cos(slope), math.sin(slope)
@@ -139,7 +151,12 @@ class Bed:
 
 class _Answer:
     def __init__(self, bed, moved_in, carried):
-        self.bed, self.moved_in, self.carried, self.flow = bed, moved_in, carried, bed.flow
+        self.bed, self.moved_in, self.carried, self.flow = (
+            bed,
+            moved_in,
+            carried,
+            bed.flow,
+        )
 
     def __call__(self, quantity, at):
         if quantity == "moved":
@@ -171,9 +188,17 @@ class _Answer:
 
     def _shields(self, load_step, ustar0):
         scene, rows = self.bed.scene, zip(self.bed.grains, self.moved_in, strict=False)
-        ratio = [float(row["ustar_over_ustar0"]) for row, level in rows if 0 < level <= load_step]
+        ratio = [
+            float(row["ustar_over_ustar0"])
+            for row, level in rows
+            if 0 < level <= load_step
+        ]
         mean = sum(r**2 for r in ratio) / max(len(ratio), 1)
-        excess = (scene["rho_sol_kg_m3"] - scene["rho_f_kg_m3"]) * scene["g_m_s2"] * scene["d_m"]
+        excess = (
+            (scene["rho_sol_kg_m3"] - scene["rho_f_kg_m3"])
+            * scene["g_m_s2"]
+            * scene["d_m"]
+        )
         return scene["rho_f_kg_m3"] * ustar0**2 * mean / excess
 
 

@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 0 only if all that was asked for was done."""
-    gc.set_threshold(100_000)  # a study's tables are millions of objects, none in a cycle
+    gc.set_threshold(
+        100_000
+    )  # a study's tables are millions of objects, none in a cycle
     terminal.listen()
     terminal.take()
     for name in ("SOURCE_DATE_EPOCH", "MPLBACKEND"):
@@ -65,7 +67,9 @@ class _Parser(argparse.ArgumentParser):
 
     def parse_known_args(self, args: Any, namespace: Any = None) -> Any:  # type: ignore[override]
         """Refuse an unknown option first: another may be missing because of it."""
-        names = {word.partition("=")[0] for word in args if word.startswith("--")} - {"--"}
+        names = {word.partition("=")[0] for word in args if word.startswith("--")} - {
+            "--"
+        }
         # what follows a command is its own parser's
         for name in () if self._subparsers else names - {*self._option_string_actions}:
             near = difflib.get_close_matches(name, self._option_string_actions, 1)
@@ -84,12 +88,20 @@ def _parser() -> argparse.ArgumentParser:
         ("status", _other, "what of a study is done, running, failed and why"),
         ("report", _other, "draw tables, figures and page of a study again"),
         ("gallery", _other, "one page over the studies that a directory holds"),
-        ("prune", _other, "drop the large files of finished cases; a rerun makes them anew"),
+        (
+            "prune",
+            _other,
+            "drop the large files of finished cases; a rerun makes them anew",
+        ),
         ("ladder", _study, "what each model costs and how far it is off"),
         ("budget", _study, "what the choices are worth that all models share"),
         ("stability", _study, "for developers: maps of where each method fails"),
         ("validate", _study, "the models beside what was measured"),
-        ("erosion", _study, "what wind takes from a stockpile, by its solved flow and by AP-42"),
+        (
+            "erosion",
+            _study,
+            "what wind takes from a stockpile, by its solved flow and by AP-42",
+        ),
         ("doctor", _other, "are the solvers here, can it draw; what to install"),
     ):
         command = commands.add_parser(name, help=text)
@@ -98,15 +110,29 @@ def _parser() -> argparse.ArgumentParser:
         if run == _other and name != "doctor":
             add("directory", type=Path, metavar="DIR")
         if name == "report":
-            add("--all", action="store_true", help="draw the figures too that it folds away")
+            add(
+                "--all",
+                action="store_true",
+                help="draw the figures too that it folds away",
+            )
         if run == _study:
             if name != "stability":
                 preset = {"study": "first-look", "erosion": "stockpile"}.get(name, name)
                 add("source", nargs="?", default=preset, metavar="FILE|PRESET")
             count = os.cpu_count() or 1
             add("--out", type=Path, metavar="DIR", help="default: results/NAME")
-            add("--workers", type=whole_number, default=count, metavar="N", help="cases at a time")
-            add("--plan", action="store_true", help="say what would run, how long, and end")
+            add(
+                "--workers",
+                type=whole_number,
+                default=count,
+                metavar="N",
+                help="cases at a time",
+            )
+            add(
+                "--plan",
+                action="store_true",
+                help="say what would run, how long, and end",
+            )
         if name == "study":
             text = "error that tau_c may have, such as 0.05: the cheapest models known to be within"
             add("--tolerance", type=number, metavar="X", help=text)
@@ -187,7 +213,11 @@ def _other(options: Namespace) -> int:
 
     if options.command == "report":
         return _end(pipeline.redraw(options.directory, every=options.all))
-    print((gallery.write if options.command == "gallery" else pipeline.prune)(options.directory))
+    print(
+        (gallery.write if options.command == "gallery" else pipeline.prune)(
+            options.directory
+        )
+    )
     return 0
 
 

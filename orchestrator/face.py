@@ -19,9 +19,30 @@ from orchestrator.runs.workspace import Workspace
 from orchestrator.study import study
 
 FIRST = (
-    *("d_m", "alpha_deg", "rho_f_kg_m3", "force_law", "fraction", "shields", "shields_low"),
-    *("shields_high", "shields_closed_form", "shields_dem", "ustar0_m_s", "ustar_closed_form_m_s"),
-    *("ustar_m_s", "wind_10m_m_s", "current_1m_m_s", "mean_velocity_m_s", "usable", "why_not"),
+    *(
+        "d_m",
+        "alpha_deg",
+        "rho_f_kg_m3",
+        "force_law",
+        "fraction",
+        "shields",
+        "shields_low",
+    ),
+    *(
+        "shields_high",
+        "shields_closed_form",
+        "shields_dem",
+        "ustar0_m_s",
+        "ustar_closed_form_m_s",
+    ),
+    *(
+        "ustar_m_s",
+        "wind_10m_m_s",
+        "current_1m_m_s",
+        "mean_velocity_m_s",
+        "usable",
+        "why_not",
+    ),
 )
 """Columns of `Opened.thresholds` that come before all others, those that it has."""
 if TYPE_CHECKING:
@@ -112,12 +133,16 @@ def threshold(
 
 def _column(name: str, values: Any) -> "NDArray[Any]":
     """The values of a parameter as an array: numbers, of a roughness also texts as d/30."""
-    refusal = InputError(f"{values!r} is neither a number nor an array of numbers", name)
+    refusal = InputError(
+        f"{values!r} is neither a number nor an array of numbers", name
+    )
     try:
         array = np.asarray(values)
         if name == "roughness" and array.dtype.kind in "UO":
             return np.asarray(values, object)
-        if array.dtype.kind not in "iufO":  # Python makes numbers of texts and of truths
+        if (
+            array.dtype.kind not in "iufO"
+        ):  # Python makes numbers of texts and of truths
             raise refusal
         return np.asarray(values, float)
     except (TypeError, ValueError):
@@ -170,7 +195,10 @@ class Opened:
 
     def __init__(self, results: Results) -> None:
         self._results, self.plot = results, SimpleNamespace(shields=self._shields)
-        self.directory, self.page = results.cases.parent, results.cases.parent / report.PAGE
+        self.directory, self.page = (
+            results.cases.parent,
+            results.cases.parent / report.PAGE,
+        )
         self.title, self.tables = results.study.title, dict(results.tables)
 
     @property
@@ -192,9 +220,19 @@ class Opened:
     def __repr__(self) -> str:
         """The study in five lines."""
         rows, scenes = self.thresholds, len(self._results.scenes)
-        usable = f"{rows['usable'].sum()} of {len(rows)} thresholds are usable" if len(rows) else ""
-        lines = [f"{scenes} scenes; {usable or 'no threshold yet'}", f"page: {self.page}"]
-        lines += [f"tables: {', '.join(self.tables)}", "in words: .answer; as a table: .thresholds"]
+        usable = (
+            f"{rows['usable'].sum()} of {len(rows)} thresholds are usable"
+            if len(rows)
+            else ""
+        )
+        lines = [
+            f"{scenes} scenes; {usable or 'no threshold yet'}",
+            f"page: {self.page}",
+        ]
+        lines += [
+            f"tables: {', '.join(self.tables)}",
+            "in words: .answer; as a table: .thresholds",
+        ]
         return "\n".join([self.title, *lines])
 
     def _repr_html_(self) -> str:

@@ -25,13 +25,23 @@ def write(directory: Path) -> Path:
             title, says = opened.title, opened.answer.split("\n\n")[0].splitlines()
         except OrchestratorError as error:
             title, says = study.name, [error.what]
-        figures = [path for name in PICTURES for path in sorted((study / FIGURES).glob(name))]
+        figures = [
+            path for name in PICTURES for path in sorted((study / FIGURES).glob(name))
+        ]
         image = figures[0].read_bytes() if figures else b""
-        about = {"title": title, "directory": study.name, "link": quote(f"{study.name}/{PAGE}")}
+        about = {
+            "title": title,
+            "directory": study.name,
+            "link": quote(f"{study.name}/{PAGE}"),
+        }
         cards.append({**about, "says": says, "image": image})
     if not cards:
         remedy = "name the directory that holds directories of studies, such as results"
-        raise InputError("there is no study with a page", where=str(directory), remedy=remedy)
+        raise InputError(
+            "there is no study with a page", where=str(directory), remedy=remedy
+        )
     path = directory.absolute() / NAME
-    Folder(path.parent).put(NAME, page.fill("gallery.html.j2", title="Studies", cards=cards))
+    Folder(path.parent).put(
+        NAME, page.fill("gallery.html.j2", title="Studies", cards=cards)
+    )
     return path

@@ -47,7 +47,9 @@ class Finished(NamedTuple):
     undrawn: Sequence[str] = ()
 
 
-def run(study: Study, out: Path, *, workers: int, queue: Queue | None = None) -> Finished:
+def run(
+    study: Study, out: Path, *, workers: int, queue: Queue | None = None
+) -> Finished:
     """Run a study, or what is missing of it, in a directory; `workers` cases at a time.
 
     A queue of a cluster runs the cases in place of this machine. An `InputError` says that the
@@ -62,7 +64,9 @@ def run(study: Study, out: Path, *, workers: int, queue: Queue | None = None) ->
         states = planned.done(space.cases)
         todo = planned.missing(space.cases, states)
         rest = {"queue": queue, "after_s": planned.drawing_s}
-        failed = complete(todo, space, workers=workers, limit_s=study.time_limit_s, **rest)
+        failed = complete(
+            todo, space, workers=workers, limit_s=study.time_limit_s, **rest
+        )
         failures = _with_advice(failed, planned)
         if todo:
             states |= planned.done(space.cases, but=states)
@@ -111,7 +115,12 @@ def _file_of(about: Mapping[str, Any]) -> str:
 
 
 def complete(
-    todo: dict[str, Case], space: Workspace, *, workers: int, limit_s: float, **settings: Any
+    todo: dict[str, Case],
+    space: Workspace,
+    *,
+    workers: int,
+    limit_s: float,
+    **settings: Any,
 ) -> Failures:
     """Run cases, each for `limit_s` at most, show their progress, and give the failures.
 
@@ -122,7 +131,10 @@ def complete(
     queue, after_s = settings.get("queue"), settings.get("after_s", 0.0)
     pools = partial(cluster.pool, queue) if queue else engine.local
     opened = pools(space.cases, workers=workers, limit_s=limit_s)
-    with opened as pool, engine.Display(todo.values(), space.cases, workers, after_s) as display:
+    with (
+        opened as pool,
+        engine.Display(todo.values(), space.cases, workers, after_s) as display,
+    ):
         return engine.run(todo, pool, display, display.watch)
 
 
@@ -130,11 +142,16 @@ def reopen(space: Workspace) -> tuple[Study, Plan]:
     """The study that a directory was made for, and its plan; an `InputError` if it holds none."""
     about = space.description()
     if "study" not in about:
-        what, remedy = f"this is the experiment {about['name']}", "its own command draws it again"
+        what, remedy = (
+            f"this is the experiment {about['name']}",
+            "its own command draws it again",
+        )
         raise InputError(what, str(space.root), remedy)
     # its text has those of the files that it names
     files = Files(None)
-    study = parse(about["study"], name=about["name"], where=str(space.root), files=files)
+    study = parse(
+        about["study"], name=about["name"], where=str(space.root), files=files
+    )
     study = replace(study, tolerance=about.get("tolerance"))
     return study, plan.make(study, space.cases)
 
@@ -161,11 +178,18 @@ def prune(directory: Path) -> str:
         done = planned.done(space.cases)
         made = tables.make(study, planned, space.cases, done)
         shown = report.drawn_from(Results(study, planned, made, space.cases))
-        return workspace.prune(space, {n: planned.cases[n] for n in done}, {c.name for c in shown})
+        return workspace.prune(
+            space, {n: planned.cases[n] for n in done}, {c.name for c in shown}
+        )
 
 
 def _draw(
-    study: Study, planned: Plan, space: Workspace, done: States, failures: Failures, every: bool
+    study: Study,
+    planned: Plan,
+    space: Workspace,
+    done: States,
+    failures: Failures,
+    every: bool,
 ) -> tuple[str, Sequence[str]]:
     """Write tables, figures and page, and last the marker of what they are made of.
 
@@ -185,7 +209,9 @@ def _draw(
         answer = report.said(results, guests)
         try:
             undrawn = report.write(results, causes, space, guests, every)
-        except BaseException:  # no memory for a picture, or an interrupt: the answer is found
+        except (
+            BaseException
+        ):  # no memory for a picture, or an interrupt: the answer is found
             print(answer, file=sys.stderr)
             raise
     terminal.check()

@@ -24,8 +24,12 @@ from orchestrator.study.study import Study
 
 START_S, SCENE_S, GRAIN_S = 2.5, 4e-3, 4e-5
 """Times of imports and first figures, of a scene, and of a grain of a bed without a run, s."""
-BESIDE = 1.3  # time of a case with the Python beside its solver, over that of the solver
-SORT_S = 4.3e-3  # of `pace` on the machine of these times and of those that cases expect, s
+BESIDE = (
+    1.3  # time of a case with the Python beside its solver, over that of the solver
+)
+SORT_S = (
+    4.3e-3  # of `pace` on the machine of these times and of those that cases expect, s
+)
 BYTES = 2.2e6  # mean size of a case of the preset `paper`
 BY_DEM = 'protocol.method = "dem", without a tolerance, answers its scenes as they are written'
 """What to do where a run on levels that were chosen has failed."""
@@ -49,14 +53,22 @@ class Plan:
     @property
     def drawing_s(self) -> float:
         """Expected time of tables, figures and the grains that move without a run, s."""
-        lengths = sum(pile.length for pile in self.piles.values() if not pile.method.cases)
+        lengths = sum(
+            pile.length for pile in self.piles.values() if not pile.method.cases
+        )
         return START_S + SCENE_S * len(self.decisions) + GRAIN_S * lengths
 
     @property
     def chosen(self) -> frozenset[str]:
         """The names of the cases that no scene as it is written needs, nor a check by DEM."""
-        piles = [pile for asked, pile in self.piles.items() if not self.decisions[asked].is_chosen]
-        needed = {run.name for pile in (*piles, *self.checks.values()) for run in pile.runs}
+        piles = [
+            pile
+            for asked, pile in self.piles.items()
+            if not self.decisions[asked].is_chosen
+        ]
+        needed = {
+            run.name for pile in (*piles, *self.checks.values()) for run in pile.runs
+        }
         cells = {cell.name for cell in self.cells}
         return frozenset(self.cases) - needed - cells
 
@@ -65,18 +77,28 @@ class Plan:
         """The ids of the cases, by name."""
         return {name: case.id for name, case in self.cases.items()}
 
-    def done(self, directory: Path, but: Container[str] = ()) -> dict[str, dict[str, Any]]:
+    def done(
+        self, directory: Path, but: Container[str] = ()
+    ) -> dict[str, dict[str, Any]]:
         """The markers of the cases that are done, by name, but for some; results are checked."""
         names = [name for name in self.cases if name not in but]
         with ThreadPoolExecutor() as pool:  # gigabytes of results are read
-            states = pool.map(lambda name: done_state(self.cases[name], directory), names)
-            return {name: state for name, state in zip(names, states, strict=True) if state}
+            states = pool.map(
+                lambda name: done_state(self.cases[name], directory), names
+            )
+            return {
+                name: state for name, state in zip(names, states, strict=True) if state
+            }
 
     def missing(self, directory: Path, done: Container[str]) -> dict[str, Case]:
         """The cases to be run, by name: those not `done`, and those pruned that they need."""
         missing = {name: case for name, case in self.cases.items() if name not in done}
-        starts = (need for case in missing.values() if case.needs_bulky for need in case.needs)
-        return {case.name: case for case in starts if not is_whole(case, directory)} | missing
+        starts = (
+            need for case in missing.values() if case.needs_bulky for need in case.needs
+        )
+        return {
+            case.name: case for case in starts if not is_whole(case, directory)
+        } | missing
 
 
 def make(study: Study, cases: Path | None = None) -> Plan:
@@ -146,7 +168,9 @@ def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
     yield f"{study.title}: {_number(len(study.scenes), 'scene')}; regimes: {regimes}"
     if outside := sum(not law_holds(scene) for scene in study.scenes):
         yield f"  in {outside} the force law does not hold for a single grain"
-    for why, times in Counter(answer.why for answer in plan.decisions.values()).most_common():
+    for why, times in Counter(
+        answer.why for answer in plan.decisions.values()
+    ).most_common():
         yield f"  {times} answered: {why}"
     yield from expected(plan, directory, workers)
 
@@ -154,11 +178,15 @@ def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
 def expected(plan: Plan, directory: Path, workers: int) -> Iterator[str]:
     """Lines of text: the cases of a plan by kind, expected time and disk."""
     missing = plan.missing(directory, plan.done(directory)).values()
-    kinds, todo = (_counted(case.kind for case in each) for each in (plan.cases.values(), missing))
+    kinds, todo = (
+        _counted(case.kind for case in each) for each in (plan.cases.values(), missing)
+    )
     yield f"{_number(len(plan.cases), 'case')}: {kinds or 'none'}; to run: {todo or 'none'}"
     # a chain of cases takes at least the sum of its times, however many run beside it
     walls = {case.name: case.cost_s / min(case.ranks, workers) for case in missing}
-    chains = (sum(walls.get(run.name, 0.0) for run in (case, *case.needs)) for case in missing)
+    chains = (
+        sum(walls.get(run.name, 0.0) for run in (case, *case.needs)) for case in missing
+    )
     slower, alone_s = pace(), sum(case.cost_s for case in missing)
     runs = slower * BESIDE * max(alone_s / workers, max(chains, default=0.0))
     drawing = slower * plan.drawing_s

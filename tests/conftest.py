@@ -43,7 +43,9 @@ def run_check(tmp_path: Path) -> Deck:
         for name, value in variables.items():
             command += ["-var", name, repr(value)]
         log = folder / "log.check"
-        ended = process.run(command, cwd=folder, log=log, limit_s=60, env=liggghts.ENVIRONMENT)
+        ended = process.run(
+            command, cwd=folder, log=log, limit_s=60, env=liggghts.ENVIRONMENT
+        )
         said = log.read_text()
         assert ended.returncode == 0, said
         assert "the check has ended" in said
@@ -63,7 +65,11 @@ def orchestrator(tmp_path: Path) -> Command:
         *arguments: str, cwd: Path = tmp_path, path: str | None = None
     ) -> "subprocess.CompletedProcess[str]":
         root = Path(__file__).parent.parent
-        env = {**os.environ, "PYTHONPATH": str(root), **({"PATH": path} if path else {})}
+        env = {
+            **os.environ,
+            "PYTHONPATH": str(root),
+            **({"PATH": path} if path else {}),
+        }
         return subprocess.run(
             [sys.executable, "-m", "orchestrator", *arguments],
             cwd=cwd,

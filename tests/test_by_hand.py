@@ -24,7 +24,9 @@ def test_the_same_again_keeps_its_results_and_a_changed_case_leaves_none(
     copied = Path(shutil.copytree(results.cases / case.name, tmp_path / kind))
 
     def run() -> "subprocess.CompletedProcess[str]":
-        return subprocess.run(["./Allrun"], cwd=copied, capture_output=True, text=True, timeout=300)
+        return subprocess.run(
+            ["./Allrun"], cwd=copied, capture_output=True, text=True, timeout=300
+        )
 
     def derived() -> list[str]:
         return [name for name in case.derived if (copied / name).exists()]
@@ -36,8 +38,12 @@ def test_the_same_again_keeps_its_results_and_a_changed_case_leaves_none(
         assert ended.returncode == 0, ended.stderr
         assert derived() == made
         said = re.findall(r"n/N = (\d+) % at u\*_0 (\S+) m/s", ended.stdout)
-        at = pile.thresholds(results.cases, [float(percent) / 100 for percent, _ in said])
-        assert [f"{each.ustar0:.4g}" for each in at] == [ustar for _, ustar in said] != []
+        at = pile.thresholds(
+            results.cases, [float(percent) / 100 for percent, _ in said]
+        )
+        assert (
+            [f"{each.ustar0:.4g}" for each in at] == [ustar for _, ustar in said] != []
+        )
         assert (copied / "README.md").is_file()
     name, old, new = CHANGES[kind]
     text = (copied / name).read_text(encoding="utf-8")

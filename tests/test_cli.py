@@ -23,7 +23,9 @@ def refused(ended: "subprocess.CompletedProcess[str]", *words: str) -> None:
     """See that a command ended with one line that has some words."""
     assert ended.returncode != 0
     assert "Traceback" not in ended.stderr
-    lines = [line for line in ended.stderr.splitlines() if line.startswith("orchestrator")]
+    lines = [
+        line for line in ended.stderr.splitlines() if line.startswith("orchestrator")
+    ]
     assert len(lines) == 1, ended.stderr
     assert all(word in lines[0] for word in words), lines
 
@@ -52,7 +54,10 @@ def test_a_study_of_single_grains_and_the_same_again(
     assert not (tmp_path / "out").exists()
     first = orchestrator("study", grains, "--out", "out")
     assert first.returncode == 0, first.stderr
-    (head, row, *_), last = first.stdout.split("\n\n")[1].splitlines(), first.stdout.split("\n")[-2]
+    (head, row, *_), last = (
+        first.stdout.split("\n\n")[1].splitlines(),
+        first.stdout.split("\n")[-2],
+    )
     assert "τ_c" in head
     assert "DEM" in row
     assert re.search(r"\[1/1\] done .* of the work, about \d+ s left", first.stderr)
@@ -84,10 +89,14 @@ def test_what_cannot_be_run_or_written_is_refused(
     thesis = tmp_path / "mine" / "thesis.txt"
     thesis.parent.mkdir()
     thesis.write_text("do not touch")
-    refused(orchestrator("study", grains, "--out", "mine"), "mine", "not a study", "--out")
+    refused(
+        orchestrator("study", grains, "--out", "mine"), "mine", "not a study", "--out"
+    )
     assert list(thesis.parent.iterdir()) == [thesis]
     refused(orchestrator("study", grains, "--out", str(thesis)), "thesis.txt")
-    refused(orchestrator("study", grains, "--out", "/proc/study"), "/proc/study", "--out")
+    refused(
+        orchestrator("study", grains, "--out", "/proc/study"), "/proc/study", "--out"
+    )
     refused(orchestrator("status", "mine"), "mine", "no study")
     missing = orchestrator("study", grains, "--out", "out", path="/nowhere")
     refused(missing, "liggghts", "apt-get install")
@@ -116,8 +125,12 @@ def test_a_failed_case_is_named_and_the_others_are_finished(
         '[ "$1" = -h ] || ! grep -q "friction equal 0.57" parameters.liggghts'
         " || echo nonsense >>parameters.liggghts"
     )
-    (tmp_path / grains).write_text(GRAINS + '"grain.friction_angle_deg" = [30.0, 35.0]\n')
-    ended = orchestrator("study", grains, "--out", "out", path=imitation(tmp_path, script))
+    (tmp_path / grains).write_text(
+        GRAINS + '"grain.friction_angle_deg" = [30.0, 35.0]\n'
+    )
+    ended = orchestrator(
+        "study", grains, "--out", "out", path=imitation(tmp_path, script)
+    )
     assert ended.returncode == 3
     assert "Traceback" not in ended.stderr
     assert "ERROR" in ended.stderr
@@ -141,7 +154,10 @@ def test_any_failure_has_a_message_of_one_printable_line() -> None:
     full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "file")
     for failure, words in (
         (full, "file: no space is left on the disk"),
-        (shutil.Error([("a", "b", str(full))] * 2), "case: no space is left on the disk"),
+        (
+            shutil.Error([("a", "b", str(full))] * 2),
+            "case: no space is left on the disk",
+        ),
         (OSError(errno.EACCES, "Permission denied", "file"), "file: Permission denied"),
         (MemoryError(), "ulimit -v"),
         (RuntimeError("can't start new thread"), "ulimit -u"),

@@ -15,7 +15,9 @@ from orchestrator.grains.pile import Pile
 from orchestrator.runs import case
 from orchestrator.study import study
 
-FINITE = st.floats(allow_nan=False, allow_infinity=False, min_value=-1e12, max_value=1e12)
+FINITE = st.floats(
+    allow_nan=False, allow_infinity=False, min_value=-1e12, max_value=1e12
+)
 
 
 @given(FINITE)
@@ -43,7 +45,10 @@ def test_components_are_known_to_nine_digits_of_the_largest() -> None:
     assert not np.signbit(digits.on_grid([-1e-20], unit=1.0)).any()
     # a unit and its neighbours have one grid
     fine = 0.1234567890123
-    assert len({digits.on_grid([fine], unit=u)[0] for u in (0.1, np.nextafter(0.1, 0))}) == 1
+    assert (
+        len({digits.on_grid([fine], unit=u)[0] for u in (0.1, np.nextafter(0.1, 0))})
+        == 1
+    )
     assert digits.on_grid([0.0, 0.0]).tolist() == [0.0, 0.0]
 
 
@@ -89,7 +94,13 @@ def test_inputs_have_nine_digits_at_most(tmp_path: Path) -> None:
     (scene,) = study.parse(SCENE, name="s", where="s").scenes
     pile = Pile(scene)
     directory = case.prepare(pile.case, tmp_path)
-    names = ("grains.data", "parameters.liggghts", "load_steps.txt", "force.x.txt", "along.z.txt")
+    names = (
+        "grains.data",
+        "parameters.liggghts",
+        "load_steps.txt",
+        "force.x.txt",
+        "along.z.txt",
+    )
     for name in names:
         assert 8 <= _most_digits((directory / name).read_bytes()) <= digits.DIGITS, name
 
@@ -97,6 +108,8 @@ def test_inputs_have_nine_digits_at_most(tmp_path: Path) -> None:
 def test_tables_have_nine_digits_and_say_which_numbers_are_floats() -> None:
     columns = {"a": [1 / 3, 15.0], "b": [np.nan, 1e-7 / 3], "n": [3, 123456789012]}
     mixed = pd.DataFrame({**columns, "o": np.array([2 / 3, None], object)})
-    expected = "a,b,n,o\n0.333333333,,3,0.666666667\n15.0,3.33333333e-08,123456789012,\n"
+    expected = (
+        "a,b,n,o\n0.333333333,,3,0.666666667\n15.0,3.33333333e-08,123456789012,\n"
+    )
     assert tables.csv(mixed) == expected
     assert tables.csv(mixed[["a"]], "%.3g") == "a\n0.333\n15\n"

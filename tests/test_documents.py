@@ -32,14 +32,19 @@ def test_the_citation_and_the_index_follow() -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_links_lead_somewhere(page: Path) -> None:
-    links = re.findall(r"\]\(([^)#:\s]*)(#[^)\s]*)?\)", page.read_text(encoding="utf-8"))
+    links = re.findall(
+        r"\]\(([^)#:\s]*)(#[^)\s]*)?\)", page.read_text(encoding="utf-8")
+    )
     for target, anchor in links:
         goal = page.parent / target if target else page
         assert goal.exists(), target
         if anchor:
             titles = re.findall(r"(?m)^#+ (.+)$", goal.read_text(encoding="utf-8"))
             # the anchors that GitHub gives headings
-            anchors = [re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles]
+            anchors = [
+                re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
+                for title in titles
+            ]
             assert anchor[1:] in anchors, anchor
 
 
@@ -90,5 +95,7 @@ def test_a_question_is_answered_as_its_page_says(
     text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
     name, block = re.findall(r"(?s)`([\w-]+\.toml)`.*?```toml\n(.*?)```", text)[0]
     (tmp_path / name).write_text(block, encoding="utf-8")
-    command, said = re.findall(rf"(?s)orchestrator (\w+ {name}[^\n]*)\n(.*?)```", text)[0]
+    command, said = re.findall(rf"(?s)orchestrator (\w+ {name}[^\n]*)\n(.*?)```", text)[
+        0
+    ]
     assert orchestrator(*command.split()).stdout.replace(str(tmp_path), "…") == said

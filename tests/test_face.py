@@ -26,7 +26,9 @@ def test_thresholds_of_arrays_have_a_row_for_each_point() -> None:
     assert line["d_m"].tolist() == d.tolist()
     assert set(line["law"]) == {"bridged"}
     assert line["ustar_m_s"].iloc[1] == pytest.approx(0.4259, rel=1e-3)
-    grid = orchestrator.threshold(d[:, None], slope_deg=np.array([0.0, 15.0]), roughness="d/10")
+    grid = orchestrator.threshold(
+        d[:, None], slope_deg=np.array([0.0, 15.0]), roughness="d/10"
+    )
     assert len(grid) == 6
     assert grid["z0_m"].to_numpy() == pytest.approx(grid["d_m"] / 10)
     every = orchestrator.threshold(2e-4, law=None)
@@ -46,7 +48,9 @@ def test_thresholds_of_arrays_have_a_row_for_each_point() -> None:
         ({"density": [2e3, 3e3], "slope_deg": [0, 1, 2]}, "broadcast"),
     ],
 )
-def test_a_bad_argument_gets_one_clear_error(arguments: dict[str, Any], name: str) -> None:
+def test_a_bad_argument_gets_one_clear_error(
+    arguments: dict[str, Any], name: str
+) -> None:
     with pytest.raises(InputError, match=name):
         orchestrator.threshold(1e-3, **arguments)
     with pytest.warns(UserWarning, match="did you mean 0.06 mm, diameter 6e-05"):
@@ -55,7 +59,9 @@ def test_a_bad_argument_gets_one_clear_error(arguments: dict[str, Any], name: st
 
 def test_a_study_from_its_file_to_a_figure(tmp_path: Path) -> None:
     file, out = tmp_path / "grains.toml", tmp_path / "out"
-    file.write_text('protocol.load_increment = 0.05\naxes."grain.diameter" = [7e-4, 1e-3]')
+    file.write_text(
+        'protocol.load_increment = 0.05\naxes."grain.diameter" = [7e-4, 1e-3]'
+    )
     with pytest.raises(InputError, match="workers"):
         orchestrator.run(file, out=out, workers=0)
     for tolerance in (-1.0, float("nan")):
@@ -70,8 +76,16 @@ def test_a_study_from_its_file_to_a_figure(tmp_path: Path) -> None:
     assert rows["d_m"].tolist() == [7e-4, 1e-3]
     assert rows["usable"].all()
     assert set(opened.tables) == {"scenes", "single_grain"}
-    assert [*rows][:5] == ["d_m", "alpha_deg", "rho_f_kg_m3", "force_law", "shields_closed_form"]
-    assert all("One grain of 0.7 mm" in said for said in (opened.answer, opened._repr_html_()))
+    assert [*rows][:5] == [
+        "d_m",
+        "alpha_deg",
+        "rho_f_kg_m3",
+        "force_law",
+        "shields_closed_form",
+    ]
+    assert all(
+        "One grain of 0.7 mm" in said for said in (opened.answer, opened._repr_html_())
+    )
     assert repr(opened).splitlines()[1:2] == ["2 scenes; 2 of 2 thresholds are usable"]
     (name,) = set(rows["case"])
     assert opened.case(name) == opened.case("cells") == out / "cases" / name

@@ -17,14 +17,24 @@ PROFILE = "x_m,z_m\n0,0\n0.0746410162,0.02\n0.1492820323,0\n"
 
 def shields(place: Path, changes: str) -> list[float]:
     """Shields numbers of the threshold of the pile at its fractions, some of its fields changed."""
-    fields = dict(each.strip().split(" = ", 1) for each in f"{PILE};{changes}".split(";") if each)
-    text = "\n".join(f"{name} = {value}" for name, value in fields.items() if value != "none")
+    fields = dict(
+        each.strip().split(" = ", 1) for each in f"{PILE};{changes}".split(";") if each
+    )
+    text = "\n".join(
+        f"{name} = {value}" for name, value in fields.items() if value != "none"
+    )
     (place / "bed.csv").write_text(PROFILE, encoding="utf-8")
     study = parse(text, name="study", where=str(place / "study.toml"))
     (pile,) = plan.make(study).piles.values()
     scene = pile.scene
-    scale = (scene.grain.density - scene.fluid.density) * scene.fluid.gravity * scene.grain.diameter
-    return [each.tau / scale for each in pile.thresholds(place, scene.protocol.fractions)]
+    scale = (
+        (scene.grain.density - scene.fluid.density)
+        * scene.fluid.gravity
+        * scene.grain.diameter
+    )
+    return [
+        each.tau / scale for each in pile.thresholds(place, scene.protocol.fractions)
+    ]
 
 
 def scaled(size: float) -> str:
@@ -34,7 +44,10 @@ def scaled(size: float) -> str:
 
 
 PEELING, FLAT = 'protocol.method = "peeling"', 'flow.model = "flat"'
-DUNE, FLAT_BED = 'bed.shape = "dune"', f'bed.shape = "flat"; bed.slope_deg = 0.0; {FLAT}'
+DUNE, FLAT_BED = (
+    'bed.shape = "dune"',
+    f'bed.shape = "flat"; bed.slope_deg = 0.0; {FLAT}',
+)
 FENCE = '{ kind = "fence", x = -0.3, height = 0.01 }'
 BLOCK = '{ kind = "block", x = -0.1, height = 0.01 }'
 OBSTACLES = 'flow.model = "flat"; bed.obstacles = [{}, {}]'
@@ -64,7 +77,9 @@ AS_PROFILE = 'bed.profile = "bed.csv"; bed.counted = "windward"'
 def test_the_same_bed_has_the_same_threshold(
     one: str, other: str, tolerance: float, tmp_path: Path
 ) -> None:
-    assert shields(tmp_path, one) == pytest.approx(shields(tmp_path, other), rel=tolerance)
+    assert shields(tmp_path, one) == pytest.approx(
+        shields(tmp_path, other), rel=tolerance
+    )
 
 
 @pytest.mark.parametrize(

@@ -33,11 +33,17 @@ def checkout(tmp_path: Path) -> Path:
     return folder
 
 
-def test_set_up_installs_the_command_of_the_checkout(checkout: Path, tmp_path: Path) -> None:
-    outside = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+def test_set_up_installs_the_command_of_the_checkout(
+    checkout: Path, tmp_path: Path
+) -> None:
+    outside = {
+        name: value for name, value in os.environ.items() if name != "PYTHONPATH"
+    }
 
     def says(command: Path) -> str:
-        return subprocess.check_output([command, "--version"], cwd=tmp_path, env=outside, text=True)
+        return subprocess.check_output(
+            [command, "--version"], cwd=tmp_path, env=outside, text=True
+        )
 
     (tmp_path / "orchestrator.py").write_text("raise SystemExit('another program')\n")
     command = checkout / ".venv/bin/orchestrator"

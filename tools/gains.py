@@ -24,9 +24,7 @@ PANELS = {
     "horizontal": "Grains, level rows",
     "disordered up to 0.02 d": "Grains, random gaps",
 }
-FLOOR = (
-    1e-3  # smaller errors, and the reference's, which is none, are drawn there; likewise of costs
-)
+FLOOR = 1e-3  # smaller errors, and the reference's, which is none, are drawn there; likewise of costs
 
 
 def read(path: str, unit: str) -> pd.DataFrame:
@@ -44,24 +42,47 @@ def main() -> None:
     older, newer = read(*given[:2]), read(*given[2:])
     with style.settings():
         canvas = Figure(figsize=(8.6, 7.0), layout="constrained")
-        for ax, (name, title) in zip(canvas.subplots(2, 2).flat, PANELS.items(), strict=True):
+        for ax, (name, title) in zip(
+            canvas.subplots(2, 2).flat, PANELS.items(), strict=True
+        ):
             was, now = older.loc[name], newer.loc[name]
             levels = now.index.intersection(was.index)
             ax.set(xscale="log", yscale="log", title=title)
-            ax.set(xlabel="cost of one run, units", ylabel="largest error of the threshold")
+            ax.set(
+                xlabel="cost of one run, units", ylabel="largest error of the threshold"
+            )
             for level in levels:
                 ends = was.loc[level], now.loc[level]
-                ax.plot(*([one[x] for one in ends] for x in ("cost", "error")), color="0.8", lw=1)
-            ax.plot(was["cost"][levels], was["error"][levels], "o", mfc="white", mec="0.5", ms=4)
+                ax.plot(
+                    *([one[x] for one in ends] for x in ("cost", "error")),
+                    color="0.8",
+                    lw=1,
+                )
+            ax.plot(
+                was["cost"][levels],
+                was["error"][levels],
+                "o",
+                mfc="white",
+                mec="0.5",
+                ms=4,
+            )
             ax.plot(now["cost"], now["error"], "o", color="C0", ms=4)
             ax.margins(0.12)
             for axis in (ax.xaxis, ax.yaxis):
                 style.plain_ticks(axis)
-            names = [ax.text(row.cost, row.error, row.Index, size=6) for row in now.itertuples()]
-            adjust_text(names, ax=ax, arrowprops={"arrowstyle": "-", "color": "C0", "lw": 0.4})
+            names = [
+                ax.text(row.cost, row.error, row.Index, size=6)
+                for row in now.itertuples()
+            ]
+            adjust_text(
+                names, ax=ax, arrowprops={"arrowstyle": "-", "color": "C0", "lw": 0.4}
+            )
         samples = [
             Line2D([], [], marker="o", ls="", mfc=face, mec=edge, label=label)
-            for face, edge, label in (("white", "0.5", "68c6716"), ("C0", "C0", "f33d66e"))
+            for face, edge, label in (
+                ("white", "0.5", "68c6716"),
+                ("C0", "C0", "f33d66e"),
+            )
         ]
         canvas.legend(handles=samples, loc="outside lower center", ncols=2)
         canvas.savefig(picture, dpi=110)

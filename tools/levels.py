@@ -17,7 +17,9 @@ def together(ladders: list[pd.DataFrame]) -> pd.DataFrame:
     groups = rows.assign(cost_core_s=rows["cost_core_s"] * rows["scenes"]).groupby(KEY)
     most = groups[["error", "uncertainty"]].max()
     sums = groups[["cost_core_s", "scenes"]].sum()
-    joined = most.join(sums.assign(cost_core_s=sums["cost_core_s"] / sums["scenes"])).reset_index()
+    joined = most.join(
+        sums.assign(cost_core_s=sums["cost_core_s"] / sums["scenes"])
+    ).reset_index()
     return joined[ladders[0].columns]
 
 

@@ -47,7 +47,13 @@ def intervals(rows: pd.DataFrame, strip: Scene) -> pd.DataFrame:
     usual = columns.asked(strip)
     for law, beta, ratio in itertools.product(LAWS, BETAS, RATIOS):
         at = single(beds, law, beta, ratio)
-        row = {"force_law": law, "beta_deg": beta, "d_m": 1.0, "z0_m": 1 / ratio, "bed": "grain"}
+        row = {
+            "force_law": law,
+            "beta_deg": beta,
+            "d_m": 1.0,
+            "z0_m": 1 / ratio,
+            "bed": "grain",
+        }
         answers[kind_of({**usual, **row})] = np.where(at.valid, at.shields, np.nan)
     for model, law in itertools.product(MODELS[1:], ("bridged", "bridged-gravel")):
         gusts = {"intensity": INTENSITY, "events": EVENTS} if model.gust > 1 else None

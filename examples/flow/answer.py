@@ -65,14 +65,22 @@ class Bed:
     """The stress on the bed line of a scene, by arc length from the windward toe."""
 
     def __init__(self, scene, case, finer):
-        corners = [(float(row["x_m"]), float(row["z_m"])) for row in table(case / "bed.csv")]
+        corners = [
+            (float(row["x_m"]), float(row["z_m"])) for row in table(case / "bed.csv")
+        ]
         x, z = np.array(corners).T
         lines = grid_lines(x, z, scene["h_m"], finer)
         first = scene["first_cell_m"] / math.cos(math.radians(scene["alpha_deg"]))
         heights = levels(first, scene["h_m"], scene["lid_height_m"], finer)
         bed = np.interp(lines, x, z)
         found = solve(
-            lines, heights, bed, scene["ustar0_m_s"], scene["z0_m"], scene["solve_nu_m2_s"], _say
+            lines,
+            heights,
+            bed,
+            scene["ustar0_m_s"],
+            scene["z0_m"],
+            scene["solve_nu_m2_s"],
+            _say,
         )
         self.ratio = found.ratio
         length = np.hypot(np.diff(lines), np.diff(bed))
@@ -88,7 +96,10 @@ class Bed:
 
     def over(self, s, length):
         """u*/u*_0 of the mean stress over a length around a place."""
-        begin, end = (np.interp(s + side * length / 2, self.ends, self.carried) for side in (-1, 1))
+        begin, end = (
+            np.interp(s + side * length / 2, self.ends, self.carried)
+            for side in (-1, 1)
+        )
         mean = (end - begin) / length
         return math.copysign(math.sqrt(abs(mean)), mean)
 
@@ -100,7 +111,10 @@ class Bed:
 
 def _say(flow):
     if flow.iterations % 50 == 0:
-        print(f"iteration {flow.iterations}: the stress changes by {flow.change:.1e}", flush=True)
+        print(
+            f"iteration {flow.iterations}: the stress changes by {flow.change:.1e}",
+            flush=True,
+        )
 
 
 def flow(scene, case, finer):
@@ -129,7 +143,10 @@ def refused(scene):
         return f"the turbulence model {scene['turbulence_model']}"
     if scene.get("packing", "aligned") != "aligned":
         return f"the packing {scene['packing']}"
-    if scene.get("stress", "wall") != "wall" or scene.get("flow_model", "solve") != "solve":
+    if (
+        scene.get("stress", "wall") != "wall"
+        or scene.get("flow_model", "solve") != "solve"
+    ):
         return "another stress than that of the wall"
     return ""
 

@@ -12,7 +12,9 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 KAPPA, C_MU, C1, C2, SIGMA_K = 0.41, 0.09, 1.44, 1.92, 1.0
-SIGMA_E = KAPPA**2 / ((C2 - C1) * C_MU**0.5)  # with it the log layer solves the equations
+SIGMA_E = KAPPA**2 / (
+    (C2 - C1) * C_MU**0.5
+)  # with it the log layer solves the equations
 RELAX, CAREFUL, HURRY = 0.8, 0.5, 200
 """What is kept of an iteration's change, in the first iterations and then: the flow behind a steep
 pile swings about its answer for ever with the first."""
@@ -58,20 +60,28 @@ class Grid:
         tangent = at[last] - at[first]
         self.area = np.c_[tangent[:, 1], -tangent[:, 0]]
         self.middle = (at[first] + at[last]) / 2
-        self.on_edge = ~np.isin(self.left, self.inner) | ~np.isin(self.right, self.inner)
+        self.on_edge = ~np.isin(self.left, self.inner) | ~np.isin(
+            self.right, self.inner
+        )
         self.left_of, self.right_of = self._pick(self.left), self._pick(self.right)
         share = np.r_[np.repeat(wx.data[1::2], nz), np.tile(wz.data[1::2], nx)]
-        self.mean = sparse.diags(1 - share) @ self.left_of + sparse.diags(share) @ self.right_of
+        self.mean = (
+            sparse.diags(1 - share) @ self.left_of + sparse.diags(share) @ self.right_of
+        )
         # the flux of a gradient through a face: along the line of centres, and along the face
         d = self.centre[self.right] - self.centre[self.left]
         self.direct = (self.area**2).sum(1) / (self.area * d).sum(1)
         skew = -self.direct * (d * tangent).sum(1) / (tangent**2).sum(1)
         self.across = sparse.diags(skew) @ (self.nodes[last] - self.nodes[first])
-        self.gradient = sparse.diags(self.direct) @ (self.right_of - self.left_of) + self.across
+        self.gradient = (
+            sparse.diags(self.direct) @ (self.right_of - self.left_of) + self.across
+        )
         # what leaves the cells through their faces
         self.out = (self.left_of - self.right_of).T.tocsr()[self.inner]
         inverse = sparse.diags(1 / self.volume) @ self.out
-        self.slope = [inverse @ sparse.diags(self.area[:, i]) @ self.mean for i in (0, 1)]
+        self.slope = [
+            inverse @ sparse.diags(self.area[:, i]) @ self.mean for i in (0, 1)
+        ]
         self.crossed_by_x = np.arange(len(self.left)) < (nx + 1) * nz
         self.bed = (nx + 1) * nz + np.arange(nx) * (nz + 1)  # its faces
         self.wall_cells = np.arange(nx) * nz
@@ -82,7 +92,9 @@ class Grid:
 
     def _pick(self, ids):
         one = np.ones(len(ids))
-        return sparse.csr_matrix((one, (np.arange(len(ids)), ids)), (len(ids), self.ids.size))
+        return sparse.csr_matrix(
+            (one, (np.arange(len(ids)), ids)), (len(ids), self.ids.size)
+        )
 
     def boundary(self, fixed):
         """A field from its cells: no gradient at the sides, but that those in `fixed` keep values.
@@ -93,7 +105,9 @@ class Grid:
         i, j = np.meshgrid(np.arange(nx + 2), np.arange(nz + 2), indexing="ij")
         near = (np.clip(i, 1, nx) - 1) * nz + np.clip(j, 1, nz) - 1
         held = np.zeros(self.ids.shape, bool)
-        for side, where in zip(SIDES, (i == 0, i == nx + 1, j == 0, j == nz + 1), strict=True):
+        for side, where in zip(
+            SIDES, (i == 0, i == nx + 1, j == 0, j == nz + 1), strict=True
+        ):
             held |= where & (side in fixed)
         keep = np.where(held.ravel(), 0.0, 1.0)
         ring = sparse.csr_matrix((keep, (np.arange(i.size), near.ravel())))
@@ -151,7 +165,13 @@ class Solver:
         enough = CONVERGED if self.inlet else CONVERGED_COLUMN
         before = flow.stress
         for flow.iterations in range(1, MOST + 1):
-            self.relax = COLUMN if not self.inlet else RELAX if flow.iterations < HURRY else CAREFUL
+            self.relax = (
+                COLUMN
+                if not self.inlet
+                else RELAX
+                if flow.iterations < HURRY
+                else CAREFUL
+            )
             self.second = min(flow.iterations / START, 1.0) ** 2
             self._iterate(flow)
             flow.change = np.abs(flow.stress - before).max() / ustar**2
@@ -160,7 +180,9 @@ class Solver:
                 say(flow)
             if flow.change < enough:
                 return flow
-        raise SystemExit(f"not steady after {MOST} iterations: {flow.change:.1e} in the last")
+        raise SystemExit(
+            f"not steady after {MOST} iterations: {flow.change:.1e} in the last"
+        )
 
     def _iterate(self, flow):
         """Each equation once, in place."""
@@ -175,14 +197,20 @@ class Solver:
             self._continuity(flow, slack, gain)
         along = flow.u[g.inner[c]] * g.along[:, 0] + flow.w[g.inner[c]] * g.along[:, 1]
         flow.stress = grip * along
-        (ux, uz), (wx, wz) = ([s @ values for s in g.slope] for values in (flow.u, flow.w))
+        (ux, uz), (wx, wz) = (
+            [s @ values for s in g.slope] for values in (flow.u, flow.w)
+        )
         made = (viscosity[g.inner] - self.nu) * (2 * ux**2 + 2 * wz**2 + (uz + wx) ** 2)
         made[c] = np.abs(flow.stress) * u_k / self.reach
         k, epsilon = flow.k[g.inner], flow.epsilon[g.inner]
         # Newton's method for the sources: at a given stress the made k goes with k^-2
         source, sink = (C1 * made + C2 * epsilon) * epsilon / k, 2 * C2 * epsilon / k
-        self._transport(flow, "epsilon", at_faces / SIGMA_E, source, sink, u_k**3 / self.reach)
-        self._transport(flow, "k", at_faces / SIGMA_K, 3 * made, (epsilon + 2 * made) / k)
+        self._transport(
+            flow, "epsilon", at_faces / SIGMA_E, source, sink, u_k**3 / self.reach
+        )
+        self._transport(
+            flow, "k", at_faces / SIGMA_K, 3 * made, (epsilon + 2 * made) / k
+        )
 
     def _momentum(self, flow, viscosity, grip):
         """Both components of the speed.
@@ -197,9 +225,13 @@ class Solver:
         more = diagonal * (1 / self.relax - 1)
         lu = splu((matrix + sparse.diags(wall + more)).tocsc(), permc_spec=ORDER)
         gain = g.volume / (np.asarray(matrix.sum(axis=1)).ravel() + wall + more)
-        slopes = [[self.spread @ (s @ values) for s in g.slope] for values in (flow.u, flow.w)]
+        slopes = [
+            [self.spread @ (s @ values) for s in g.slope] for values in (flow.u, flow.w)
+        ]
         normal = np.c_[-g.along[:, 1], g.along[:, 0]]
-        off = wall[c] * (flow.u[g.inner[c]] * normal[:, 0] + flow.w[g.inner[c]] * normal[:, 1])
+        off = wall[c] * (
+            flow.u[g.inner[c]] * normal[:, 0] + flow.w[g.inner[c]] * normal[:, 1]
+        )
         for i, values in enumerate((flow.u, flow.w)):
             turned = sum((g.mean @ slopes[j][i]) * g.area[:, j] for j in (0, 1))
             push = g.out @ (viscosity * turned) - g.volume * (g.slope[i] @ flow.p)
@@ -219,7 +251,9 @@ class Solver:
         flux[g.bed] = 0.0
         ring, _ = self.pressure
         moved = sparse.diags((g.mean @ (self.spread @ gain)) * self.open) @ g.gradient
-        p = ring @ splu((g.out @ moved @ ring).tocsc(), permc_spec=ORDER).solve(g.out @ flux)
+        p = ring @ splu((g.out @ moved @ ring).tocsc(), permc_spec=ORDER).solve(
+            g.out @ flux
+        )
         flow.flux = flux - moved @ p
         flow.p += p
         for i, values in enumerate((flow.u, flow.w)):

@@ -46,10 +46,16 @@ def settled(folder, seed, length=LENGTH):
     draw = np.random.default_rng(seed)
     row = int(length / 1.25)
     layers = ROWS * length // row + 1
-    x = np.concatenate([np.arange(length) + 0.5, *[(np.arange(row) + 0.5) * length / row] * layers])
+    x = np.concatenate(
+        [np.arange(length) + 0.5, *[(np.arange(row) + 0.5) * length / row] * layers]
+    )
     x[length:] += draw.uniform(-0.02, 0.02, row * layers)
-    z = np.concatenate([np.zeros(length), np.repeat(1.3 + 1.25 * np.arange(layers), row)])
-    size = np.concatenate([np.ones(length), draw.uniform(SMALLEST, 2 - SMALLEST, row * layers)])
+    z = np.concatenate(
+        [np.zeros(length), np.repeat(1.3 + 1.25 * np.arange(layers), row)]
+    )
+    size = np.concatenate(
+        [np.ones(length), draw.uniform(SMALLEST, 2 - SMALLEST, row * layers)]
+    )
     _run(folder, x % length, z, size, length, level=0.0, hold=0.0)
     return np.loadtxt(folder / "settled.dump", skiprows=9)
 
@@ -61,36 +67,54 @@ def flux(folder, seed, shields, hold, length=LENGTH):
     _, _, x, z, radius = bed.T
     at = np.linspace(0, length, 50 * length, endpoint=False)
     aside = (at[:, None] - x + length / 2) % length - length / 2
-    upper = np.where(np.abs(aside) < radius, z + np.sqrt(np.maximum(radius**2 - aside**2, 0)), -9)
+    upper = np.where(
+        np.abs(aside) < radius, z + np.sqrt(np.maximum(radius**2 - aside**2, 0)), -9
+    )
     # a row of equal grains has its mean upper side pi/8 d over its centres; the level lies d/2 + z0
     # below these, as the bed line of a pile does
     level = upper.max(1).mean() - np.pi / 8 - 0.5 - 1 / 30
     flows = np.sqrt(np.asarray(shields) * (RHO_SOL - RHO_F) / RHO_F * G * D)
     (folder / "flows.txt").write_text("".join(f"{one:.9g}\n" for one in flows))
     _run(folder, x % length, z, 2 * radius, length, level=float(level) * D, hold=hold)
-    _, moved, time = np.loadtxt(folder / "flux.csv", delimiter=",", skiprows=1, ndmin=2).T
+    _, moved, time = np.loadtxt(
+        folder / "flux.csv", delimiter=",", skiprows=1, ndmin=2
+    ).T
     return MASS * moved / time / (length * D) / D
 
 
 def _run(folder, x, z, size, length, **told):
-    lines = [f"variable {name} equal {value!r}" for name, value in {**WATER, **told}.items()]
+    lines = [
+        f"variable {name} equal {value!r}" for name, value in {**WATER, **told}.items()
+    ]
     lines.append(f'variable contact string "{CONTACT}"')
     (folder / "parameters.liggghts").write_text("\n".join(lines) + "\n")
     kinds = np.where(np.arange(len(x)) < length, 1, 2)
-    sides = f"0 {length * D} xlo xhi\n{-3 * D} {3 * D} ylo yhi\n{-3 * D} {60 * D} zlo zhi\n"
+    sides = (
+        f"0 {length * D} xlo xhi\n{-3 * D} {3 * D} ylo yhi\n{-3 * D} {60 * D} zlo zhi\n"
+    )
     rows = "".join(
         f"{i} {kind} {own * D:.17g} {RHO_SOL} {at * D:.17g} 0.0 {up * D:.17g}\n"
         for i, (kind, own, at, up) in enumerate(zip(kinds, size, x, z, strict=True), 1)
     )
     head = f"id type diameter density x y z\n\n{len(x)} atoms\n4 atom types\n\n{sides}\nAtoms\n\n"
     (folder / "grains.data").write_text(head + rows)
-    command = ["liggghts", "-in", str(HERE / "in.flux"), "-log", "log.flux", "-screen", "none"]
+    command = [
+        "liggghts",
+        "-in",
+        str(HERE / "in.flux"),
+        "-log",
+        "log.flux",
+        "-screen",
+        "none",
+    ]
     subprocess.run(command, cwd=folder, check=True)
 
 
 def main(folder, seeds="3", hold="60"):
     """Print a table: a row for each flow, a column for each bed."""
-    beds = [flux(folder / f"bed-{i}", i, SHIELDS, float(hold)) for i in range(int(seeds))]
+    beds = [
+        flux(folder / f"bed-{i}", i, SHIELDS, float(hold)) for i in range(int(seeds))
+    ]
     print("Shields number | flux over the criterion of 0.41e-3 kg/s/m, for each bed")
     for row in zip(SHIELDS, *beds, strict=True):
         print(row[0], *(f"{one / CRITERION:.3g}" for one in row[1:]), sep=" | ")

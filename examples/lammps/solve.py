@@ -59,7 +59,9 @@ def bed_parameters(bed, step):
         "rest_energy": bed.rest_energy,
         "away": door.AWAY,
         "behind": bed.behind,
-        "waiting_samples": int(bed.scene["waiting_time"] / door.SAMPLING_INTERVAL + 0.5),
+        "waiting_samples": int(
+            bed.scene["waiting_time"] / door.SAMPLING_INTERVAL + 0.5
+        ),
         "load_steps": len(bed.load_steps) - 1,
         "displacement_criterion": bed.scene["displacement_criterion"],
         "roof_x": math.sin(slope),
@@ -71,7 +73,9 @@ def bed_parameters(bed, step):
 
 def write_variables(path, values):
     """Write a file of LAMMPS variables."""
-    lines = (f"variable        {name} index {value!r}\n" for name, value in values.items())
+    lines = (
+        f"variable        {name} index {value!r}\n" for name, value in values.items()
+    )
     path.write_text("".join(lines))
 
 
@@ -83,15 +87,22 @@ def write_bed(bed, folder):
     margin = door.BOX * d
     lines = ["grains", "", f"{len(places)} atoms", "3 atom types", ""]
     for axis, values in zip("xz", zip(*places, strict=True), strict=True):
-        lines.append(f"{min(values) - margin!r} {max(values) + margin!r} {axis}lo {axis}hi")
+        lines.append(
+            f"{min(values) - margin!r} {max(values) + margin!r} {axis}lo {axis}hi"
+        )
     lines += [f"{-margin!r} {margin!r} ylo yhi", "", "Atoms  # sphere", ""]
     for number, (row, (x, z)) in enumerate(zip(bed.grains, places, strict=True), 1):
-        lines.append(f"{number} {kinds[row['kind']]} {row['d_m']} {rho!r} {x!r} 0.0 {z!r}")
+        lines.append(
+            f"{number} {kinds[row['kind']]} {row['d_m']} {rho!r} {x!r} 0.0 {z!r}"
+        )
     (folder / "grains.data").write_text("\n".join(lines) + "\n")
     for place, axis in enumerate("xz"):
         rows = (f"{number} {way[place]!r}\n" for number, way in enumerate(bed.along, 1))
         (folder / f"along.{axis}.txt").write_text(f"{bed.counted}\n{''.join(rows)}")
-    with (folder / "force.x.txt").open("w") as fx, (folder / "force.z.txt").open("w") as fz:
+    with (
+        (folder / "force.x.txt").open("w") as fx,
+        (folder / "force.z.txt").open("w") as fz,
+    ):
         # LAMMPS reads one set more than it uses
         for load_step in (*range(len(bed.load_steps)), len(bed.load_steps) - 1):
             for stream, axis in ((fx, 0), (fz, 1)):
@@ -127,7 +138,9 @@ def run(deck, *variables):
     """Run LAMMPS on a deck in the working directory."""
     command = ["lmp", "-in", deck, "-nocite", "-log", "none", *variables]
     with open("log.txt", "w") as log:
-        code = subprocess.call(command, stdout=log, stderr=log, env={**os.environ, **ENVIRONMENT})
+        code = subprocess.call(
+            command, stdout=log, stderr=log, env={**os.environ, **ENVIRONMENT}
+        )
     if code != 0:
         said = Path("log.txt").read_text().splitlines()
         sys.exit("\n".join(line for line in said if line.startswith("ERROR")))
@@ -144,7 +157,9 @@ def check(kind, scene):
 
 def steps(folder):
     """The time steps of a run: those of the last sample of the grains."""
-    return int((folder / "track.dump").read_text().split("ITEM: TIMESTEP\n")[-1].split()[0])
+    return int(
+        (folder / "track.dump").read_text().split("ITEM: TIMESTEP\n")[-1].split()[0]
+    )
 
 
 def main(case, out):

@@ -34,7 +34,10 @@ def flow_around(scene, ustar):
     """Speed (m/s) and shear (1/s) of the flow around the grain."""
     d, nu, r = scene["d_m"], scene["nu_m2_s"], scene["z0_m"] / scene["d_m"]
     viscous = (nu / (d / 2 + scene["z0_m"]), nu)
-    rough = (KARMAN * ((1 + r) * math.log(1 + 1 / r) - 1), KARMAN * math.log(1 + 1 / r) / d)
+    rough = (
+        KARMAN * ((1 + r) * math.log(1 + 1 / r) - 1),
+        KARMAN * math.log(1 + 1 / r) / d,
+    )
     if scene["force_law"] == "low":
         return tuple(ustar**2 / a for a in viscous)
     if scene["force_law"] == "high":
@@ -142,7 +145,9 @@ def roll(scene, incline_deg, speed, times):
 def incline(scene, case):
     """The acceleration of a sphere on a plane, once it rolls or slides."""
     unit, g = scene["time_unit_s"], scene["reduced_gravity_m_s2"]
-    (t1, v1, _), (t2, v2, _) = roll(scene, scene["incline_deg"], 0.0, (2 * unit, 6 * unit))
+    (t1, v1, _), (t2, v2, _) = roll(
+        scene, scene["incline_deg"], 0.0, (2 * unit, 6 * unit)
+    )
     return lambda quantity, at: (v2 - v1) / (t2 - t1) / g
 
 
@@ -161,7 +166,9 @@ class Bed:
 
     def __init__(self, scene, grains):
         self.scene, self.dt = scene, time_step(scene)
-        self.fixed = [(float(g["x_m"]), float(g["z_m"])) for g in grains if g["kind"] == "fixed"]
+        self.fixed = [
+            (float(g["x_m"]), float(g["z_m"])) for g in grains if g["kind"] == "fixed"
+        ]
         mobile = next(g for g in grains if g["kind"] == "mobile")
         self.x, self.z = float(mobile["x_m"]), float(mobile["z_m"])
         self.vx = self.vz = self.spin = 0.0
@@ -178,7 +185,9 @@ class Bed:
             nx, nz = dx / distance, dz / distance
             # along the contact, in the sense in which the grain rolls forwards over its neighbour
             slip = self.vx * nz - self.vz * nx - self.spin * d / 2
-            push, grip = contact.force(d - distance, -self.vx * nx - self.vz * nz, slip, self.dt)
+            push, grip = contact.force(
+                d - distance, -self.vx * nx - self.vz * nz, slip, self.dt
+            )
             fx += push * nx + grip * nz
             fz += push * nz - grip * nx
             torque -= grip * d / 2
@@ -220,7 +229,9 @@ def pivot(scene, case):
             high = middle
         else:
             low = middle
-    ustar = math.sqrt(float(load_steps[low]["ustar_m_s"]) * float(load_steps[high]["ustar_m_s"]))
+    ustar = math.sqrt(
+        float(load_steps[low]["ustar_m_s"]) * float(load_steps[high]["ustar_m_s"])
+    )
     return lambda quantity, at: ustar
 
 
@@ -251,17 +262,21 @@ def pile(scene, case):
 def poured_pivots(scene, case, counted):
     """The load step in which the force on each grain turns it over its own foremost contact."""
     discs = [
-        (float(g["x_m"]), float(g["z_m"]), float(g["d_m"]) / 2) for g in table(case / "grains.csv")
+        (float(g["x_m"]), float(g["z_m"]), float(g["d_m"]) / 2)
+        for g in table(case / "grains.csv")
     ]
     forces = {}
     for row in table(case / "forces.csv"):
-        forces.setdefault(row["id"], []).append((float(row["fx_n"]), float(row["fz_n"])))
+        forces.setdefault(row["id"], []).append(
+            (float(row["fx_n"]), float(row["fz_n"]))
+        )
     for grain in counted:
         side = math.copysign(1.0, float(grain["ustar_over_ustar0"]))
         here, weight = discs[int(grain["id"]) - 1], grain_weight(scene, grain)
         lean = foremost(here, discs, side)
         yield first_of(
-            lean is None or fx * side * math.cos(lean) + (fz - weight) * math.sin(lean) >= 0
+            lean is None
+            or fx * side * math.cos(lean) + (fz - weight) * math.sin(lean) >= 0
             for fx, fz in forces[grain["id"]]
         )
 
@@ -308,7 +323,9 @@ def counts(scene, order, total, load_steps):
     """The answers for a number of grains, of which those that go have a flow and a stress each."""
     flow = [float(row["ustar0_m_s"]) for row in load_steps]
     moved = [sum(own <= u for own, _ in order) for u in flow]
-    excess = (scene["rho_sol_kg_m3"] - scene["rho_f_kg_m3"]) * scene["g_m_s2"] * scene["d_m"]
+    excess = (
+        (scene["rho_sol_kg_m3"] - scene["rho_f_kg_m3"]) * scene["g_m_s2"] * scene["d_m"]
+    )
 
     def first(fraction):
         need = max(math.ceil(fraction * total - 1e-9), 1)

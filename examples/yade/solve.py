@@ -126,7 +126,9 @@ def passing(scene, case):
     """A grain rests on two fixed ones and is pushed until it has passed the criterion."""
     set_up(scene, Vector3(0, 0, -scene["reduced_gravity_m_s2"]))
     rows = door.table(case / "grains.csv")
-    ids = [add(float(row["x_m"]), float(row["z_m"]), scene, row["kind"]) for row in rows]
+    ids = [
+        add(float(row["x_m"]), float(row["z_m"]), scene, row["kind"]) for row in rows
+    ]
     grain, unit = O.bodies[ids[-1]].state, scene["time_unit_s"]
     run(10 * unit)
     start, since = grain.pos[0], O.time
@@ -163,7 +165,9 @@ def bed(scene, case):
     O.engines += [protocol.fluid]
     period = int(door.SAMPLING_INTERVAL * scene["time_unit_s"] / O.dt + 0.5)
     # one run with samples inside: between two runs YADE waits a twentieth of a second
-    O.engines += [PyRunner(command="protocol.sample()", iterPeriod=period, initRun=False)]
+    O.engines += [
+        PyRunner(command="protocol.sample()", iterPeriod=period, initRun=False)
+    ]
     O.run(-1, True)
     return asked.answer(protocol.moved_in, protocol.carried)
 
@@ -176,7 +180,9 @@ class Protocol:
         self.asked, self.ids, self.counted = asked, ids, ids[: asked.counted]
         scene, grains = asked.scene, asked.grains
         mobile = [row["kind"] != "fixed" for row in grains]
-        self.moving = [number for number, moves in zip(ids, mobile, strict=True) if moves]
+        self.moving = [
+            number for number, moves in zip(ids, mobile, strict=True) if moves
+        ]
         self.moved_in, self.carried = [0] * asked.counted, [False] * asked.counted
         self.along = dict(zip(self.counted, asked.along, strict=True))
         self.marker = scene["displacement_criterion"] * scene["d_m"]
@@ -212,7 +218,9 @@ class Protocol:
         if self.load_step == 0:
             self.settling -= 1
             if self.settling == 0:
-                self.start = {one: tuple(O.bodies[one].state.pos) for one in self.counted}
+                self.start = {
+                    one: tuple(O.bodies[one].state.pos) for one in self.counted
+                }
                 self.fluid.dead = True
                 self._begin(1)
             return
@@ -242,8 +250,14 @@ class Protocol:
 
     def _unpassed_energy(self):
         """Kinetic energy of translation of the mobile grains that have not passed, J."""
-        passed = {number for number, step in zip(self.counted, self.moved_in, strict=True) if step}
-        states = [O.bodies[number].state for number in self.moving if number not in passed]
+        passed = {
+            number
+            for number, step in zip(self.counted, self.moved_in, strict=True)
+            if step
+        }
+        states = [
+            O.bodies[number].state for number in self.moving if number not in passed
+        ]
         return sum(state.mass * state.vel.squaredNorm() / 2 for state in states)
 
     def _passed(self, number):
@@ -251,14 +265,20 @@ class Protocol:
 
     def _travel(self, number):
         """Displacement of a counted grain along its bed, in its own diameter over d, m."""
-        (x, _, z), start, along = O.bodies[number].state.pos, self.start[number], self.along[number]
+        (x, _, z), start, along = (
+            O.bodies[number].state.pos,
+            self.start[number],
+            self.along[number],
+        )
         return (x - start[0]) * along[0] + (z - start[2]) * along[1]
 
     def _gone(self, number):
         x, _, z = O.bodies[number].state.pos
         slope, ridge_x, ridge_z = self.roof
         over = z > ridge_z - abs(x - ridge_x) * math.tan(slope)
-        far = x > self.behind or (number in self.start and self._travel(number) > self.far)
+        far = x > self.behind or (
+            number in self.start and self._travel(number) > self.far
+        )
         inside = self.low[0] < x < self.high[0] and self.low[1] < z < self.high[1]
         if over or far or not inside:
             O.bodies.erase(number)

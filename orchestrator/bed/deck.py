@@ -75,7 +75,9 @@ SETTLE_FLOW = math.sqrt(0.5)
 """Flow of the settling over that of the first load step: about half of its force. Without any, a
 bed at its limiting slope would not come to rest."""
 STEADY = np.ones(1)  # the gusts of a deck without any
-START = 0.9  # flow of the first load step over that of the first threshold by the pivot law
+START = (
+    0.9  # flow of the first load step over that of the first threshold by the pivot law
+)
 BEYOND = 1.2
 """The last load step's flow over that at which the pivot law says that enough grains have moved."""
 STIR = 0.02
@@ -87,7 +89,11 @@ have left before it."""
 
 
 def protocol(
-    grain: Grain, rules: Protocol, enough: int = 0, smallest: float = 1, gusts: Gusts | None = None
+    grain: Grain,
+    rules: Protocol,
+    enough: int = 0,
+    smallest: float = 1,
+    gusts: Gusts | None = None,
 ) -> dict[str, float | int]:
     """Variables of the contact law, of the settling, and of how the deck holds a load step.
 
@@ -207,7 +213,13 @@ def write(
         bounds[:, 1] = 0.0, grains.width * grains.diameter
     diameters = grains.diameter * grains.sizes
     write_grains(
-        directory, grains.position, grains.kind, diameters, grains.density, bounds, present
+        directory,
+        grains.position,
+        grains.kind,
+        diameters,
+        grains.density,
+        bounds,
+        present,
     )
     write_parameters(directory, {**parameters, "width": grains.width, "ranks": ranks})
     write_numbers(directory / "load_steps.txt", flows)
@@ -270,7 +282,9 @@ def write_grains(
     columns = (values[order].tolist() for values in (kind, diameters, position))
     rows = "".join(
         row % (place + 1, number, diameter, density, *centre)
-        for place, number, diameter, centre in zip(order.tolist(), *columns, strict=True)
+        for place, number, diameter, centre in zip(
+            order.tolist(), *columns, strict=True
+        )
     )
     head = f"grains: id type diameter density x y z\n\n{len(order)} atoms\n4 atom types\n\n"
     (directory / "grains.data").write_text(f"{head}{box}\nAtoms\n\n{rows}")
@@ -288,14 +302,19 @@ def read_texts(path: Path, rows: int = 1) -> dict[str, NDArray[Any]]:
         columns = np.array([line.split(",") for line in lines]).T
         return dict(zip(head.split(","), columns, strict=True))
     except (OSError, ValueError) as error:
-        what, remedy = f"the table cannot be read: {error}", "run the same command again"
+        what, remedy = (
+            f"the table cannot be read: {error}",
+            "run the same command again",
+        )
         raise SolverError(what, where=str(path), remedy=remedy) from None
 
 
 def read_table(path: Path, rows: int = 1) -> pd.DataFrame:
     """The numbers of such a CSV, to the last digit; NaN where one is missing."""
     columns = read_texts(path, rows).items()
-    return pd.DataFrame({n: np.where(c == "", "nan", c).astype(float) for n, c in columns})
+    return pd.DataFrame(
+        {n: np.where(c == "", "nan", c).astype(float) for n, c in columns}
+    )
 
 
 def read_dump(path: Path, columns: tuple[str, ...]) -> tuple[IntArray, pd.DataFrame]:
@@ -309,7 +328,9 @@ def read_dump(path: Path, columns: tuple[str, ...]) -> tuple[IntArray, pd.DataFr
         heads = [frame.split("\n", 8) for frame in text.split("ITEM: TIMESTEP\n")[1:]]
         steps, counts = (np.array([int(head[row]) for head in heads]) for row in (0, 2))
         body = StringIO("".join(head[8] for head in heads))
-        rows = pd.read_csv(body, sep=r"\s+", names=list(columns), header=None, low_memory=False)
+        rows = pd.read_csv(
+            body, sep=r"\s+", names=list(columns), header=None, low_memory=False
+        )
         whole = text.endswith("\n") and len(rows) == counts.sum()
         if not whole or rows.isna().any(axis=None):
             raise ValueError("it is cut short or has NaN")

@@ -159,7 +159,9 @@ class BedLine:
         ridge = inner[np.argmax(inner[:, 1])]
         apart = inner[inner[:, 0] != ridge[0]] - ridge
         steep = np.abs(np.arctan2(-apart[:, 1], np.abs(apart[:, 0]))).min()
-        return float(np.degrees(steep)), ridge + np.array([0, clearance / np.cos(steep)])
+        return float(np.degrees(steep)), ridge + np.array(
+            [0, clearance / np.cos(steep)]
+        )
 
     def nearest(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
         """The segment nearest to each of m points, and the arc length of the nearest place on it.
@@ -170,10 +172,15 @@ class BedLine:
         blocks = len(points) * len(self.lengths) // PLACES + 1
         for block in np.array_split(np.arange(len(points)), blocks):
             away = points[block, None] - self.corners[:-1]
-            along = np.clip(np.einsum("mnk,nk->mn", away, self.tangents), 0.0, self.lengths)
+            along = np.clip(
+                np.einsum("mnk,nk->mn", away, self.tangents), 0.0, self.lengths
+            )
             places = self.corners[:-1] + along[..., None] * self.tangents
             distance = np.linalg.norm(points[block, None] - places, axis=2)
-            tied = distance <= distance.min(axis=1, keepdims=True) + 1e-9 * self.lengths.max()
+            tied = (
+                distance
+                <= distance.min(axis=1, keepdims=True) + 1e-9 * self.lengths.max()
+            )
             chosen = np.argmax(np.where(tied, places[..., 1], -np.inf), axis=1)
             segment[block] = chosen
             s[block] = self.arc_lengths[chosen] + along[np.arange(len(block)), chosen]
@@ -210,7 +217,10 @@ def triangle(slope_deg: float, height: float) -> BedLine:
 def between_flats(corners: FloatArray, height: float) -> BedLine:
     """A line with flat bed before and behind some corners."""
     (x_first, z_first), (x_last, z_last) = corners[[0, -1]]
-    before, behind = (x_first - UPSTREAM * height, z_first), (x_last + DOWNSTREAM * height, z_last)
+    before, behind = (
+        (x_first - UPSTREAM * height, z_first),
+        (x_last + DOWNSTREAM * height, z_last),
+    )
     return BedLine.through(np.vstack([before, corners, behind]), height)
 
 
@@ -220,8 +230,12 @@ def _train(form: FloatArray, count: int, spacing: float | None) -> FloatArray:
     spacing = spacing or length
     if count > 1 and spacing < length * (1 - 1e-9):
         what = f"forms {length:g} m long overlap at {spacing:g} m"
-        raise UnfitError("bed.spacing", what, "raise it, or leave it out: they touch then")
-    corners = np.vstack([form + np.array([place * spacing, 0]) for place in range(count)])
+        raise UnfitError(
+            "bed.spacing", what, "raise it, or leave it out: they touch then"
+        )
+    corners = np.vstack(
+        [form + np.array([place * spacing, 0]) for place in range(count)]
+    )
     # forms that touch share a corner
     return np.asarray(corners[np.append(True, np.diff(corners[:, 0]) > 1e-9 * spacing)])
 
@@ -241,7 +255,9 @@ def _foot(line: BedLine, top: FloatArray, way: int) -> FloatArray:
     """Where a side that goes down from a point, upstream (-1) or downstream (1), meets the bed."""
     x = float(top[0])
     for _ in range(50):  # the side is steeper than any bed: this converges
-        x = float(top[0] + way * (top[1] - line.height(np.array(x))) / tan(radians(SIDE_DEG)))
+        x = float(
+            top[0] + way * (top[1] - line.height(np.array(x))) / tan(radians(SIDE_DEG))
+        )
     return np.array([x, float(line.height(np.array(x)))])
 
 

@@ -35,8 +35,12 @@ SLIT = 0.15
 BARE = 1.0  # grains this near to an obstacle are fixed under its foot, diameters
 LOWER = 0.1  # a neighbour bears a grain that stands so much over it, diameters
 UNDER = 2  # rows of fixed grains where none is counted: none falls through them
-HIDES = 4.0  # farthest distance at which a grain hides another one of a lattice, diameters
-OFFSET = 0.125  # largest offset of a grain normal to its row, over the size of the disorder
+HIDES = (
+    4.0  # farthest distance at which a grain hides another one of a lattice, diameters
+)
+OFFSET = (
+    0.125  # largest offset of a grain normal to its row, over the size of the disorder
+)
 FINE = 0.1  # between two places of a curve at which a row may be opened, diameters
 TURNS = 100  # how often a row is opened further; grains that overlap then are left out by `cover`
 PLACES = 2000  # places along a bed without grains, as many as a figure shows
@@ -54,7 +58,9 @@ class Places:
     width: float = 0.0
 
     @classmethod
-    def of(cls, centres: FloatArray, across: ArrayLike = 0.0, width: float = 0.0) -> "Places":
+    def of(
+        cls, centres: FloatArray, across: ArrayLike = 0.0, width: float = 0.0
+    ) -> "Places":
         """Places from x and z, shape (n, 2), and y."""
         x, z = centres.T
         y = np.broadcast_to(np.asarray(across, float), x.shape)
@@ -78,7 +84,10 @@ class Places:
     def contacts(self, sizes: FloatArray, touch: float = TOUCH) -> tuple[IntArray, ...]:
         """Pairs as `pairs` gives them whose surfaces are nearer than a part of their mean size."""
         first, second, apart = self.pairs((1 + touch) * float(sizes.max()))
-        close = np.linalg.norm(apart, axis=1) < (1 + touch) * (sizes[first] + sizes[second]) / 2
+        close = (
+            np.linalg.norm(apart, axis=1)
+            < (1 + touch) * (sizes[first] + sizes[second]) / 2
+        )
         return first[close], second[close], apart[close]
 
 
@@ -151,13 +160,17 @@ class Lattice:
         """Whether its rows have random gaps."""
         return self.pattern == "disordered"
 
-    def packed(self, line: BedLine, centres: FloatArray, kinds: Iterable[BoolArray]) -> Packing:
+    def packed(
+        self, line: BedLine, centres: FloatArray, kinds: Iterable[BoolArray]
+    ) -> Packing:
         """The mobile, windward and lee grains on a line; those of a replica a little aside."""
         mobile, windward, lee = kinds
         aside = PERTURBATION if self.seed and not self.uneven else 0.0
         shift = np.random.default_rng(self.seed).uniform(-aside, aside, centres.shape)
         arc_length = line.nearest(centres)[1]
-        return Packing(centres + shift, np.ones(len(centres)), mobile, windward, lee, arc_length)
+        return Packing(
+            centres + shift, np.ones(len(centres)), mobile, windward, lee, arc_length
+        )
 
 
 def along(line: BedLine, counts: str | Range) -> Packing:
@@ -169,18 +182,24 @@ def along(line: BedLine, counts: str | Range) -> Packing:
     finer = line.with_corners([*ends, *(end for bare in line.bare for end in bare)])
     x, s = np.array(finer.x), finer.arc_lengths
     middle = (x[1:] + x[:-1]) / 2
-    chosen = line.counted(counts)[np.searchsorted(line.x, middle) - 1] & within(middle, counts)
+    chosen = line.counted(counts)[np.searchsorted(line.x, middle) - 1] & within(
+        middle, counts
+    )
     for start, end in line.bare:
         chosen &= (middle < start) | (middle > end)
     sums = np.concatenate([[0.0], np.cumsum(np.where(chosen, finer.lengths, 0.0))])
     if not sums[-1]:
-        raise UnfitError("bed.counted", "no bed is counted", "choose another part of the bed")
+        raise UnfitError(
+            "bed.counted", "no bed is counted", "choose another part of the bed"
+        )
     ways = (np.arange(PLACES) + 0.5) / PLACES * sums[-1]
     piece = np.searchsorted(sums, ways, side="right") - 1
     arc_length = s[piece] + ways - sums[piece]
     x = np.interp(arc_length, s, x)
     each, none = np.ones(PLACES), np.zeros(PLACES, bool)
-    return Packing(np.column_stack([x, line.height(x)]), each, none, ~none, none, arc_length)
+    return Packing(
+        np.column_stack([x, line.height(x)]), each, none, ~none, none, arc_length
+    )
 
 
 def pile(line: BedLine, lattice: Lattice) -> Packing:
@@ -193,7 +212,9 @@ def pile(line: BedLine, lattice: Lattice) -> Packing:
     layers = mobile_layers + (lattice.pattern == "horizontal")
     # below the layers that hold mobile grains one is enough: a grain touches no deeper one
     thick = {faces[0]: (layers + 0.5) * row_height, faces[1]: LEE_DEPTH * row_height}
-    points = _filling(line, replace(lattice, mobile_layers=mobile_layers), surface, thick)
+    points = _filling(
+        line, replace(lattice, mobile_layers=mobile_layers), surface, thick
+    )
     deep = np.array([surface - line.over(points, face) for face in faces])
     depth, level = deep.min(axis=0), points[:, 1] - surface
     shell = (deep[0] < thick[faces[0]]) | (deep[1] < thick[faces[1]])
@@ -205,11 +226,16 @@ def pile(line: BedLine, lattice: Lattice) -> Packing:
     body, depth, behind = points[kept], deep[0, kept], deep[1, kept]
     buried = level[kept] < -TIE
     ahead = body[:, 0] <= line.crest[0] + TIE
-    free = exposed(body, line.tangents[np.where(ahead, *faces)], slack=lattice.disorder) & ~buried
+    free = (
+        exposed(body, line.tangents[np.where(ahead, *faces)], slack=lattice.disorder)
+        & ~buried
+    )
     windward, lee = free & ahead, free & ~ahead
     # on a steep lee side no grain lies by itself
     fallen = (behind < 1) & ~_rests(body)
-    mobile = ((depth < (mobile_layers - 0.5) * row_height) & ~buried & ~fallen) | windward
+    mobile = (
+        (depth < (mobile_layers - 0.5) * row_height) & ~buried & ~fallen
+    ) | windward
     needed = ~buried | _touching(body, mobile)
     apron = _apron(body[needed], surface)
     fixed = np.zeros(len(apron), bool)
@@ -235,11 +261,17 @@ def _filling(
     normal = np.array([-direction[1], direction[0]])
     apex = line.crest + np.array([0, surface / face[0]])
     corners = np.array([np.zeros(2), line.toe, line.crest]) - apex
-    along, down = corners @ direction / np.cos(beta) / 2, -corners @ normal / np.sin(beta)
+    along, down = (
+        corners @ direction / np.cos(beta) / 2,
+        -corners @ normal / np.sin(beta),
+    )
     rows = np.arange(0, whole_up(down.max()) + 3)
     columns = np.arange(-whole_up(-along.min()) - 3, whole_up(along.max()) + 4)
     offset = (2 * columns + rows[:, None] % 2) * np.cos(beta)
-    fall, near = np.broadcast_to(rows[:, None] * np.sin(beta), offset.shape), offset < -np.inf
+    fall, near = (
+        np.broadcast_to(rows[:, None] * np.sin(beta), offset.shape),
+        offset < -np.inf,
+    )
     for face, most in thick.items():
         out = line.normals[face]
         over = offset * (direction @ out) - fall * (normal @ out)
@@ -250,7 +282,9 @@ def _filling(
     uneven = max(lattice.mobile_layers, DISORDERED)
     count = whole_up(line.crest_s / np.cos(beta) / 2) + uneven + 4
     upper = apex + _disordered(count, uneven, lattice) @ np.vstack([direction, normal])
-    return np.vstack([upper, points[(apex - points) @ normal > (uneven + 0.5) * np.sin(beta)]])
+    return np.vstack(
+        [upper, points[(apex - points) @ normal > (uneven + 0.5) * np.sin(beta)]]
+    )
 
 
 def _disordered(columns: int, layers: int, lattice: Lattice) -> FloatArray:
@@ -300,7 +334,9 @@ def _apron(body: FloatArray, surface: float) -> FloatArray:
     return np.column_stack([x, np.full(len(x), surface)])
 
 
-def cover(line: BedLine, ground: BedLine, counts: str | Range, lattice: Lattice) -> Packing:
+def cover(
+    line: BedLine, ground: BedLine, counts: str | Range, lattice: Lattice
+) -> Packing:
     """Pack the grains of a bed of any shape; lengths in diameters.
 
     The line is divided at its sharp corners. Each part has rows of its own, those that are counted
@@ -324,7 +360,9 @@ def cover(line: BedLine, ground: BedLine, counts: str | Range, lattice: Lattice)
     mobile = chosen & near & _rests(centres)
     counted = mobile & seen
     if not counted.any():
-        raise UnfitError("bed.counted", "no grain is counted", "choose another part of the bed")
+        raise UnfitError(
+            "bed.counted", "no grain is counted", "choose another part of the bed"
+        )
     needed = mobile | seen | _touching(centres, mobile)
     kinds = (mobile, counted, seen & ~counted)
     return lattice.packed(line, centres[needed], (kind[needed] for kind in kinds))
@@ -353,13 +391,17 @@ def _rows(top: BedLine, counted: BoolArray, lattice: Lattice) -> Iterator[FloatA
     if lattice.pattern == "horizontal":
         yield _level_rows(top, lattice)
     for turn in (True, False) if lattice.pattern != "horizontal" else (False,):
-        for first, last in (part for part, has in zip(parts, carries, strict=True) if has == turn):
+        for first, last in (
+            part for part, has in zip(parts, carries, strict=True) if has == turn
+        ):
             points = _rows_along(top, first, last, lattice, turn)
             straight = first == last and lattice.pattern == "aligned"
             yield points[_depth(top, points)[1] >= -(TIE if straight else STRAY)]
 
 
-def _rows_along(top: BedLine, first: int, last: int, lattice: Lattice, counted: bool) -> FloatArray:
+def _rows_along(
+    top: BedLine, first: int, last: int, lattice: Lattice, counted: bool
+) -> FloatArray:
     """Rows under some segments of a line, which end a little beyond them."""
     layers = lattice.mobile_layers + (lattice.pattern == "horizontal")
     rows = layers + 1 if counted else UNDER
@@ -391,7 +433,9 @@ def _on_a_curve(
     arc = curve.arc_lengths - curve.arc_lengths[0]
     for _ in range(TURNS):
         along = np.interp(close, places - np.cumsum(opened), places)
-        segment = np.clip(np.searchsorted(arc, along, side="right") - 1, 0, len(arc) - 2)
+        segment = np.clip(
+            np.searchsorted(arc, along, side="right") - 1, 0, len(arc) - 2
+        )
         into = (along - arc[segment])[:, None] * curve.tangents[segment]
         lowest = curve.corners[segment] + into + aside[:, None] * curve.normals[segment]
         rows = _stacked(lowest, layers)
@@ -423,7 +467,9 @@ def _level_rows(top: BedLine, lattice: Lattice) -> FloatArray:
     x = top.crest[0] + spacing * (np.arange(count) - before)
     parts = []
     for row in range(whole_up((highest - min(top.z)) / row_height) + layers + 2):
-        places = np.column_stack([x + row % 2 * half, np.full_like(x, highest - row * row_height)])
+        places = np.column_stack(
+            [x + row % 2 * half, np.full_like(x, highest - row * row_height)]
+        )
         over = top.height(places[:, 0]) - places[:, 1]
         parts.append(places[(over > -1) & (over < thick)])
     points = np.vstack(parts)
@@ -436,7 +482,10 @@ def _depth(top: BedLine, points: FloatArray) -> tuple[IntArray, FloatArray]:
     segment = top.nearest(points)[0]
     depth = -top.over(points, segment)
     # over a top the point may be above the line of the other segment
-    for other in (np.maximum(segment - 1, 0), np.minimum(segment + 1, len(top.lengths) - 1)):
+    for other in (
+        np.maximum(segment - 1, 0),
+        np.minimum(segment + 1, len(top.lengths) - 1),
+    ):
         convex = top.bends_deg[np.maximum(segment, other)] > SHARP_DEG
         beside = -top.over(points, other)
         depth = np.where(convex & (other != segment), np.minimum(depth, beside), depth)
@@ -470,7 +519,9 @@ def exposed(centres: FloatArray, tangents: FloatArray, slack: float = 0.0) -> Bo
     return np.asarray(np.bincount(first[hidden], minlength=len(centres)) == 0)
 
 
-def shadows(along: Places, height: FloatArray, radii: FloatArray) -> tuple[IntArray, IntArray]:
+def shadows(
+    along: Places, height: FloatArray, radii: FloatArray
+) -> tuple[IntArray, IntArray]:
     """Pairs of grains of any sizes: one that is hidden, and one that hides it.
 
     A grain is hidden where the line through its centre, normal to the bed, meets another grain

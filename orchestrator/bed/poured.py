@@ -48,7 +48,9 @@ MOST_GRAINS = 100_000
 """Most grains of a poured bed: some hundred megabytes, and half an hour of one core."""
 LAYER = np.sin(np.pi / 3)  # thickness of a layer, d: as of a lattice
 NEAR = 0.5  # fixed grains whose surfaces are nearer than this to a mobile one's are in the case, d
-LOCAL = 5.0  # length of bed before and behind a grain that its height is compared with, d
+LOCAL = (
+    5.0  # length of bed before and behind a grain that its height is compared with, d
+)
 
 
 def drawn(
@@ -108,7 +110,12 @@ class PouredBed(Case):
         fields = ("depth", "surface", "diameter", "friction_angle_deg", "seed", "width")
         sizes = self.sizes if isinstance(self.sizes, tuple | None) else str(self.sizes)
         values = {name: getattr(self, name) for name in fields}
-        return {"x": list(self.line.x), "z": list(self.line.z), "sizes": sizes, **values}
+        return {
+            "x": list(self.line.x),
+            "z": list(self.line.z),
+            "sizes": sizes,
+            **values,
+        }
 
     @property
     def cost_s(self) -> float:
@@ -130,7 +137,9 @@ class PouredBed(Case):
             raise InputError(what, "bed.length", f"at least {LEAST_LENGTH:g} diameters")
         if self._count > MOST_GRAINS:
             what = f"about {self._count:.2g} grains would be poured, more than {MOST_GRAINS:g}"
-            remedy = "a shorter bed, larger grains, or less of bed.poured_depth or bed.width"
+            remedy = (
+                "a shorter bed, larger grains, or less of bed.poured_depth or bed.width"
+            )
             raise InputError(what, where="bed.packing", remedy=remedy)
 
     @cached_property
@@ -170,17 +179,23 @@ class PouredBed(Case):
         rows = digits.whole_up(self.width)
         y = np.tile(np.arange(rows) * self.width / rows, len(x))
         upper = np.column_stack([np.repeat(x, rows), y, np.repeat(z, rows)])
-        return np.vstack([upper, upper + np.array([0.5, self.width / rows / 2, -np.sqrt(0.5)])])
+        return np.vstack(
+            [upper, upper + np.array([0.5, self.width / rows / 2, -np.sqrt(0.5)])]
+        )
 
     def rain(self, sizes: FloatArray) -> FloatArray:
         """Places in the air, (n, 3), of grains of n sizes (d): rows in which no two touch."""
-        chance = np.random.default_rng(self.seed).uniform(size=(len(sizes), 3 if self.width else 2))
+        chance = np.random.default_rng(self.seed).uniform(
+            size=(len(sizes), 3 if self.width else 2)
+        )
         places = np.zeros((len(sizes), 3))
         # with no room to the sides each lane would stay a bed in a plane
         lanes = max(int(self.width / ((1 + LOOSE) * float(sizes.max()))), 1)
         for lane in range(lanes):
             grains = slice(lane, None, lanes)
-            places[grains, 0], places[grains, 2] = self._lane(sizes[grains], chance[grains]).T
+            places[grains, 0], places[grains, 2] = self._lane(
+                sizes[grains], chance[grains]
+            ).T
             if self.width:
                 wide = self.width / lanes
                 aside = (chance[grains, 2] - 0.5) * (wide - sizes[grains])
@@ -201,7 +216,9 @@ class PouredBed(Case):
             tops[under] = np.maximum(tops[under], z + 0.5)
         places = np.empty((len(sizes), 2))
         x = start + room[0] * chance[0, 0]
-        for number, (size, wide) in enumerate(zip(sizes.tolist(), room.tolist(), strict=True)):
+        for number, (size, wide) in enumerate(
+            zip(sizes.tolist(), room.tolist(), strict=True)
+        ):
             beside, over = LOOSE * size * chance[number, :2]
             if x + wide > end:
                 x = start + wide * chance[number, 0]
@@ -221,18 +238,34 @@ class PouredBed(Case):
     def grains(self) -> tuple[FloatArray, FloatArray]:
         """Centres of all grains, the fixed first, and their diameters, d."""
         floor, sizes = self.floor, self._drawn(self._count, self.seed)
-        return np.vstack([floor, self.rain(sizes)]), np.append(np.ones(len(floor)), sizes)
+        return np.vstack([floor, self.rain(sizes)]), np.append(
+            np.ones(len(floor)), sizes
+        )
 
     def write(self, directory: Path, cases: Path) -> None:
         """Write the grains in the air, the walls and the cut."""
         start, end = self.ends
         centres, sizes = self.grains
-        grain = {"diameter": DIAMETER, "smallest": float(sizes.min()), "density": DENSITY}
-        contact = {"gravity": GRAVITY, "friction": tan(radians(self.friction_angle_deg)), **CONTACT}
-        walls = {"upstream": start * DIAMETER, "downstream": end * DIAMETER, "most_looks": LONGEST}
+        grain = {
+            "diameter": DIAMETER,
+            "smallest": float(sizes.min()),
+            "density": DENSITY,
+        }
+        contact = {
+            "gravity": GRAVITY,
+            "friction": tan(radians(self.friction_angle_deg)),
+            **CONTACT,
+        }
+        walls = {
+            "upstream": start * DIAMETER,
+            "downstream": end * DIAMETER,
+            "most_looks": LONGEST,
+        }
         sharing = {"width": self.width, "ranks": self.ranks}
         stages = {"stiffness": STIFFNESS, "drag": DRAG, "calm": CALM}
-        deck.write_parameters(directory, {**grain, **contact, **walls, **sharing, **stages})
+        deck.write_parameters(
+            directory, {**grain, **contact, **walls, **sharing, **stages}
+        )
         (x, z), (run, rise) = self.line.corners.T, self.line.tangents.T
         x, raised = x * DIAMETER, (z[:-1] + self.surface / run) * DIAMETER
         cut = {"x0": x[:-1], "x1": x[1:], "z0": raised, "slope": rise / run}
@@ -258,13 +291,19 @@ class PouredBed(Case):
         liggghts.check_log(directory)
         where = str(directory / SETTLING)
         last = deck.read_table(directory / SETTLING).groupby("stage").last()
-        energy = (last["ke"] / last["grains"].clip(lower=1) / (WEIGHT * DIAMETER)).to_numpy()
+        energy = (
+            last["ke"] / last["grains"].clip(lower=1) / (WEIGHT * DIAMETER)
+        ).to_numpy()
         if len(last) < len(CALM) or not (last["grains"] > 0).all():
             what = "no grain of the poured bed is left"
-            raise SolverError(what, where, "a gentler slope, or more of bed.poured_depth")
+            raise SolverError(
+                what, where, "a gentler slope, or more of bed.poured_depth"
+            )
         if not np.all(energy < CALM):
             what = f"the poured bed does not come to rest: {energy[-1]:.2g} W d a grain"
-            raise Noisy(what, where, "a gentler slope, or a larger grain.friction_angle_deg")
+            raise Noisy(
+                what, where, "a gentler slope, or a larger grain.friction_angle_deg"
+            )
         _, rows = deck.read_dump(directory / DUMP, ("id", "x", "y", "z"))
         number = rows["id"].to_numpy(np.int64) - 1
         bed = pd.DataFrame({f"{axis}_over_d": rows[axis] / DIAMETER for axis in "xyz"})
@@ -288,7 +327,10 @@ def read(
     an InputError if no grain is counted.
     """
     rows = deck.read_table(directory / BED)
-    centres, sizes = rows[["x_over_d", "z_over_d"]].to_numpy(float), rows["size"].to_numpy(float)
+    centres, sizes = (
+        rows[["x_over_d", "z_over_d"]].to_numpy(float),
+        rows["size"].to_numpy(float),
+    )
     mobile = rows["fixed"].to_numpy() == 0
     segment, along = line.nearest(centres)
     height = line.over(centres, segment)
@@ -301,7 +343,9 @@ def read(
     counted = free & line.counted(counts)[segment] & within(centres[:, 0], counts)
     if not counted.any():
         what = "no grain of the poured bed is exposed where grains are counted"
-        raise InputError(what, "bed.counted", "choose another part of the bed, or another bed.seed")
+        raise InputError(
+            what, "bed.counted", "choose another part of the bed, or another bed.seed"
+        )
     first, second, apart = places.pairs(float(sizes.max()) + NEAR)
     gap = np.linalg.norm(apart, axis=1) - (sizes[first] + sizes[second]) / 2
     near = mobile.copy()

@@ -8,18 +8,28 @@ from typing import Any
 
 def add(commands: Any) -> None:
     """Add ``benchmark`` with its parts to the parser of the program."""
-    group = commands.add_parser("benchmark", help="compare another solver with this one")
+    group = commands.add_parser(
+        "benchmark", help="compare another solver with this one"
+    )
     parts = group.add_subparsers(required=True, metavar="part")
 
     def part(name: str, run: Any, text: str) -> argparse.ArgumentParser:
         # the directories first: an option of several values would take them for its own
-        usage = f"%(prog)s PACK {'RESULTS ... ' if name == 'compare' else ''}[OPTION ...]"
-        command: argparse.ArgumentParser = parts.add_parser(name, help=text, usage=usage)
+        usage = (
+            f"%(prog)s PACK {'RESULTS ... ' if name == 'compare' else ''}[OPTION ...]"
+        )
+        command: argparse.ArgumentParser = parts.add_parser(
+            name, help=text, usage=usage
+        )
         command.set_defaults(run=run)
-        command.add_argument("pack", type=Path, metavar="PACK", help="directory of the pack")
+        command.add_argument(
+            "pack", type=Path, metavar="PACK", help="directory of the pack"
+        )
         several: dict[str, Any] = {"action": "extend", "nargs": "+", "default": []}
         text, levels = "only these levels, 1 to 5", (1, 2, 3, 4, 5)
-        command.add_argument("--level", **several, type=int, choices=levels, metavar="N", help=text)
+        command.add_argument(
+            "--level", **several, type=int, choices=levels, metavar="N", help=text
+        )
         if name != "export":
             text = "only these scenes, such as '2-incline-*'"
             command.add_argument("--scene", **several, metavar="PATTERN", help=text)
@@ -29,7 +39,9 @@ def add(commands: Any) -> None:
     text = "a finished study; without one only levels 1 and 2, which are formulas"
     command.add_argument("--from", dest="study", type=Path, metavar="DIR", help=text)
 
-    command = part("run", _judge, "run a solver on each scene, ours in turn, and compare")
+    command = part(
+        "run", _judge, "run a solver on each scene, ours in turn, and compare"
+    )
     text = "such as 'my-solver {case} {out}': a scene's directory, and the CSV file to write"
     command.add_argument("--solver", required=True, metavar="COMMAND", help=text)
     text = "what the page calls the solver; default: its script, or its program"
@@ -51,7 +63,9 @@ def add(commands: Any) -> None:
 def _export(options: argparse.Namespace) -> int:
     from orchestrator.benchmark.export import export
 
-    print(f"{options.pack}: {export(options.pack, options.study, options.level)} scenes")
+    print(
+        f"{options.pack}: {export(options.pack, options.study, options.level)} scenes"
+    )
     return 0
 
 
@@ -63,7 +77,9 @@ def _judge(options: argparse.Namespace) -> int:
     if "results" in options:
         outcome = compare.compare(options.pack, options.results, options.out, choice)
     else:
-        choice = choice._replace(seconds=options.limit, memory=options.memory, name=options.name)
+        choice = choice._replace(
+            seconds=options.limit, memory=options.memory, name=options.name
+        )
         outcome = compare.run(options.pack, options.solver, options.out, choice)
     for line in outcome.failures:
         print(f"orchestrator: {line}", file=sys.stderr)

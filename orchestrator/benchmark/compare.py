@@ -101,7 +101,9 @@ def run(root: Path, command: str, out: Path | None, options: Options) -> Outcome
         for level, listed in groupby(names, lambda name: chosen.scenes[name]["level"]):
             of_level = list(listed)
             scenes = "scene" if len(of_level) == 1 else "scenes"
-            print(f"level {level}: {len(of_level)} {scenes}", file=sys.stderr, flush=True)
+            print(
+                f"level {level}: {len(of_level)} {scenes}", file=sys.stderr, flush=True
+            )
             for name in of_level:
                 _solve(words, chosen.root / pack.SCENES / name, options, folder, name)
                 answer, times = ours.answer(name)
@@ -111,7 +113,9 @@ def run(root: Path, command: str, out: Path | None, options: Options) -> Outcome
         return _written(chosen, judge.judge(chosen, names, [out]), folder)
 
 
-def compare(root: Path, results: Sequence[Path], out: Path | None, options: Options) -> Outcome:
+def compare(
+    root: Path, results: Sequence[Path], out: Path | None, options: Options
+) -> Outcome:
     """Judge answers that are there, and write one page of all solvers.
 
     Parameters
@@ -137,7 +141,9 @@ def compare(root: Path, results: Sequence[Path], out: Path | None, options: Opti
     solvers = [OURS, *map(name_of, results)]
     for place, solver in zip(results, solvers[1:], strict=True):
         if not place.is_dir():
-            raise InputError("there is no such directory", where=str(place), remedy="name another")
+            raise InputError(
+                "there is no such directory", where=str(place), remedy="name another"
+            )
         if solvers.count(solver) > 1:
             remedy = "run one with another --name, or rename its directory"
             raise InputError(f"two solvers have the name {solver}", "RESULTS", remedy)
@@ -161,11 +167,17 @@ def compare(root: Path, results: Sequence[Path], out: Path | None, options: Opti
 
 def _check_pack(place: Path, chosen: Pack) -> None:
     """Refuse results of `run` whose answers are to the questions of another pack."""
-    answered = workspace.read_marker(place, workspace.RESULTS).get("pack", chosen.questions)
+    answered = workspace.read_marker(place, workspace.RESULTS).get(
+        "pack", chosen.questions
+    )
     if answered != chosen.questions:
         what = "it holds answers to another pack, or to an earlier export of this one"
-        remedy = "compare them with the pack that they answer, or run the solver on this one"
-        raise InputError(f"{what}: {chosen.root}", where=str(place), remedy=f"{remedy} with --out")
+        remedy = (
+            "compare them with the pack that they answer, or run the solver on this one"
+        )
+        raise InputError(
+            f"{what}: {chosen.root}", where=str(place), remedy=f"{remedy} with --out"
+        )
 
 
 def _note_pack(folder: Folder, chosen: Pack) -> None:
@@ -175,7 +187,9 @@ def _note_pack(folder: Folder, chosen: Pack) -> None:
     other = str(about.get("at", at))
     if other != at and (folder.root / other / pack.MANIFEST).is_file():
         what = f"the directory holds the comparison with another pack, {other}"
-        raise InputError(what, where=str(folder.root), remedy="choose another with --out")
+        raise InputError(
+            what, where=str(folder.root), remedy="choose another with --out"
+        )
     folder.note(workspace.COMPARISON.marker, text_of({**about, "at": at}))
 
 
@@ -202,24 +216,41 @@ def split(command: str) -> list[str]:
             remedy = "such as 'my-solver {case} {out}'"
             raise InputError(f"the command has no {part}", "--solver", remedy)
     for word in filter(OPERATORS.fullmatch, words):
-        raise InputError(f"no shell reads the command: {word}", "--solver", "write: sh -c '...'")
+        raise InputError(
+            f"no shell reads the command: {word}", "--solver", "write: sh -c '...'"
+        )
     if shutil.which(words[0]) is None:
         what = f"there is no program {words[0]} that may be run"
         raise InputError(what, "--solver", "give its path")
-    return [str(Path(word).absolute()) if Path(word).is_file() else word for word in words]
+    return [
+        str(Path(word).absolute()) if Path(word).is_file() else word for word in words
+    ]
 
 
-def _solve(words: Sequence[str], scene: Path, options: Options, folder: Folder, name: str) -> None:
+def _solve(
+    words: Sequence[str], scene: Path, options: Options, folder: Folder, name: str
+) -> None:
     """Run a solver on a copy of a scene, in a directory that is removed afterwards.
 
     Its answer, its output, its times (s) and memory (MiB) are put into a directory of the results;
     with the times is ``error``, the reason why the answer does not count.
     """
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as private:
-        work, log, report = Path(private, "work"), Path(private, LOG), Path(private, USED)
-        case, out, memory = work / "case", work / ANSWER, f"{options.memory * 2**30:.0f}"
+        work, log, report = (
+            Path(private, "work"),
+            Path(private, LOG),
+            Path(private, USED),
+        )
+        case, out, memory = (
+            work / "case",
+            work / ANSWER,
+            f"{options.memory * 2**30:.0f}",
+        )
         shutil.copytree(scene, case)
-        command = [word.replace("{case}", str(case)).replace("{out}", str(out)) for word in words]
+        command = [
+            word.replace("{case}", str(case)).replace("{out}", str(out))
+            for word in words
+        ]
         ended = process.run(
             [sys.executable, "-ISc", MEASURE, str(report), memory, *command],
             cwd=work,
@@ -229,7 +260,9 @@ def _solve(words: Sequence[str], scene: Path, options: Options, folder: Folder, 
             output_limit=LOG_BYTES,
             file_limit=FILE_BYTES,
         )
-        error = f"it ended with {ended.returncode}: {process.last_words(log)}".rstrip(": ")
+        error = f"it ended with {ended.returncode}: {process.last_words(log)}".rstrip(
+            ": "
+        )
         if ended.over == "time":
             error = f"it did not end within {options.seconds:g} s and was killed"
         elif ended.over:
@@ -244,11 +277,16 @@ def _solve(words: Sequence[str], scene: Path, options: Options, folder: Folder, 
             folder.note(f"{name}/{LOG}", stream.read(LOG_BYTES))
 
 
-def _written(chosen: Pack, judged: tuple[pd.DataFrame, pd.DataFrame], folder: Folder) -> Outcome:
+def _written(
+    chosen: Pack, judged: tuple[pd.DataFrame, pd.DataFrame], folder: Folder
+) -> Outcome:
     """Put tables, figures and page of a comparison into a directory."""
     numbers, verdicts = judged
     theirs = verdicts[verdicts["solver"] != OURS]
-    tables = {NUMBERS: (numbers[numbers["solver"] != OURS], "%.9g"), VERDICTS: (theirs, "%.6g")}
+    tables = {
+        NUMBERS: (numbers[numbers["solver"] != OURS], "%.9g"),
+        VERDICTS: (theirs, "%.6g"),
+    }
     with folder.renewed():
         for name, (table, digits) in tables.items():
             columns = ["solver", *table.columns.drop("solver")]
@@ -261,4 +299,6 @@ def _written(chosen: Pack, judged: tuple[pd.DataFrame, pd.DataFrame], folder: Fo
         lines[LISTED:] = [f"and {len(lines) - LISTED} more: see {VERDICTS}"]
     table = judge.summary(theirs).dropna(axis=1, how="all")
     text = table.to_string(index=False, na_rep="", float_format="{:.3g}".format)
-    return Outcome(lines, "\n".join([text, *judge.in_words(theirs)]), folder.root / page.PAGE)
+    return Outcome(
+        lines, "\n".join([text, *judge.in_words(theirs)]), folder.root / page.PAGE
+    )

@@ -309,9 +309,13 @@ def failures(verdicts: pd.DataFrame) -> pd.DataFrame:
     """
     failed = verdicts[verdicts["failed"]]
     # messages of one cause differ in their numbers
-    cause = failed["message"].str.replace(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "#", regex=True)
+    cause = failed["message"].str.replace(
+        r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "#", regex=True
+    )
     rows = []
-    for (solver, kind, _), group in failed.groupby(["solver", "kind", cause], sort=False):
+    for (solver, kind, _), group in failed.groupby(
+        ["solver", "kind", cause], sort=False
+    ):
         first = group.iloc[0]
         scenes = first["scene"]
         if len(group) > 1:

@@ -27,7 +27,12 @@ from orchestrator.types import Row
 
 SCHEMA = 2
 """Version of the exchange format. A key or column that is renamed is a new version."""
-MANIFEST, EXPECTED, STUDY, TIMES = "manifest.json", "expected.csv", "study.toml", "times.csv"
+MANIFEST, EXPECTED, STUDY, TIMES = (
+    "manifest.json",
+    "expected.csv",
+    "study.toml",
+    "times.csv",
+)
 FILES = (EXPECTED, "scenes.csv", TIMES, STUDY, "README.md")
 """Files of a pack beside its manifest and the directory of its scenes."""
 SCENES, SCENE = "scenes", "scene.json"
@@ -38,7 +43,14 @@ COUNTS = ("moved", "not_moved", "carried_off")
 LARGEST_TOLERANCE = 1.0  # relative, of an expected answer
 NUMBER = "%.9g"  # format of the numbers in all tables
 KINDS = {
-    **{"closed-form": 1, "collision": 2, "incline": 2, "sliding": 2, "passing": 2, "pivot": 2},
+    **{
+        "closed-form": 1,
+        "collision": 2,
+        "incline": 2,
+        "sliding": 2,
+        "passing": 2,
+        "pivot": 2,
+    },
     **{"flow": 3, "pile": 4, "line": 5},
 }
 """Kinds of scenes, and the level of each."""
@@ -46,7 +58,9 @@ CONTRACT = "## Write a solver\n"
 """Heading in docs/benchmark.md with which the contract for solvers begins."""
 _DECIMAL = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 """A number as programs print it; Python would also take 1_000 and digits of other scripts."""
-_IN_SCENES = re.compile(r"[1-5]-[a-z0-9]+([.+-][a-z0-9]+)*/[a-z0-9]+([_-][a-z0-9]+)*\.(csv|json)")
+_IN_SCENES = re.compile(
+    r"[1-5]-[a-z0-9]+([.+-][a-z0-9]+)*/[a-z0-9]+([_-][a-z0-9]+)*\.(csv|json)"
+)
 
 
 class Manifest(BaseModel):
@@ -62,7 +76,9 @@ class Manifest(BaseModel):
     machine: dict[str, str | int | None]
 
 
-_ENTRIES = TypeAdapter(dict[str, float | str], config=ConfigDict(strict=True, allow_inf_nan=False))
+_ENTRIES = TypeAdapter(
+    dict[str, float | str], config=ConfigDict(strict=True, allow_inf_nan=False)
+)
 
 
 @dataclass(frozen=True)
@@ -104,7 +120,10 @@ class Problem:
         folder.mkdir(parents=True)
         text = json.dumps({"schema": SCHEMA, **self.entries}, indent=1, allow_nan=False)
         (folder / SCENE).write_text(text + "\n", encoding="utf-8")
-        for stem, table in {**self.tables, "ask": self.expected[["quantity", "at"]]}.items():
+        for stem, table in {
+            **self.tables,
+            "ask": self.expected[["quantity", "at"]],
+        }.items():
             (folder / f"{stem}.csv").write_text(csv(table), encoding="utf-8")
 
 
@@ -114,7 +133,11 @@ def csv(table: pd.DataFrame) -> str:
 
 
 def expectation(
-    quantity: str, value: float, tolerance: float, at: float | None = None, *interval: float
+    quantity: str,
+    value: float,
+    tolerance: float,
+    at: float | None = None,
+    *interval: float,
 ) -> Row:
     """A row of the expected answers; the value is also our answer.
 
@@ -152,10 +175,14 @@ class Pack:
         A pack that was exported again has the same one, unless a scene has changed.
         """
         asked = self.manifest.sha256.items()
-        given = {name: digest for name, digest in asked if name.startswith(f"{SCENES}/")}
+        given = {
+            name: digest for name, digest in asked if name.startswith(f"{SCENES}/")
+        }
         return digest_text(canonical_json(given))
 
-    def chosen(self, levels: Collection[int] = (), patterns: Collection[str] = ()) -> list[str]:
+    def chosen(
+        self, levels: Collection[int] = (), patterns: Collection[str] = ()
+    ) -> list[str]:
         """Names of the scenes of some levels and patterns, empty for all, by rising level.
 
         Raises InputError if none is left.
@@ -163,7 +190,9 @@ class Pack:
         names = []
         for name, given in self.scenes.items():
             is_of_level = not levels or given["level"] in levels
-            if is_of_level and any(fnmatchcase(name, pattern) for pattern in patterns or ["*"]):
+            if is_of_level and any(
+                fnmatchcase(name, pattern) for pattern in patterns or ["*"]
+            ):
                 names.append(name)
         if not names:
             remedy = "see its scenes.csv, and --level and --scene"
@@ -177,7 +206,9 @@ def read(root: Path) -> Pack:
         what = f"there is no pack here: {MANIFEST} is missing"
         remedy = "write one with: python -m orchestrator benchmark export"
         if (root / EXPECTED).is_file() and not (root / SCENES).exists():
-            what = f"this is a table of expected answers, and no pack: it has no {SCENES}"
+            what = (
+                f"this is a table of expected answers, and no pack: it has no {SCENES}"
+            )
             remedy = "its README.md says how the pack is written"
         raise InputError(what, str(root), remedy)
     path = root / MANIFEST
@@ -214,12 +245,16 @@ def verify(root: Path, manifest: Manifest) -> None:
         if manifest.sha256.get(name) != digests.get(name):
             how = "is missing" if name not in digests else "is not what was exported"
             _refuse(f"the file {name} {how}", root)
-    if {name.split("/")[1] for name in manifest.sha256 if "/" in name} != {*manifest.scenes}:
+    if {name.split("/")[1] for name in manifest.sha256 if "/" in name} != {
+        *manifest.scenes
+    }:
         _refuse(f"its manifest does not list the scenes of {SCENES}", root)
 
 
 def _refuse(what: str, where: Path) -> NoReturn:
-    raise InputError(what, where=str(where), remedy="the pack is not used: export it again")
+    raise InputError(
+        what, where=str(where), remedy="the pack is not used: export it again"
+    )
 
 
 def _expected(path: Path, scenes: Mapping[str, Row]) -> pd.DataFrame:
@@ -227,7 +262,10 @@ def _expected(path: Path, scenes: Mapping[str, Row]) -> pd.DataFrame:
     texts = ["scene", *COLUMNS[:2]]
     numbers = COLUMNS[2:]
     kinds = {**dict.fromkeys(texts, object), **dict.fromkeys(numbers, float)}
-    absent: Any = {"keep_default_na": False, "na_values": {key: [""] for key in numbers}}
+    absent: Any = {
+        "keep_default_na": False,
+        "na_values": {key: [""] for key in numbers},
+    }
     try:
         table: pd.DataFrame = pd.read_csv(path, dtype=kinds, **absent)
         if [*table] != [*texts, *numbers] or {*table["scene"]} != {*scenes}:
@@ -247,7 +285,10 @@ def _expected(path: Path, scenes: Mapping[str, Row]) -> pd.DataFrame:
 
 
 def write(
-    root: Path, problems: Iterable[Problem], study: tuple[str, str], programs: Mapping[str, str]
+    root: Path,
+    problems: Iterable[Problem],
+    study: tuple[str, str],
+    programs: Mapping[str, str],
 ) -> int:
     """Write a pack, in place of one of the same study, and return how many scenes it has.
 
@@ -264,7 +305,9 @@ def write(
         for one in listed:
             one.write(scenes / one.scene)
         expected = pd.concat([one.expected.assign(scene=one.scene) for one in listed])
-        times = pd.DataFrame({"scene": one.scene, "seconds": one.seconds} for one in listed)
+        times = pd.DataFrame(
+            {"scene": one.scene, "seconds": one.seconds} for one in listed
+        )
         files = {
             EXPECTED: csv(expected[["scene", *COLUMNS]]),
             "scenes.csv": csv(pd.DataFrame(one.entries for one in listed)),
@@ -274,8 +317,13 @@ def write(
         }
         for file, content in files.items():
             folder.put(file, content)
-        model = re.search("(?m)^model name.*: (.*)$", Path("/proc/cpuinfo").read_text("utf-8"))
-        processor, paths = model[1] if model else platform.machine(), [root / f for f in files]
+        model = re.search(
+            "(?m)^model name.*: (.*)$", Path("/proc/cpuinfo").read_text("utf-8")
+        )
+        processor, paths = (
+            model[1] if model else platform.machine(),
+            [root / f for f in files],
+        )
         manifest = {
             "schema": SCHEMA,
             "scenes": [one.scene for one in listed],
@@ -310,6 +358,12 @@ def contract() -> str:
 
 def _readme(programs: Mapping[str, str]) -> str:
     """The text of a pack's README, with the programs of our answers and their versions."""
-    lines = [f"- {program} {version}\n" for program, version in sorted(programs.items())]
-    by = "\n## Programs that gave the answers of our runs\n\n" + "".join(lines) if lines else ""
+    lines = [
+        f"- {program} {version}\n" for program, version in sorted(programs.items())
+    ]
+    by = (
+        "\n## Programs that gave the answers of our runs\n\n" + "".join(lines)
+        if lines
+        else ""
+    )
     return README + contract() + by

@@ -51,7 +51,12 @@ SHOWN = {
 BEDS = (
     ("flow", "ustar_over_ustar0", "stress", "Friction velocity along the bed"),
     ("pile", "moved", "moved", "Grains that have moved, under the given stress"),
-    ("line", "moved", "moved-line", "Grains that have moved, with the solver’s own flow"),
+    (
+        "line",
+        "moved",
+        "moved-line",
+        "Grains that have moved, with the solver’s own flow",
+    ),
 )
 """Figures of the beds: kind of scene, quantity, stem and title."""
 AXES: dict[str, tuple[str, str, Look]] = {
@@ -61,27 +66,39 @@ AXES: dict[str, tuple[str, str, Look]] = {
 """Labels of a quantity's axes, and their limits."""
 
 
-def write(chosen: Pack, numbers: pd.DataFrame, verdicts: pd.DataFrame, folder: Folder) -> None:
+def write(
+    chosen: Pack, numbers: pd.DataFrame, verdicts: pd.DataFrame, folder: Folder
+) -> None:
     """Put the page and its figures into a directory; the tables are those of `judge.judge`."""
     theirs = verdicts[verdicts["solver"] != OURS]
     percent = {name: 100 * theirs[name] for name in ("error", "worst")}
-    scenes = theirs[[*SHOWN]].assign(**percent, passed=np.where(theirs["passed"], "yes", "no"))
+    scenes = theirs[[*SHOWN]].assign(
+        **percent, passed=np.where(theirs["passed"], "yes", "no")
+    )
     scenes = scenes.rename(columns=SHOWN)
     with style.settings(), warnings.catch_warnings():
         # the name of a solver may have letters that the font has not
         warnings.filterwarnings("ignore", "Glyph .* missing from font")
         answered = theirs[theirs["answered"]].groupby("kind")["scene"].unique()
-        beds = [_panels(numbers, answered[kind], *of) for kind, *of in BEDS if kind in answered]
+        beds = [
+            _panels(numbers, answered[kind], *of)
+            for kind, *of in BEDS
+            if kind in answered
+        ]
         beds += _shields(chosen, numbers)
         sections = [
-            Section("", "\n\n".join(judge.in_words(theirs)), (), (judge.summary(theirs),)),
+            Section(
+                "", "\n\n".join(judge.in_words(theirs)), (), (judge.summary(theirs),)
+            ),
             Section("What failed", tables=(judge.failures(theirs),)),
             Section("Beds", THRESHOLDS, beds, (thresholds(numbers),)),
             Section("Time and error", ERRORS, _speed(verdicts), (scenes,), LIMITS),
         ]
         names = ", ".join(theirs["solver"].unique())
         title = f"Against the pack “{printable(chosen.root.name)}”: {names}"
-        shown = [part for part in sections if part.figures or any(map(len, part.tables))]
+        shown = [
+            part for part in sections if part.figures or any(map(len, part.tables))
+        ]
         page.write(title, shown, folder, PAGE, chosen.manifest.programs)
 
 
@@ -106,17 +123,27 @@ def thresholds(numbers: pd.DataFrame) -> pd.DataFrame:
     ends = zip(asked["low"], asked["high"], strict=True)
     interval = [f"{low:#.3g} ... {high:#.3g}" for low, high in ends]
     table = asked.assign(texts=texts, interval=interval, **{"n/N": asked["at"]})
-    table = table.pivot(index=["scene", "n/N", "interval"], columns="solver", values="texts")
+    table = table.pivot(
+        index=["scene", "n/N", "interval"], columns="solver", values="texts"
+    )
     table = table.reindex(columns=[*_looks(asked)]).reset_index()
     return table[["scene", "n/N", *_looks(asked), "interval"]]
 
 
-def _legends(canvas: Canvas, looks: dict[str, Look], levels: Any, *samples: Line2D) -> None:
+def _legends(
+    canvas: Canvas, looks: dict[str, Look], levels: Any, *samples: Line2D
+) -> None:
     """A legend of the solvers above, and one of samples and levels below."""
     # a dollar sign in the name of a solver begins no formula
-    solvers = [style.entry(name.replace("$", r"\$"), look["color"]) for name, look in looks.items()]
+    solvers = [
+        style.entry(name.replace("$", r"\$"), look["color"])
+        for name, look in looks.items()
+    ]
     grey: Look = {"color": "0.3", "mfc": "none", "ls": "none"}
-    marks = [Line2D([], [], marker=MARKERS[n], label=f"level {n}", **grey) for n in sorted(levels)]
+    marks = [
+        Line2D([], [], marker=MARKERS[n], label=f"level {n}", **grey)
+        for n in sorted(levels)
+    ]
     style.legends(canvas, solvers, [*samples, *marks])
 
 
@@ -142,7 +169,9 @@ def _panels(
         for solver, of in asked.groupby("solver"):
             x = of["at"].astype(float)
             if solver == OURS:
-                ax.fill_between(x, of["low"] / count, of["high"] / count, color="0.85", lw=0)
+                ax.fill_between(
+                    x, of["low"] / count, of["high"] / count, color="0.85", lw=0
+                )
                 ax.plot(x, of["value"] / count, color=EXPECTED)
                 continue
             answer = of["answer"] / count
@@ -169,7 +198,11 @@ def _shields(chosen: Pack, numbers: pd.DataFrame) -> list[Figure]:
         return []
     given = pd.DataFrame([chosen.scenes[name] for name in asked["scene"]], asked.index)
     # of theta = rho_f u*^2/((rho_sol - rho_f) g d) and Re* = u* d/nu
-    excess = (given["rho_sol_kg_m3"] / given["rho_f_kg_m3"] - 1) * given["g_m_s2"] * given["d_m"]
+    excess = (
+        (given["rho_sol_kg_m3"] / given["rho_f_kg_m3"] - 1)
+        * given["g_m_s2"]
+        * given["d_m"]
+    )
     unit = np.sqrt(excess) * given["d_m"] / given["nu_m2_s"]
     looks = _looks(numbers)
     canvas = style.canvas(3.8)
@@ -180,7 +213,9 @@ def _shields(chosen: Pack, numbers: pd.DataFrame) -> list[Figure]:
     theta = here["value"]
     x = unit[here.index] * np.sqrt(theta)
     spread = [theta - here["low"], here["high"] - theta]
-    ax.errorbar(x, theta, spread, fmt="none", ecolor=looks.pop(OURS)["color"], elinewidth=0.7)
+    ax.errorbar(
+        x, theta, spread, fmt="none", ecolor=looks.pop(OURS)["color"], elinewidth=0.7
+    )
     x_ends = (float(x.min()) / 3, float(x.max()) * 3)
     y_ends = (max(min(theta.min(), 0.02) / 2, 1e-6), max(theta.max(), 0.2) * 2)
 
@@ -199,7 +234,12 @@ def _shields(chosen: Pack, numbers: pd.DataFrame) -> list[Figure]:
     ax.set_xlim(*x_ends)
     ax.set_ylim(*y_ends)
     samples = {"curves for water": WATER, "expected, interval": EXPECTED}
-    _legends(canvas, looks, table["level"].unique(), *map(style.entry, samples, samples.values()))
+    _legends(
+        canvas,
+        looks,
+        table["level"].unique(),
+        *map(style.entry, samples, samples.values()),
+    )
     caption = "Thresholds in the Shields diagram: bars are the intervals of the expected answers."
     return [Figure("shields", "Thresholds", caption + _left_out(outside), (), canvas)]
 
@@ -216,7 +256,12 @@ def _speed(verdicts: pd.DataFrame) -> list[Figure]:
     for (solver, level), rows in groups:
         error = rows["worst"].clip(FLOOR, CEILING)
         ax.plot(rows["cpu_s"].clip(*CPU_S), error, MARKERS[level], **looks[solver])
-    ax.set(xscale="log", yscale="log", xlabel="CPU time of a scene, s", ylabel="largest error")
+    ax.set(
+        xscale="log",
+        yscale="log",
+        xlabel="CPU time of a scene, s",
+        ylabel="largest error",
+    )
     _legends(canvas, looks, timed["level"].unique())
     caption = (
         "Each point is a scene: CPU time, and largest error of its judged numbers; ours is filled. "

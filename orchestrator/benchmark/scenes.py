@@ -49,7 +49,9 @@ STIFFNESS, PASSING_STIFFNESS = 1e4, 1e5
 """K d/W of the check decks' grain; springs of 1e4 would start the one that passes 1 % early."""
 UNIT = float(np.sqrt(DIAMETER * GRAVITY))
 """sqrt(d g') of the check decks' grain, m/s."""
-LEAST_QUIET = 5.0  # load steps shorter than this, sqrt(d/g'), are ramps with other thresholds
+LEAST_QUIET = (
+    5.0  # load steps shorter than this, sqrt(d/g'), are ramps with other thresholds
+)
 _GRAIN = """rho_f_kg_m3 nu_m2_s g_m_s2 d_m rho_sol_kg_m3 alpha_deg beta_deg z0_m force_law alpha_s
 regime mass_kg reduced_gravity_m_s2 weight_n"""
 _DEM = """phi_deg stiffness damping spring_n_m time_unit_s time_step displacement_criterion
@@ -69,12 +71,18 @@ ENTRIES = {
 def parameters(scene: Scene, kind: str) -> Row:
     """Entries of a scene, with its force law decided, in a problem of a kind."""
     g, weight = scene.reduced_gravity, scene.weight
-    grain = mechanics(scene.grain.diameter, scene.grain.density, g, weight, scene.grain.stiffness)
+    grain = mechanics(
+        scene.grain.diameter, scene.grain.density, g, weight, scene.grain.stiffness
+    )
     values = fields.used(scene) | grain
-    return {key: values[key] for key in ENTRIES[kind].split() if values.get(key) is not None}
+    return {
+        key: values[key] for key in ENTRIES[kind].split() if values.get(key) is not None
+    }
 
 
-def mechanics(d: float, density: float, gravity: float, weight: float, stiffness: float) -> Row:
+def mechanics(
+    d: float, density: float, gravity: float, weight: float, stiffness: float
+) -> Row:
     """The mechanics of a grain in SI units; gravity is that of the submerged grain."""
     return {
         "mass_kg": density * np.pi / 6 * d**3,
@@ -94,7 +102,9 @@ def closed_form(name: str, scene: Scene) -> Problem:
     rows += [expectation("lift_n", float(lift(u)), FORMULA, u) for u in flows]
     ends = {"ustar_m_s": exact.friction_velocity, "reynolds": exact.reynolds}
     ends["shields"] = exact.shields
-    rows += [expectation(quantity, float(value), FORMULA) for quantity, value in ends.items()]
+    rows += [
+        expectation(quantity, float(value), FORMULA) for quantity, value in ends.items()
+    ]
     return Problem(name, "closed-form", parameters(scene, "closed-form"), {}, rows)
 
 
@@ -103,29 +113,41 @@ def pivot(name: str, scene: Scene, ours: float) -> Problem:
     threshold = float(study_form.closed_form(scene).friction_velocity)
     # the mean of two load steps is within half a step of what lies between them
     half = float(np.sqrt(1 + scene.protocol.load_increment))
-    row = expectation("ustar_m_s", threshold, PIVOT, None, threshold / half, threshold * half)
+    row = expectation(
+        "ustar_m_s", threshold, PIVOT, None, threshold / half, threshold * half
+    )
     centres, _, sizes = cells.cell(scene)
     d, rising = scene.grain.diameter, cells.flows(scene)
     fx, fz = cells.force(scene, rising).T
     steps = {"load_step": range(len(rising)), "ustar_m_s": rising * threshold}
     load_steps = pd.DataFrame({**steps, "fx_n": fx, "fz_n": fz})
     tables = {"grains": _three(centres * d, sizes * d), "load_steps": load_steps}
-    return Problem(name, "pivot", parameters(scene, "pivot"), tables, [{**row, "ours": ours}])
+    return Problem(
+        name, "pivot", parameters(scene, "pivot"), tables, [{**row, "ours": ours}]
+    )
 
 
 def has_pivot(scene: Scene) -> bool:
     """Whether the grain's threshold by load steps is the closed form's, and means something."""
     threshold = study_form.closed_form(scene)
     # else lift bears the weight before drag can push the grain up the slope: it rolls back
-    rolls = bool(threshold.lift * np.tan(np.radians(scene.bed.slope_deg)) < threshold.drag)
-    return study_form.law_holds(scene) and rolls and scene.protocol.waiting_time >= LEAST_QUIET
+    rolls = bool(
+        threshold.lift * np.tan(np.radians(scene.bed.slope_deg)) < threshold.drag
+    )
+    return (
+        study_form.law_holds(scene)
+        and rolls
+        and scene.protocol.waiting_time >= LEAST_QUIET
+    )
 
 
 def _three(centres: Any, diameter: Any) -> pd.DataFrame:
     """Two fixed grains and a mobile one; centres in m, shape (3, 2)."""
     x, z = centres.T
     kinds = ["fixed", "fixed", "mobile"]
-    return pd.DataFrame({"id": [1, 2, 3], "x_m": x, "z_m": z, "d_m": diameter, "kind": kinds})
+    return pd.DataFrame(
+        {"id": [1, 2, 3], "x_m": x, "z_m": z, "d_m": diameter, "kind": kinds}
+    )
 
 
 def checks() -> Iterator[Problem]:
@@ -136,37 +158,64 @@ def checks() -> Iterator[Problem]:
         root = np.sqrt(1 - damping**2)
         restitution = np.exp(-damping / root * (np.pi - 2 * np.arcsin(damping)))
         given = _contact(0.01, damping) | {"speed_m_s": MEETING * UNIT}
-        listed.append(("collision", damping, given, [("restitution", restitution, None)]))
+        listed.append(
+            ("collision", damping, given, [("restitution", restitution, None)])
+        )
     for degrees in INCLINES_DEG:  # a grain rolls or slides down a plane
         sin, cos = np.sin(np.radians(degrees)), np.cos(np.radians(degrees))
         value = 5 / 7 * sin if sin < 3.5 * friction * cos else sin - friction * cos
         given = _contact(0.2) | {"incline_deg": degrees}
-        listed.append(("incline", degrees, given, [("acceleration_over_g", value, None)]))
+        listed.append(
+            ("incline", degrees, given, [("acceleration_over_g", value, None)])
+        )
     for speed in SPEEDS:  # a grain slides until it rolls
         given = _contact(0.02) | {"speed_m_s": speed * UNIT}
         given["roll_time_s"] = 2 * speed * UNIT / (7 * friction * GRAVITY)
         half, rolls = ("speed_over_start", 6 / 7, 0.5), ("speed_over_start", 5 / 7, 2.0)
-        listed.append(("sliding", speed, given, [half, rolls, ("spin_over_start", 5 / 7, 2.0)]))
+        listed.append(
+            ("sliding", speed, given, [half, rolls, ("spin_over_start", 5 / 7, 2.0)])
+        )
     beta = np.radians(PASSING_DEG)
     x, z = float(np.cos(beta)), -float(np.sin(beta))
-    grains = {"grains": _three(DIAMETER * np.array([[-x, z], [x, z], [0.0, 0.0]]), DIAMETER)}
+    grains = {
+        "grains": _three(DIAMETER * np.array([[-x, z], [x, z], [0.0, 0.0]]), DIAMETER)
+    }
     for push in PUSHES:  # a grain is pushed over its neighbour
         given = _contact(0.2, stiffness=PASSING_STIFFNESS)
-        given |= {"alpha_deg": 0.0, "beta_deg": PASSING_DEG, "displacement_criterion": CRITERION}
+        given |= {
+            "alpha_deg": 0.0,
+            "beta_deg": PASSING_DEG,
+            "displacement_criterion": CRITERION,
+        }
         given["force_n"] = push * given["weight_n"] / float(np.tan(beta))
         time = passing_time(push, CRITERION)
         listed.append(("passing", push, given, [("passing_time_over_t", time, None)]))
     for kind, number, given, exact in listed:
-        rows = [expectation(what, float(x), CHECK, at) | {"ours": np.nan} for what, x, at in exact]
-        yield Problem(f"{kind}-{number:g}", kind, given, grains if kind == "passing" else {}, rows)
+        rows = [
+            expectation(what, float(x), CHECK, at) | {"ours": np.nan}
+            for what, x, at in exact
+        ]
+        yield Problem(
+            f"{kind}-{number:g}", kind, given, grains if kind == "passing" else {}, rows
+        )
 
 
-def _contact(time_step: float, damping: float = 0.1, stiffness: float = STIFFNESS) -> Row:
+def _contact(
+    time_step: float, damping: float = 0.1, stiffness: float = STIFFNESS
+) -> Row:
     """Parameters of the grain of the check decks."""
     weight = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY
     return {
-        **{"d_m": DIAMETER, "rho_sol_kg_m3": DENSITY, "time_step": time_step, "damping": damping},
-        **{"phi_deg": Grain(diameter=DIAMETER).friction_angle_deg, "stiffness": stiffness},
+        **{
+            "d_m": DIAMETER,
+            "rho_sol_kg_m3": DENSITY,
+            "time_step": time_step,
+            "damping": damping,
+        },
+        **{
+            "phi_deg": Grain(diameter=DIAMETER).friction_angle_deg,
+            "stiffness": stiffness,
+        },
         **mechanics(DIAMETER, DENSITY, GRAVITY, weight, stiffness),
     }
 
@@ -211,13 +260,23 @@ def flow(name: str, pile: Pile, results: Tables) -> Problem:
     low, high = (x * pile.model.line.crest_s / pile.bed.height for x in FACE)
     stress = results["wall_stress"].set_index("flow_case").loc[[pile.flow.name]]
     diagnostics = results["flow"].set_index("flow_case").loc[[pile.flow.name]]
-    rows = [expectation("windward_mean", float(diagnostics["ustar_mean"].iloc[0]), MEAN_STRESS)]
+    rows = [
+        expectation(
+            "windward_mean", float(diagnostics["ustar_mean"].iloc[0]), MEAN_STRESS
+        )
+    ]
     for s, u in zip(stress["s_over_h"], stress["ustar_over_ustar0_wall"], strict=True):
-        rows.append(expectation("ustar_over_ustar0", u, STRESS if low <= s <= high else np.nan, s))
+        rows.append(
+            expectation(
+                "ustar_over_ustar0", u, STRESS if low <= s <= high else np.nan, s
+            )
+        )
     return Problem(name, "flow", *_flow_tables(pile), rows)
 
 
-def bed(name: str, kind: str, scene_id: str, pile: Pile, results: Tables, cases: Path) -> Problem:
+def bed(
+    name: str, kind: str, scene_id: str, pile: Pile, results: Tables, cases: Path
+) -> Problem:
     """Levels 4 and 5: the grains of a bed that DEM answered.
 
     The kind is ``pile``, under the given stress, or ``line``, whose flow the solver finds.
@@ -227,7 +286,9 @@ def bed(name: str, kind: str, scene_id: str, pile: Pile, results: Tables, cases:
     scene = pile.scene
     curve = results["pile_curve"].set_index("scene_id").loc[[scene_id]].reset_index()
     thresholds = results["pile_threshold"].set_index("scene_id").loc[[scene_id]]
-    total, moved, off = (int(curve[key].iloc[-1]) for key in ("count", "moved", "carried_off"))
+    total, moved, off = (
+        int(curve[key].iloc[-1]) for key in ("count", "moved", "carried_off")
+    )
     tolerance, until = THRESHOLD[kind], 1.0
     scatter = POURED_SCATTER if pile.pouring else SCATTER
     if off:
@@ -253,7 +314,9 @@ def bed(name: str, kind: str, scene_id: str, pile: Pile, results: Tables, cases:
             given |= {"roof_slope_deg": slope, "roof_x_m": x, "roof_z_m": z}
         if pile.pouring:
             tables["forces"] = _forces(pile, curve, cases)
-            given["settle_drag_kg_s"] = POURED_DRAG * given["mass_kg"] / given["time_unit_s"]
+            given["settle_drag_kg_s"] = (
+                POURED_DRAG * given["mass_kg"] / given["time_unit_s"]
+            )
     return Problem(name, kind, given, tables, rows)
 
 
@@ -272,15 +335,24 @@ def _counts(curve: pd.DataFrame, scatter: float, until: float) -> list[Row]:
         judged = 0.0 if near.max() <= until * total else np.nan
         return expectation(quantity, n[step], judged, step, low, high)
 
-    rows = [counted("moved", step) for step in range(1, end + 1)]  # load step 0 is the settling
+    rows = [
+        counted("moved", step) for step in range(1, end + 1)
+    ]  # load step 0 is the settling
     last = rows[-1]
     rest, low, high = (total - last[key] for key in ("value", "high", "low"))
     rows.append(expectation("not_moved", rest, last["tolerance"], end, low, high))
-    return [*rows, counted("carried_off", end)] if curve["carried_off"].iloc[-1] else rows
+    return (
+        [*rows, counted("carried_off", end)] if curve["carried_off"].iloc[-1] else rows
+    )
 
 
 def _threshold(
-    pile: Pile, cases: Path, curve: pd.DataFrame, row: Any, tolerance: float, part: float
+    pile: Pile,
+    cases: Path,
+    curve: pd.DataFrame,
+    row: Any,
+    tolerance: float,
+    part: float,
 ) -> list[Row]:
     """The Shields number and the flow at a fraction of the moved grains, with their intervals."""
     fraction, shields, flow = row["fraction"], row["shields"], row["ustar0_m_s"]
@@ -321,7 +393,12 @@ def _grains(pile: Pile, cases: Path) -> pd.DataFrame:
     x, z = packing.centres.T * d
     kinds = [~packing.mobile, packing.windward, pushed]
     columns = {
-        **{"id": np.arange(1, len(x) + 1), "x_m": x, "z_m": z, "d_m": packing.sizes * d},
+        **{
+            "id": np.arange(1, len(x) + 1),
+            "x_m": x,
+            "z_m": z,
+            "d_m": packing.sizes * d,
+        },
         "kind": np.select(kinds, ["fixed", "counted", "pushed"], "mobile"),
         "slope_deg": np.where(exposed, slope, np.nan),
         "ustar_over_ustar0": np.where(exposed, pile.loads(cases).ratio, np.nan),
@@ -335,5 +412,10 @@ def _forces(pile: Pile, curve: pd.DataFrame, cases: Path) -> pd.DataFrame:
     exposed = np.flatnonzero(loading.ratio)
     fx, fz = loading.at(curve["ustar0_m_s"])[:, exposed].reshape(-1, 2).T
     steps, ids = np.repeat(curve["load_step"].to_numpy(), len(exposed)), exposed + 1
-    columns = {"load_step": steps, "id": np.tile(ids, len(curve)), "fx_n": fx, "fz_n": fz}
+    columns = {
+        "load_step": steps,
+        "id": np.tile(ids, len(curve)),
+        "fx_n": fx,
+        "fz_n": fz,
+    }
     return pd.DataFrame(columns)

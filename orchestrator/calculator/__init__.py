@@ -21,15 +21,25 @@ class Parameter(NamedTuple):
 
 
 MOST_POINTS = 100_000
-_Z0 = Parameter("bed.roughness", "z0_m", "z0, m", (1e-12, 1), "d/30", 'or such a part: "d/10"')
-_RHO = Parameter("fluid.density", "rho_f_kg_m3", "rho_f, kg/m3", (1e-6, 2e4), fluids.PAPER[0])
+_Z0 = Parameter(
+    "bed.roughness", "z0_m", "z0, m", (1e-12, 1), "d/30", 'or such a part: "d/10"'
+)
+_RHO = Parameter(
+    "fluid.density", "rho_f_kg_m3", "rho_f, kg/m3", (1e-6, 2e4), fluids.PAPER[0]
+)
 _NU = Parameter("fluid.viscosity", "nu_m2_s", "nu, m2/s", (1e-8, 1e3), fluids.PAPER[1])
-_ALPHA = Parameter("bed.slope_deg", "alpha_deg", "alpha, deg", (0, 30), 0.0, "the flow goes up it")
+_ALPHA = Parameter(
+    "bed.slope_deg", "alpha_deg", "alpha, deg", (0, 30), 0.0, "the flow goes up it"
+)
 _BETA = Parameter("bed.entrainment_angle_deg", "beta_deg", "beta, deg", (30, 60), 60.0)
-_LIFT = Parameter("forces.lift_coefficient", "alpha_s", "alpha_s", (0, 100), LIFT_COEFFICIENT)
+_LIFT = Parameter(
+    "forces.lift_coefficient", "alpha_s", "alpha_s", (0, 100), LIFT_COEFFICIENT
+)
 PARAMETERS = {
     "diameter": Parameter("grain.diameter", "d_m", "d, m", (1e-7, 10)),
-    "density": Parameter("grain.density", "rho_sol_kg_m3", "rho_sol, kg/m3", (1, 2e4), 2500.0),
+    "density": Parameter(
+        "grain.density", "rho_sol_kg_m3", "rho_sol, kg/m3", (1, 2e4), 2500.0
+    ),
     "fluid_density": _RHO,
     "viscosity": _NU,
     "slope_deg": _ALPHA,
@@ -38,12 +48,24 @@ PARAMETERS = {
     "lift_coefficient": _LIFT,
     "gravity": Parameter("fluid.gravity", "g_m_s2", "g, m/s2", (1e-5, 1e4), GRAVITY),
     "cohesion": Parameter(
-        "grain.cohesion", "cohesion_n_m", "cohesion, N/m", (0, 1e3), 0.0, "pull of a contact over d"
+        "grain.cohesion",
+        "cohesion_n_m",
+        "cohesion, N/m",
+        (0, 1e3),
+        0.0,
+        "pull of a contact over d",
     ),
-    "depth": Parameter("depth", "depth_m", "depth, m", (0, 0), None, "of a liquid: its mean speed"),
+    "depth": Parameter(
+        "depth", "depth_m", "depth, m", (0, 0), None, "of a liquid: its mean speed"
+    ),
 }
 """By keyword, which is also the name in JSON. The paper's values are the defaults."""
-GEOMETRIC = ("diameter", "viscosity", "roughness", "depth")  # their ranges are geometric
+GEOMETRIC = (
+    "diameter",
+    "viscosity",
+    "roughness",
+    "depth",
+)  # their ranges are geometric
 QUANTITIES = {
     "ustar_m_s": ("friction_velocity", "u*, m/s"),
     "wind_1m_m_s": ("wind_speed_1_m", "wind at 1 m, m/s"),

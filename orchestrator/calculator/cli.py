@@ -46,7 +46,9 @@ def add(commands: Any) -> None:
     about = "when one grain starts to move, closed form, at once"
     command = commands.add_parser("threshold", help=about, epilog=RANGES)
     for name, each in PARAMETERS.items():
-        default = f"{each.default:g}" if isinstance(each.default, float) else each.default
+        default = (
+            f"{each.default:g}" if isinstance(each.default, float) else each.default
+        )
         of_paper = ", that of the paper's fluid" if name in OF_FLUID else ""
         text = f"default {default}{of_paper}" if default else ""
         text = "; ".join(filter(None, (each.label, each.note, text)))
@@ -62,7 +64,9 @@ def add(commands: Any) -> None:
     )
     command.add_argument("--law", default="auto", metavar="NAME", help=text)
     form = command.add_mutually_exclusive_group()
-    form.add_argument("--json", action="store_true", help="an object for each law by its name")
+    form.add_argument(
+        "--json", action="store_true", help="an object for each law by its name"
+    )
     form.add_argument("--csv", action="store_true", help="a row for each point and law")
     command.set_defaults(run=_run)
 
@@ -193,7 +197,10 @@ def answered(
     from orchestrator.calculator.table import thresholds
 
     fields = {each.field: names[name] for name, each in PARAMETERS.items()}
-    fields |= {"fluid.kind": names["fluid"], f"fluid.{TEMPERATURE}": names["temperature"]}
+    fields |= {
+        "fluid.kind": names["fluid"],
+        f"fluid.{TEMPERATURE}": names["temperature"],
+    }
     fields["law"] = names["law"]
     asked: list[str] = []
     try:
@@ -203,7 +210,9 @@ def answered(
         table = numbers_of(given)
         if fluid is not None:
             count = len(points["diameter"])
-            of_fluid = {name: [table[field]] * count for name, field in OF_FLUID.items()}
+            of_fluid = {
+                name: [table[field]] * count for name, field in OF_FLUID.items()
+            }
             points = {**points, **of_fluid}
         asked = questions(_numbers(points), fields, form)
         return thresholds(points, law), asked
@@ -313,7 +322,9 @@ def _of_one(rows: Sequence["Row"], answer: str) -> Iterator[str]:
         name = "The paper's rule: a grain"
     elif not chosen[0]["valid"]:
         holding = ", ".join(f"--law {row['law']}" for row in rows if row["valid"])
-        name = f"Force law {chosen[0]['law']} does not hold here: {chosen[0]['why_not']}"
+        name = (
+            f"Force law {chosen[0]['law']} does not hold here: {chosen[0]['why_not']}"
+        )
         name = f"{name} (choose {holding}). By it a grain"
     yield f"{name} of {rows[0]['d_m'] * 1000:.4g} mm starts to move at"
     width = max(map(len, shown.values()))
@@ -333,7 +344,9 @@ def _of_one(rows: Sequence["Row"], answer: str) -> Iterator[str]:
     yield f"\nlaws of the paper's rule: {' and '.join(LAWS_OF[rows[0]['regime']])}"
 
 
-def _of_many(rows: Sequence["Row"], answer: str, varied: Sequence[str]) -> Iterator[str]:
+def _of_many(
+    rows: Sequence["Row"], answer: str, varied: Sequence[str]
+) -> Iterator[str]:
     """The rows of the answer for many points."""
     chosen = [row for row in rows if row["answer"]]
     laws = [*dict.fromkeys(row["law"] for row in chosen)]

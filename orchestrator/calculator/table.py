@@ -78,15 +78,21 @@ def thresholds(points: Mapping[str, Any], answer: str = AUTO) -> Table:
     known = {each.column: grains[name] for name, each in PARAMETERS.items()}
     liquid_depth = np.where(density < GAS_BELOW, np.nan, depth)
     blocks = []
-    with np.errstate(all="ignore"):  # numbers beyond all floats end as laws that do not hold
-        by_law = {n: threshold(each, exposure, **rest, **pivot) for n, each in LAWS.items()}
+    with np.errstate(
+        all="ignore"
+    ):  # numbers beyond all floats end as laws that do not hold
+        by_law = {
+            n: threshold(each, exposure, **rest, **pivot) for n, each in LAWS.items()
+        }
         regimes = regime(by_law["low"], by_law["high"]).astype(object)
         picked = _picked(answer, regimes, by_law["bridged"].friction_velocity, exposure)
         for name, at in by_law.items():
             ustar = at.friction_velocity
             block: Table = {"law": np.full(count, name, object)}
             # columns that are no attribute of a threshold follow below
-            block |= {c: getattr(at, key, density) for c, (key, _) in QUANTITIES.items()}
+            block |= {
+                c: getattr(at, key, density) for c, (key, _) in QUANTITIES.items()
+            }
             block |= measurable_speeds(
                 ustar,
                 roughness=grains["roughness"],
@@ -138,9 +144,14 @@ def _grains(points: Mapping[str, Any], count: int) -> Table:
 
     A point that may be beyond a limit is made a scene, which refuses it or warns; no other point.
     """
-    given = {name: points.get(name, [each.default] * count) for name, each in PARAMETERS.items()}
+    given = {
+        name: points.get(name, [each.default] * count)
+        for name, each in PARAMETERS.items()
+    }
     lengths = [*map(_length, given["roughness"], given["diameter"])]
-    grains = {name: np.array(x, float) for name, x in {**given, "roughness": lengths}.items()}
+    grains = {
+        name: np.array(x, float) for name, x in {**given, "roughness": lengths}.items()
+    }
     is_safe = grains["density"] > grains["fluid_density"]
     is_safe &= grains["roughness"] <= 0.3 * grains["diameter"]
     for name, each in PARAMETERS.items():
@@ -169,4 +180,6 @@ def _length(z0: Any, diameter: float) -> float:
     if not isinstance(z0, str):
         return float(z0)
     part = re.fullmatch(r"d/([1-9]\d*(?:\.\d+)?)", z0, re.ASCII)
-    return float(f"{diameter / float(part[1]):.12g}") if part else np.nan  # digits as in a scene
+    return (
+        float(f"{diameter / float(part[1]):.12g}") if part else np.nan
+    )  # digits as in a scene

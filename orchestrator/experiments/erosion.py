@@ -173,7 +173,9 @@ def solved(scene: Scene, threshold: float | None, cases: Path) -> Surface:
         is_on &= (x < start) | (x > end)
     segment = np.searchsorted(line.x, x) - 1
     slope = line.slopes_deg[np.clip(segment, 0, len(line.x) - 2)]
-    part = np.select([slope > LEVEL_DEG, slope < -LEVEL_DEG], ["windward", "lee"], "top")
+    part = np.select(
+        [slope > LEVEL_DEG, slope < -LEVEL_DEG], ["windward", "lee"], "top"
+    )
     columns = {
         "x_m": x,
         "z_m": z,
@@ -196,7 +198,9 @@ def _rises(bed: PileBed) -> bool:
     return bool(bed.profile) or bed.form.rises
 
 
-def grouped(scenes: Sequence[Scene], threshold: float | None, cases: Path) -> list[Pile]:
+def grouped(
+    scenes: Sequence[Scene], threshold: float | None, cases: Path
+) -> list[Pile]:
     """The piles of some scenes whose flows are done, each without and with its obstacles."""
     alike: dict[Scene, list[Scene]] = {}
     for scene in scenes:
@@ -236,7 +240,9 @@ def experiment(study: Study, out: Path) -> Experiment:
     least = USTAR_T.get(asked, -1.0) if isinstance(asked, str) else asked
     if least is not None and not 0 < least <= 10:
         remedy = f"a value in m/s up to 10, or one of: {', '.join(USTAR_T)}"
-        raise InputError(f"{asked!r} is not accepted", f"{where}: erosion.threshold", remedy)
+        raise InputError(
+            f"{asked!r} is not accepted", f"{where}: erosion.threshold", remedy
+        )
     source = ""
     if isinstance(asked, str):
         source = f" (AP-42, {asked})"
@@ -271,7 +277,9 @@ def experiment(study: Study, out: Path) -> Experiment:
     every = plan.listed(run for flow in flows.values() for run in flow.cases)
     planned = plan.Plan({}, {}, (), {}, every)
     limit_s = study.time_limit_s
-    return Experiment("erosion", study.title, planned, results, limit_s, source=study.source)
+    return Experiment(
+        "erosion", study.title, planned, results, limit_s, source=study.source
+    )
 
 
 def rows(found: Sequence[Pile], winds: ArrayLike) -> pd.DataFrame:
@@ -305,7 +313,9 @@ def rows(found: Sequence[Pile], winds: ArrayLike) -> pd.DataFrame:
     return pd.DataFrame(listed)
 
 
-def sentences(found: Sequence[Pile], winds: Sequence[float], source: str) -> Iterator[str]:
+def sentences(
+    found: Sequence[Pile], winds: Sequence[float], source: str
+) -> Iterator[str]:
     """The answer in words: each pile by both, and what its obstacles take away."""
     speeds = ", ".join(map("{:g}".format, winds))
     for pile in found:
@@ -351,7 +361,9 @@ def _draw(axes: Sequence[Axes], pile: Pile, winds: Sequence[float]) -> None:
         colour = COLOURS[number % len(COLOURS)]
         _draw_shares(middle, surface, colour, "-")
         right.plot(axis, surface.potential(axis), color=colour)
-        left.plot(surface.faces["x_m"], surface.faces["ratio"], ".", ms=2.5, color=colour)
+        left.plot(
+            surface.faces["x_m"], surface.faces["ratio"], ".", ms=2.5, color=colour
+        )
     for surface, line_style in zip(pile.by_epa, LINES, strict=False):
         _draw_shares(middle, surface, GREY, line_style)
         right.plot(axis, surface.potential(axis), color=GREY, ls=line_style)
@@ -360,7 +372,9 @@ def _draw(axes: Sequence[Axes], pile: Pile, winds: Sequence[float]) -> None:
     bed.fill_between(x, z, color=style.BED, lw=0)
     bed.set(ylim=(0, 4 * (z.max() or 1)), yticks=[])
     middle.set(xlim=(0, 100), ylim=(0, None), xlabel="share of the surface above, %")
-    left.set(zorder=1, frame_on=False, ylim=middle.get_ylim(), xlabel="x, m", ylabel=USTAR)
+    left.set(
+        zorder=1, frame_on=False, ylim=middle.get_ylim(), xlabel="x, m", ylabel=USTAR
+    )
     left.set_title(pile.name, loc="left")
     right.set(xlim=(0, axis[-1]), ylim=(0, None), xlabel="wind at 10 m, m/s")
     right.set_title("P, g/m² of surface", loc="left")

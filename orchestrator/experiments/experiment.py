@@ -24,7 +24,9 @@ from orchestrator.study.study import TIME_LIMIT_S, Study
 from orchestrator.tables import csv
 
 Results = tuple[Mapping[str, pd.DataFrame], Sequence[Section]]
-TEXTS = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
+TEXTS = tomllib.loads(
+    Path(__file__).with_name("texts.toml").read_text(encoding="utf-8")
+)
 """The texts of the pages, by experiment and by what they are about."""
 
 
@@ -42,7 +44,9 @@ class Runs:
 
     def cpu_s(self, runs: Sequence[case.Case]) -> float:
         """Processor seconds of some runs; NaN if one is not done."""
-        return sum(float(self.done.get(run.name, {}).get("cpu_s", "nan")) for run in runs)
+        return sum(
+            float(self.done.get(run.name, {}).get("cpu_s", "nan")) for run in runs
+        )
 
 
 @dataclass(frozen=True)
@@ -71,8 +75,12 @@ class Experiment:
             self._describe(space)
             missing = planned.missing(space.cases, planned.done(space.cases)).items()
             ends = {name: case.failure(space.cases / name)[0] for name, _ in missing}
-            todo = {name: run for name, run in missing if ends[name] not in self.verdicts}
-            failures = pipeline.complete(todo, space, workers=workers, limit_s=self.limit_s)
+            todo = {
+                name: run for name, run in missing if ends[name] not in self.verdicts
+            }
+            failures = pipeline.complete(
+                todo, space, workers=workers, limit_s=self.limit_s
+            )
             with style.settings():
                 done = planned.done(space.cases)
                 tables, sections = self.results(Runs(planned, space.cases, done))
@@ -85,8 +93,12 @@ class Experiment:
                     solvers = case.programs(space.cases, planned.cases)
                     page.write(self.title, sections, folder, space.page.name, solvers)
         if self.failing is not None:
-            failures = {name: error for name, error in failures.items() if name in self.failing}
-        answer = "\n".join(p.text.replace("\n\n", "\n") for p in sections if not p.title)
+            failures = {
+                name: error for name, error in failures.items() if name in self.failing
+            }
+        answer = "\n".join(
+            p.text.replace("\n\n", "\n") for p in sections if not p.title
+        )
         return Finished(space.page, len(todo), failures, answer)
 
     def _describe(self, space: Workspace) -> None:

@@ -22,7 +22,14 @@ from matplotlib.patheffects import Normal, Stroke
 
 from orchestrator import plan
 from orchestrator.bed.line import of_bed
-from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs, label, piles
+from orchestrator.experiments.experiment import (
+    TEXTS,
+    Experiment,
+    Results,
+    Runs,
+    label,
+    piles,
+)
 from orchestrator.fidelity import levels, limits
 from orchestrator.fidelity.decision import Decision, on_levels
 from orchestrator.fidelity.levels import FLAT, LEVELS, PEELING, Pair, level
@@ -54,7 +61,9 @@ USED = (  # together
     ("standard", "1 layer, slow"),
 )
 CURVE = np.arange(0.05, 0.86, 0.05)  # fractions at which whole curves are compared
-HEADS = {f"error_{n}": f"$n/N$ = {n} %" for n in (10, 30, 50, 70)} | {"error_curve": "whole curve"}
+HEADS = {f"error_{n}": f"$n/N$ = {n} %" for n in (10, 30, 50, 70)} | {
+    "error_curve": "whole curve"
+}
 LEVEL_PAIR = ["flow_level", "grain_level"]
 FLOOR = 1e-3  # errors below it are drawn on it
 BANDS = (
@@ -83,18 +92,27 @@ def experiment(study: Study, out: Path) -> Experiment:
         means = together(compared)
         rows = compared.merge(means[["packing", *LEVEL_PAIR, "pareto"]], how="left")
         known = known_errors(measured)
-        return {"points": rows.fillna({"pareto": False}), "levels": known}, _sections(means, known)
+        return {"points": rows.fillna({"pareto": False}), "levels": known}, _sections(
+            means, known
+        )
 
     limit_s = study.time_limit_s
     return Experiment(
-        "ladder", "Speed against accuracy", planned, results, limit_s, source=study.source
+        "ladder",
+        "Speed against accuracy",
+        planned,
+        results,
+        limit_s,
+        source=study.source,
     )
 
 
 def decisions(study: Study) -> dict[str, Decision]:
     """Every pile of a study on its pairs of levels, by names for the plan."""
     return {
-        f"{scene.id} | {pair.text}": on_levels(scene, pair, "the ladder measures these levels")
+        f"{scene.id} | {pair.text}": on_levels(
+            scene, pair, "the ladder measures these levels"
+        )
         for scene, bed in piles(study).items()
         for pair in _pairs(scene, bed)
     }
@@ -134,7 +152,8 @@ def points(pairs: Mapping[str, Decision], runs: Runs) -> pd.DataFrame:
             "scene_id": scene.id,
             "scene": label(scene),
             **point(scene),
-            "packing": levels.packing(scene) + (", level bed" if pile.bed.is_level else ""),
+            "packing": levels.packing(scene)
+            + (", level bed" if pile.bed.is_level else ""),
             "asked": scene.protocol.method,
             **{f"class_{part}": levels.scene_class(part, scene) for part in LEVELS},
             "count": motion.count,
@@ -142,10 +161,14 @@ def points(pairs: Mapping[str, Decision], runs: Runs) -> pd.DataFrame:
             "grain_level": pair.grains.name,
             "same_model": pair.flow.same_model and pair.grains.same_model,
             "model_floor": floors.get(levels.model_class(scene), math.nan),
-            "flow_s": runs.cpu_s([run for flow in pile.model.cases for run in (*flow.needs, flow)]),
+            "flow_s": runs.cpu_s(
+                [run for flow in pile.model.cases for run in (*flow.needs, flow)]
+            ),
             "grains_s": here_s + runs.cpu_s(pile.method.cases),
         }
-        taus = {name: of_pile(motion, speed, at, density).tau for name, at in names.items()}
+        taus = {
+            name: of_pile(motion, speed, at, density).tau for name, at in names.items()
+        }
         rows.append({**row, **taus})
     return pd.DataFrame(rows)
 
@@ -171,19 +194,31 @@ def errors(points: pd.DataFrame) -> pd.DataFrame:
     parts = [points.iloc[:0]]
     for _, scene in points.groupby("scene_id", sort=False):
         rows = scene.set_index(LEVEL_PAIR)
-        best, again = next((both for both in REFERENCES if both[0] in rows.index), (None, None))
+        best, again = next(
+            (both for both in REFERENCES if both[0] in rows.index), (None, None)
+        )
         if best is None:
             continue
-        taus, curve = (rows.filter(regex=f"^{start}_").astype(float) for start in ("tau", "curve"))
+        taus, curve = (
+            rows.filter(regex=f"^{start}_").astype(float) for start in ("tau", "curve")
+        )
         taus, curve = (table.div(table.xs(best)).sub(1) for table in (taus, curve))
-        error = {f"error_{round(100 * float(str(name)[4:]))}": taus[name] for name in taus}
+        error = {
+            f"error_{round(100 * float(str(name)[4:]))}": taus[name] for name in taus
+        }
         compared = rows.assign(
             **error,
             error_curve=curve.abs().mean(axis=1),
             cost_core_s=rows["flow_s"] + rows["grains_s"],
-            reference_error=taus.xs(again).abs().max() if again in rows.index else math.nan,
+            reference_error=taus.xs(again).abs().max()
+            if again in rows.index
+            else math.nan,
         )
-        parts.append(compared.reset_index()[[*scene, *compared.columns.difference(scene.columns)]])
+        parts.append(
+            compared.reset_index()[
+                [*scene, *compared.columns.difference(scene.columns)]
+            ]
+        )
     return pd.concat(parts, ignore_index=True)
 
 
@@ -197,10 +232,18 @@ def together(points: pd.DataFrame) -> pd.DataFrame:
     def largest(values: pd.Series) -> float:
         return math.nan if values.isna().any() else float(max(values, key=abs))
 
-    rows = points[points["asked"] == "dem"].groupby(["packing", *LEVEL_PAIR], sort=False)
-    means: dict[str, Any] = {"piles": ("scene_id", "size"), "cost_core_s": ("cost_core_s", "mean")}
+    rows = points[points["asked"] == "dem"].groupby(
+        ["packing", *LEVEL_PAIR], sort=False
+    )
+    means: dict[str, Any] = {
+        "piles": ("scene_id", "size"),
+        "cost_core_s": ("cost_core_s", "mean"),
+    }
     ends = {"reference_error": "max", "model_floor": "min", "same_model": "first"}
-    means |= {name: (name, how) for name, how in (dict.fromkeys(HEADS, largest) | ends).items()}
+    means |= {
+        name: (name, how)
+        for name, how in (dict.fromkeys(HEADS, largest) | ends).items()
+    }
     table: pd.DataFrame = rows.agg(**means).reset_index()
     each = table[[*HEADS][:-1]].to_numpy(float)
     worst = each[np.arange(len(each)), np.nan_to_num(np.abs(each)).argmax(axis=1)]
@@ -208,7 +251,9 @@ def together(points: pd.DataFrame) -> pd.DataFrame:
     table = table.assign(largest=np.where(whole, worst, math.nan), pareto=False)
     for _, alike in table[whole & table["same_model"]].groupby("packing"):
         values = alike[["cost_core_s", "largest"]].abs().to_numpy(float)
-        worse = [(values <= row).all(axis=1) & (values < row).any(axis=1) for row in values]
+        worse = [
+            (values <= row).all(axis=1) & (values < row).any(axis=1) for row in values
+        ]
         table.loc[alike.index, "pareto"] = ~np.any(worse, axis=1)
     return table
 
@@ -223,42 +268,78 @@ def known_errors(points: pd.DataFrame) -> pd.DataFrame:
     grains = points[(points["flow_level"] == beside) & (points["asked"] == "dem")]
     flow = points[(points["grain_level"] == PEELING.name) & points["same_model"]]
     taus, tables = [name for name in points if str(name).startswith("tau_")], []
-    key, place = ["part", "level", "scene_class", "fraction"], ["scene_class", "fraction"]
+    key, place = (
+        ["part", "level", "scene_class", "fraction"],
+        ["scene_class", "fraction"],
+    )
     for part, column, table, best, again in (
         ("grains", "grain_level", grains, "reference", "soft reference"),
         ("flow", "flow_level", flow, "fine", "finest"),
     ):
-        names = {column: "level", f"class_{part}": "scene_class", f"{part}_s": "cost_core_s"}
+        names = {
+            column: "level",
+            f"class_{part}": "scene_class",
+            f"{part}_s": "cost_core_s",
+        }
         rows = table.rename(columns=names).assign(part=part)
-        rows = rows.melt(["scene_id", *key[:-1], "cost_core_s"], taus, "fraction", "tau")
+        rows = rows.melt(
+            ["scene_id", *key[:-1], "cost_core_s"], taus, "fraction", "tau"
+        )
         base = rows.loc[rows["level"] == best, ["scene_id", "fraction", "tau"]]
         rows = rows.merge(base, on=["scene_id", "fraction"], suffixes=("", "_best"))
         neither = rows["tau"].isna() & rows["tau_best"].isna()
-        error = (rows["tau"] / rows["tau_best"] - 1).abs().fillna(math.inf).mask(neither, 0.0)
+        error = (
+            (rows["tau"] / rows["tau_best"] - 1)
+            .abs()
+            .fillna(math.inf)
+            .mask(neither, 0.0)
+        )
         rows = rows.assign(error=error, fraction=rows["fraction"].str[4:].astype(float))
         largest = {"error": ("error", "max"), "cost_core_s": ("cost_core_s", "mean")}
-        known = rows.groupby(key).agg(**largest, scenes=("scene_id", "size")).reset_index()
+        known = (
+            rows.groupby(key).agg(**largest, scenes=("scene_id", "size")).reset_index()
+        )
         shift = known.loc[known["level"] == again, [*place, "error"]]
-        known = known.merge(shift.rename(columns={"error": "uncertainty"}), "left", place)
+        known = known.merge(
+            shift.rename(columns={"error": "uncertainty"}), "left", place
+        )
         # a finer flow is run on small piles alone, other grains on every pile
-        tables.append(known.fillna({"uncertainty": 0.0 if part == "flow" else math.inf}))
+        tables.append(
+            known.fillna({"uncertainty": 0.0 if part == "flow" else math.inf})
+        )
     columns = [*key, "error", "uncertainty", "cost_core_s", "scenes"]
     return pd.concat(tables)[columns].sort_values(key)
 
 
 def _sections(pairs: pd.DataFrame, known: pd.DataFrame) -> list[Section]:
-    words, index = TEXTS["ladder"], ["part", "scene_class", "level", "scenes", "cost_core_s"]
+    words, index = (
+        TEXTS["ladder"],
+        ["part", "scene_class", "level", "scenes", "cost_core_s"],
+    )
     heads = {name: f"{name.removeprefix('error_')} %" for name in HEADS}
-    heads |= {"flow_level": "flow", "grain_level": "grains", "scene_class": "scene class"}
+    heads |= {
+        "flow_level": "flow",
+        "grain_level": "grains",
+        "scene_class": "scene class",
+    }
     heads["cost_core_s"] = "core-s"
-    means = pairs.sort_values(["packing", "cost_core_s"]).assign(**(100 * pairs[[*HEADS]]))
-    means = means[["packing", *LEVEL_PAIR, "piles", "cost_core_s", *HEADS]].rename(columns=heads)
-    rows = [(part, each.name, each.meaning) for part, levels in LEVELS.items() for each in levels]
+    means = pairs.sort_values(["packing", "cost_core_s"]).assign(
+        **(100 * pairs[[*HEADS]])
+    )
+    means = means[["packing", *LEVEL_PAIR, "piles", "cost_core_s", *HEADS]].rename(
+        columns=heads
+    )
+    rows = [
+        (part, each.name, each.meaning)
+        for part, levels in LEVELS.items()
+        for each in levels
+    ]
     meanings = pd.DataFrame(rows, columns=["part", "level", "what it is"])
     order = {name: place for place, name in enumerate(meanings["level"])}
     errors = (100 * known.set_index([*index, "fraction"])["error"]).unstack("fraction")
     errors = errors.rename(columns="{:.0%}".format).sort_index(
-        level=index[:3], key=lambda keys: keys.map(order) if keys.name == "level" else keys
+        level=index[:3],
+        key=lambda keys: keys.map(order) if keys.name == "level" else keys,
     )
     of_levels = [meanings, errors.reset_index().rename(columns=heads)]
     title, largest = "Cost against error", chart(pairs, {"largest": ""})
@@ -282,18 +363,28 @@ def chart(pairs: pd.DataFrame, columns: Mapping[str, str]) -> Canvas:
     colours = pairs["grain_level"].map(METHODS).fillna(METHODS["DEM"])
     table = pairs.assign(name=names, number=pd.factorize(names)[0] + 1, colour=colours)
     packings = [rows for _, rows in table.groupby("packing", sort=False)]
-    height = (2.6 if single else 1.7) * len(packings) + 0.06 * table["number"].nunique() + 1.2
+    height = (
+        (2.6 if single else 1.7) * len(packings)
+        + 0.06 * table["number"].nunique()
+        + 1.2
+    )
     canvas = style.canvas(height)
-    grid = canvas.subplots(len(packings), len(columns), sharex=True, sharey=True, squeeze=False)
+    grid = canvas.subplots(
+        len(packings), len(columns), sharex=True, sharey=True, squeeze=False
+    )
     tags = []
     for line, rows in zip(grid, packings, strict=True):
         title = f"{rows['packing'].iloc[0]} packing"
-        line[0].set_ylabel("largest error of $τ_c$, %" if single else f"{title}\nerror of $τ_c$, %")
+        line[0].set_ylabel(
+            "largest error of $τ_c$, %" if single else f"{title}\nerror of $τ_c$, %"
+        )
         for ax, (column, head) in zip(line, columns.items(), strict=True):
             ax.set_title(head or title, loc="left" if single else "center")
             ends = rows["reference_error"].max(), rows["model_floor"].min()
             for at, (end, (_, colour)) in enumerate(zip(ends, BANDS, strict=True)):
-                ax.axhspan(0, np.nan_to_num(end), color=colour, lw=0, zorder=0.2 - at / 10)
+                ax.axhspan(
+                    0, np.nan_to_num(end), color=colour, lw=0, zorder=0.2 - at / 10
+                )
             tags.append((ax, _points(ax, rows, column, named=single)))
     for ax in grid.ravel():
         ax.set(xscale="log", yscale="log", ylim=(FLOOR / 1.5, None))
@@ -301,23 +392,39 @@ def chart(pairs: pd.DataFrame, columns: Mapping[str, str]) -> Canvas:
         for tolerance in (0.05, 0.2):
             ax.axhline(tolerance, color="0.45", lw=0.7, ls=(0, (4, 2)), zorder=1)
     grid[-1, len(columns) // 2].set_xlabel("cost, s of one core")
-    numbered: Any = (table if single else table[table["pareto"]]).drop_duplicates("number")
+    numbered: Any = (table if single else table[table["pareto"]]).drop_duplicates(
+        "number"
+    )
     mark: Look = {"ls": "", "ms": 5, "mec": "0.2", "mew": 0.9}
     samples: list[Artist] = [
-        Line2D([], [], ls="", marker=f"${row.number}$", ms=5, label=row.name, color=row.colour)
+        Line2D(
+            [],
+            [],
+            ls="",
+            marker=f"${row.number}$",
+            ms=5,
+            label=row.name,
+            color=row.colour,
+        )
         for row in numbered.itertuples(index=False)
     ]
-    samples += [Line2D([], [], label=text, **mark, **look) for text, look in MARKS.items()]
+    samples += [
+        Line2D([], [], label=text, **mark, **look) for text, look in MARKS.items()
+    ]
     samples += [Patch(label=label, color=colour, lw=0) for label, colour in BANDS]
     if single:
-        samples.append(Line2D([], [], label="no pair of levels is cheaper and better", **FRONT))
+        samples.append(
+            Line2D([], [], label="no pair of levels is cheaper and better", **FRONT)
+        )
     style.legends(canvas, [style.entry(*method) for method in METHODS.items()], samples)
     canvas.draw_without_rendering()  # labels are placed in a finished layout
     arrow = {"arrowstyle": "-", "lw": 0.4, "color": "0.5"}
     for ax, texts in tags:
         if texts:
             x, y = np.transpose([text.get_position() for text in texts])
-            adjust_text(texts, x, y, ax=ax, arrowprops=arrow, expand=(1.15, 1.4), iter_lim=100)
+            adjust_text(
+                texts, x, y, ax=ax, arrowprops=arrow, expand=(1.15, 1.4), iter_lim=100
+            )
         for text in texts:
             text.set_in_layout(False)
     return canvas
@@ -333,11 +440,25 @@ def _points(ax: Any, rows: pd.DataFrame, column: str, *, named: bool) -> list[An
     each: Any = shown.itertuples(index=False)
     for row in each:
         face = row.colour if row.same_model else "white"
-        mark: Look = {"marker": "v" if getattr(row, column) < 0 else "^", "ms": 5, "mew": 0.9}
-        ax.plot(row.cost_core_s, row.y, gid="point", zorder=3, mfc=face, mec=row.colour, **mark)
+        mark: Look = {
+            "marker": "v" if getattr(row, column) < 0 else "^",
+            "ms": 5,
+            "mew": 0.9,
+        }
+        ax.plot(
+            row.cost_core_s,
+            row.y,
+            gid="point",
+            zorder=3,
+            mfc=face,
+            mec=row.colour,
+            **mark,
+        )
         if named or row.pareto:
             text = f"{row.number}" + f": {row.name}" * (named and row.pareto)
-            tags.append(ax.text(row.cost_core_s, row.y, text, path_effects=halo, **look))
+            tags.append(
+                ax.text(row.cost_core_s, row.y, text, path_effects=halo, **look)
+            )
     if named:
         front = shown[shown["pareto"]].sort_values("cost_core_s")
         ax.step(front["cost_core_s"], front["y"], where="post", **FRONT)

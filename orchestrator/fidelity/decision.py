@@ -31,7 +31,9 @@ from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 
 Names = tuple[str, ...]
-LEAST_HELD = 6.0  # waiting time, sqrt(d/g'), below which load steps are a ramp of the flow
+LEAST_HELD = (
+    6.0  # waiting time, sqrt(d/g'), below which load steps are a ramp of the flow
+)
 EXACT = "the closed form is exact for a single grain in a held flow"
 LONG_BED = f"more than {LONG:g} grains long"
 ALONG = f"{LONG_BED}: closed form along the bed, checked where motion starts"
@@ -41,9 +43,12 @@ Their values do not ask for DEM."""
 _NUMBERS = [
     field.name.split(".")
     for field in FIELDS
-    if field.info.about == "answer" and field.name not in ("protocol.method", "flow.model", *KEPT)
+    if field.info.about == "answer"
+    and field.name not in ("protocol.method", "flow.model", *KEPT)
 ]
-NUMBERS = {f"{part}.{name}": PARTS[part].model_fields[name].default for part, name in _NUMBERS}
+NUMBERS = {
+    f"{part}.{name}": PARTS[part].model_fields[name].default for part, name in _NUMBERS
+}
 """Fields of mesh, contact, load steps and mobile layers, with the defaults of a lattice: a scene in
 which one has another value is answered by DEM, which uses it."""
 
@@ -111,7 +116,10 @@ def decide(scene: Scene, tolerance: float | None) -> Decision:
         return as_asked(scene, why_as_written)
     if tolerance is None:
         most = min(levels.floors().values())
-        start, limit = "chosen by default: ", f"within the model's own spread of {most:.0%}"
+        start, limit = (
+            "chosen by default: ",
+            f"within the model's own spread of {most:.0%}",
+        )
     else:
         most, start, limit = tolerance, "", "within the tolerance"
     pair, why = _looked_up(scene, most)
@@ -201,7 +209,9 @@ def _of_grain(scene: Scene, tolerance: float | None) -> Decision:
     if scene.protocol.waiting_time < LEAST_HELD:
         return as_asked(scene, "the study asks for a ramp of the flow")
     if scene.bed.slope_deg > scene.bed.entrainment_angle_deg:
-        return as_asked(scene, "a slope beyond the entrainment angle: the closed form is off")
+        return as_asked(
+            scene, "a slope beyond the entrainment angle: the closed form is off"
+        )
     exact = changed(scene, {"protocol.method": "pivot"})
     return Decision(scene, exact, None, levels.UNKNOWN, EXACT, is_chosen=True)
 
@@ -265,7 +275,10 @@ def _looked_up(scene: Scene, most: float) -> tuple[Pair | None, str]:
 
 @cache  # a study has thousands of scenes of a few classes
 def _cheapest(
-    flows: Sequence[Level], grains: Sequence[Level], classes: tuple[Names, Names], most: float
+    flows: Sequence[Level],
+    grains: Sequence[Level],
+    classes: tuple[Names, Names],
+    most: float,
 ) -> tuple[Pair | None, str]:
     """The cheapest pair of some levels with a known error of at most `most`, and why it is taken.
 
@@ -287,7 +300,10 @@ def _cheapest(
     # errors below the uncertainty of the reference cannot be ranked, but those of flows can
     best = min(pairs, key=lambda pair: known[pair].total)
     exact = GRAINS[-1]
-    flow_error = {pair: levels.known_of_classes(pair.flow, exact, *classes).error for pair in pairs}
+    flow_error = {
+        pair: levels.known_of_classes(pair.flow, exact, *classes).error
+        for pair in pairs
+    }
     alike = [
         pair
         for pair in pairs
@@ -316,6 +332,8 @@ def checks(answers: Iterable[Decision]) -> dict[str, Decision]:
         dem = changed(answer.asked, {"protocol.method": "dem"})
         member = (Pile(dem).case.cost_s, answer.asked.id, dem)
         group = _check_group(answer.asked)
-        cheapest[group] = min(cheapest.get(group, member), member, key=lambda one: one[:2])
+        cheapest[group] = min(
+            cheapest.get(group, member), member, key=lambda one: one[:2]
+        )
     why = "it checks an answer without DEM"
     return {asked: as_asked(dem, why) for _, asked, dem in cheapest.values()}

@@ -28,32 +28,60 @@ from orchestrator.study.study import make_scene
 from orchestrator.types import FloatArray
 
 Fields = Mapping[str, Any]  # values of a scene's fields, named as in a study file
-STRIP_WIDTH = 5.0  # of the bed of the level `strip`, d; more where the largest grains need it
+STRIP_WIDTH = (
+    5.0  # of the bed of the level `strip`, d; more where the largest grains need it
+)
 FINER = {
     **{"flow.cells_per_face": 1, "flow.expansion_ratio": -1},
     **{"bed.mobile_layers": 1, "grain.stiffness": 1},
-    **{"protocol.time_step": -1, "protocol.waiting_time": 1, "protocol.load_increment": -1},
+    **{
+        "protocol.time_step": -1,
+        "protocol.waiting_time": 1,
+        "protocol.load_increment": -1,
+    },
 }
 """Numbers of a level, and whether a larger one (1) or a smaller one (-1) is at least as fine."""
 FOLDER = Path(__file__).with_name("calibration")
-DISORDERS = (0.02, 0.05, 0.2)  # ends of the ranges of disorder that share their known errors, d
-VISCOUS, ROUGH = 3.0, 30.0  # Re* below which a bed is smooth, and from which it is rough
+DISORDERS = (
+    0.02,
+    0.05,
+    0.2,
+)  # ends of the ranges of disorder that share their known errors, d
+VISCOUS, ROUGH = (
+    3.0,
+    30.0,
+)  # Re* below which a bed is smooth, and from which it is rough
 LEVEL_BED = "level bed"  # class for the flow of beds over which u* is u*_0 everywhere
 LIMITING = ", limiting slope"  # end of the name of a class
 LIFTED_TO = 1.235  # lift over the weight normal to the bed, up to which lifted grains were measured
-BETWEEN_DEG = 5.0  # below the limiting slope, from which slopes were measured as below it
+BETWEEN_DEG = (
+    5.0  # below the limiting slope, from which slopes were measured as below it
+)
 AT_LEAST = ("flow.lid", "flow.upstream", "flow.downstream")  # as good where larger
 SETTINGS = (
-    *(*AT_LEAST, "flow.turbulence_model", "flow.convection_scheme", "forces.averaging_length"),
+    *(
+        *AT_LEAST,
+        "flow.turbulence_model",
+        "flow.convection_scheme",
+        "forces.averaging_length",
+    ),
     *("forces.loaded_grains", "forces.exposure", "forces.sheltering", "grain.cohesion"),
     "protocol.displacement_criterion",
 )
 _AT = {name: name.split(".") for name in SETTINGS}
-DEFAULTS = {name: PARTS[part].model_fields[key].default for name, (part, key) in _AT.items()}
+DEFAULTS = {
+    name: PARTS[part].model_fields[key].default for name, (part, key) in _AT.items()
+}
 """Fields that move an answer and that the ladder keeps at their defaults."""
 SAME_CELL = 0.02  # relative difference of the first cell that changes no known error
 FROZEN = "frozen bed"  # the choice that the flow of the whole pile acts until the last grain left
-STATED = ("packing", "roughness length", "entrainment angle", "friction angle", "lift coefficient")
+STATED = (
+    "packing",
+    "roughness length",
+    "entrainment angle",
+    "friction angle",
+    "lift coefficient",
+)
 """Choices whose values a study file states."""
 
 
@@ -102,7 +130,10 @@ class Level:
     def changes(self, scene: Scene) -> Fields:
         """The fields that it sets where it is chosen: a flow over fine sand has its own z0."""
         own = self.sets.get("flow.model", "flat") != "flat"
-        return {**self.fields(scene), **({"flow.roughness": outer_roughness(scene)} if own else {})}
+        return {
+            **self.fields(scene),
+            **({"flow.roughness": outer_roughness(scene)} if own else {}),
+        }
 
     def describes(self, scene: Scene, *, or_finer: bool = False) -> bool:
         """Whether the scene is on this level, or has numbers that are finer and all else alike."""
@@ -115,7 +146,10 @@ class Level:
 
     def fields(self, scene: Scene) -> Fields:
         """The fields that it sets in a scene."""
-        fields, bed = {**self.sets, **(self.on_poured if scene.is_poured else {})}, scene.bed
+        fields, bed = (
+            {**self.sets, **(self.on_poured if scene.is_poured else {})},
+            scene.bed,
+        )
         assert isinstance(bed, PileBed)
         if self.derived == "threshold_speed":
             ustar = float(closed_form(scene).friction_velocity)
@@ -145,7 +179,9 @@ class Pair(NamedTuple):
 
     def answer(self, scene: Scene) -> Scene:
         """The scene as both levels answer it."""
-        return changed(scene, {**self.flow.changes(scene), **self.grains.changes(scene)})
+        return changed(
+            scene, {**self.flow.changes(scene), **self.grains.changes(scene)}
+        )
 
 
 def value_of(scene: Scene, name: str) -> Any:
@@ -155,7 +191,9 @@ def value_of(scene: Scene, name: str) -> Any:
 
 def changed(scene: Scene, fields: Fields) -> Scene:
     """A scene with some fields changed; an `InputError` for a value that a field cannot have."""
-    parts: dict[str, dict[str, Any]] = {name: dict(getattr(scene, name)) for name in PARTS}
+    parts: dict[str, dict[str, Any]] = {
+        name: dict(getattr(scene, name)) for name in PARTS
+    }
     for name, value in fields.items():
         part, _, field = name.partition(".")
         parts.setdefault(part, {})[field] = value
@@ -169,14 +207,18 @@ def packing(scene: Scene) -> str:
 
 
 def _load(part: str) -> tuple[Level, ...]:
-    data = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+    data = tomllib.loads(
+        Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+    )
     for row in data[part]:
         for sets in (row["sets"], row.get("on_poured", {})):
             sets |= data["rules"].get(sets.pop("rules", ""), {})
     return tuple(Level(**row) for row in data[part])
 
 
-AS_ASKED = Level("as asked", "numbers of the study file")  # where a scene is on no level
+AS_ASKED = Level(
+    "as asked", "numbers of the study file"
+)  # where a scene is on no level
 FLOW, GRAINS = _load("flow"), _load("grains")
 LEVELS = {"flow": FLOW, "grains": GRAINS}
 """All levels, by the part of a pile that they answer, from cheap to dear."""
@@ -192,7 +234,10 @@ def level(part: str, name: str) -> Level:
 
 def pair_of(scene: Scene) -> Pair:
     """The levels that a pile is on as it is asked; `AS_ASKED` where it is on none."""
-    on = ([level for level in levels if level.describes(scene)] for levels in LEVELS.values())
+    on = (
+        [level for level in levels if level.describes(scene)]
+        for levels in LEVELS.values()
+    )
     flow, grains = (levels[-1] if levels else AS_ASKED for levels in on)
     return Pair(flow, LOCAL if LOCAL.describes(scene) else grains)
 
@@ -247,7 +292,9 @@ def scene_class(part: str, scene: Scene, *, obstacles: bool = True) -> str:
     if part == "flow":
         if bed.is_level:
             return LEVEL_BED
-        name = scene.forces.stress + ("" if scene.flow.top == "boundary layer" else ", channel")
+        name = scene.forces.stress + (
+            "" if scene.flow.top == "boundary layer" else ", channel"
+        )
     elif name == "disordered":
         name = f"disordered up to {next(end for end in DISORDERS if bed.disorder <= end):g} d"
     if part == "grains" and _lift(scene) > 1:
@@ -272,10 +319,15 @@ def classes(part: str, scene: Scene) -> tuple[str, ...]:
     """
     bed, name = scene.bed, scene_class(part, scene)
     assert isinstance(bed, PileBed)
-    base, below_deg = name.removesuffix(LIMITING), scene.limiting_slope_deg - bed.slope_deg
+    base, below_deg = (
+        name.removesuffix(LIMITING),
+        scene.limiting_slope_deg - bed.slope_deg,
+    )
     if bed.is_triangle and (1 <= below_deg < BETWEEN_DEG or base == "horizontal"):
         return base, base + LIMITING
-    return (name, scene_class(part, scene, obstacles=False)) if bed.obstacles else (name,)
+    return (
+        (name, scene_class(part, scene, obstacles=False)) if bed.obstacles else (name,)
+    )
 
 
 def _lift(scene: Scene) -> float:
@@ -325,7 +377,9 @@ def known(pair: Pair, scene: Scene) -> Known:
 def _coarser(part: str, scene: Scene) -> Level:
     """The most expensive level that is no finer than a scene and was measured; or `AS_ASKED`."""
     for one in LEVELS[part][::-1]:
-        is_known = all((part, one.name, name) in measured() for name in classes(part, scene))
+        is_known = all(
+            (part, one.name, name) in measured() for name in classes(part, scene)
+        )
         if one.same_model and is_known and one.describes(scene, or_finer=True):
             return one
     return AS_ASKED
@@ -333,7 +387,10 @@ def _coarser(part: str, scene: Scene) -> Level:
 
 @cache  # a study has thousands of scenes of a few classes
 def known_of_classes(
-    flow: Level, grains: Level, flow_classes: tuple[str, ...], grain_classes: tuple[str, ...]
+    flow: Level,
+    grains: Level,
+    flow_classes: tuple[str, ...],
+    grain_classes: tuple[str, ...],
 ) -> Known:
     """Known error of two levels on scenes of some classes; unknown where it has no bound."""
     exact = flow is FLAT and flow_classes == (LEVEL_BED,)
@@ -344,7 +401,9 @@ def known_of_classes(
         return UNKNOWN
     # of several classes the worst; then both parts at each fraction, and the worst fraction
     parts = [np.max([table[key] for key in part], axis=0) for part in keys]
-    error, uncertainty = (np.sqrt(sum(part[row] ** 2 for part in parts)) for row in (0, 1))
+    error, uncertainty = (
+        np.sqrt(sum(part[row] ** 2 for part in parts)) for row in (0, 1)
+    )
     worst = int(np.argmax(np.hypot(error, uncertainty)))
     costs = [0.0] * exact + [float(part[2, 0]) for part in parts]
     known = Known(float(error[worst]), float(uncertainty[worst]), *costs)
@@ -368,7 +427,13 @@ def model_class(scene: Scene) -> str:
     """The class of scenes on which the choices common to all levels have the same effect."""
     bed, reynolds = scene.bed, float(closed_form(scene).reynolds)
     assert isinstance(bed, PileBed)
-    regime = "viscous" if reynolds < VISCOUS else "transitional" if reynolds < ROUGH else "rough"
+    regime = (
+        "viscous"
+        if reynolds < VISCOUS
+        else "transitional"
+        if reynolds < ROUGH
+        else "rough"
+    )
     shape = "" if bed.is_triangle else f", {'profile' if bed.profile else bed.shape}"
     return f"{bed.packing}, {regime}{shape}"
 
@@ -402,7 +467,9 @@ def together(shares: pd.DataFrame, quantity: str = "shields") -> tuple[float, fl
 
     Nothing falls below zero, however many choices lower it.
     """
-    low, high = (float(np.hypot.reduce(shares[f"{quantity}_{end}"])) for end in ("low", "high"))
+    low, high = (
+        float(np.hypot.reduce(shares[f"{quantity}_{end}"])) for end in ("low", "high")
+    )
     return min(low, 1.0), high
 
 
@@ -415,7 +482,9 @@ def floors() -> dict[str, float]:
     unstated = _budget()[~_budget()["choice"].isin(STATED)]
     groups = unstated.groupby(["model_class", "fraction"])
     halves = pd.Series({key: sum(together(part)) / 2 for key, part in groups})
-    return {str(model): float(half) for model, half in halves.groupby(level=0).min().items()}
+    return {
+        str(model): float(half) for model, half in halves.groupby(level=0).min().items()
+    }
 
 
 @cache

@@ -27,13 +27,18 @@ from orchestrator.study.study import ASKED, Study
 
 MOST_GRAINS = 1e5  # largest length of a bed with grains, diameters
 FROZEN_BED = 0.05  # relative change of a threshold up to which the flow of the whole pile acts on
-PILE_SLOPES_DEG = (1.0, 35.0)  # of piles that the mesh and the packing have been tried for
+PILE_SLOPES_DEG = (
+    1.0,
+    35.0,
+)  # of piles that the mesh and the packing have been tried for
 TIMESTEPS = ((0.1, 0.4), (0.3, 0.2), (0.6, 0.1), (1.0, 0.05))
 """Largest damping ratio, and the largest safe time step up to it, sqrt(m/K)."""
 LEAST_DAMPING = 0.03
 WAITING_TIME = 3.0  # least time without a passage, sqrt(d/g')
 COARSE_STEP = 0.05
-CLOSE_PACKED_DEG = 59.0  # entrainment angle from which the grains of a row hold each other
+CLOSE_PACKED_DEG = (
+    59.0  # entrainment angle from which the grains of a row hold each other
+)
 ANGLES = "min(friction angle, 90 deg - entrainment angle)"
 
 
@@ -76,26 +81,40 @@ def check(scene: Scene, where: str, *, grains: bool = True) -> None:
         warnings.warn(f"{limit.field}: {limit.what} ({remedy})", stacklevel=2)
     if isinstance(scene.bed, PileBed):
         try:
-            _ = FlowModel(scene).cases  # a mesh that cannot be made is refused before anything runs
+            _ = FlowModel(
+                scene
+            ).cases  # a mesh that cannot be made is refused before anything runs
         except InputError as error:
-            raise InputError(error.what, f"{where}: {error.where}", error.remedy) from None
+            raise InputError(
+                error.what, f"{where}: {error.where}", error.remedy
+            ) from None
 
 
 def exceeded(scene: Scene, *, grains: bool = True) -> Iterator[Limit]:
     """The limits that a scene is beyond; without `grains` those of its flow."""
     bed = scene.bed
-    slope, limit, angle = bed.slope_deg, scene.limiting_slope_deg, bed.entrainment_angle_deg
+    slope, limit, angle = (
+        bed.slope_deg,
+        scene.limiting_slope_deg,
+        bed.entrainment_angle_deg,
+    )
     if isinstance(bed, PileBed):
         yield from _pile(scene, bed) if grains else ()
-        yield from _solve(scene, bed) if scene.flow.model == "solve" else _theory(scene, bed)
+        yield from (
+            _solve(scene, bed) if scene.flow.model == "solve" else _theory(scene, bed)
+        )
     if not grains:
         return
     if (not isinstance(bed, PileBed) or bed.is_wedge) and slope > limit + 1e-9:
         what = f"{slope:g} deg is beyond {ANGLES} = {limit:g} deg: the bed rolls back without flow"
-        yield Limit("slope", "bed.slope_deg", what, "lower the slope or the entrainment angle")
+        yield Limit(
+            "slope", "bed.slope_deg", what, "lower the slope or the entrainment angle"
+        )
     if not isinstance(bed, PileBed) and slope > angle:
         what = f"beyond the entrainment angle, {angle:g} deg, a grain may rest half-way"
-        remedy = "read it by DEM, which differs from the closed form, or lower the slope"
+        remedy = (
+            "read it by DEM, which differs from the closed form, or lower the slope"
+        )
         yield Limit("slope", "bed.slope_deg", what, remedy, refused=False)
     if scene.protocol.method == "dem":
         yield from _dem(scene)
@@ -111,7 +130,9 @@ def _pile(scene: Scene, bed: PileBed) -> Iterator[Limit]:
     try:
         if (count := Geometry(scene).length) > MOST_GRAINS:
             what = f"{count * scene.grain.diameter:g} m of bed are {count:.0f} grains"
-            yield Limit("", "bed", f"{what}, more than {MOST_GRAINS:g}", _for_long(scene))
+            yield Limit(
+                "", "bed", f"{what}, more than {MOST_GRAINS:g}", _for_long(scene)
+            )
             return
         what = _unfit(scene, bed, of_bed(bed))
     except UnfitError as error:
@@ -121,7 +142,9 @@ def _pile(scene: Scene, bed: PileBed) -> Iterator[Limit]:
         yield Limit("slope", "bed", what, remedy)
     if bed.is_wedge and not low <= bed.slope_deg <= high:
         remedy = f"choose {low:g} ... {high:g} deg, and no more than {ANGLES}"
-        yield Limit("slope", "bed.slope_deg", f"a pile of {bed.slope_deg:g} deg", remedy)
+        yield Limit(
+            "slope", "bed.slope_deg", f"a pile of {bed.slope_deg:g} deg", remedy
+        )
     if angle < CLOSE_PACKED_DEG:
         what = f"a pile of {angle:g} deg: a mobile row is wedged apart by the row on it"
         remedy = "60 deg; single grains may have less"
@@ -188,7 +211,9 @@ def _solve(scene: Scene, bed: PileBed) -> Iterator[Limit]:
     ratio = KARMAN * ustar0 * cell / 2 / scene.solve_viscosity
     if ratio < 1:
         what = f"not turbulent: the first cell's eddy viscosity is {ratio:.2g} of the molecular one"
-        remedy = "take the field of a lower viscosity or a higher speed: u*/U_e is the same"
+        remedy = (
+            "take the field of a lower viscosity or a higher speed: u*/U_e is the same"
+        )
         yield Limit("similarity", "flow.viscosity", what, remedy)
     if (scheme := scene.flow.convection_scheme) != "linearUpwind":
         what = f"{scheme} does not converge to the same answer, or not at all"
@@ -200,7 +225,9 @@ def _dem(scene: Scene) -> Iterator[Limit]:
     rules, damping = scene.protocol, scene.grain.damping
     if rules.time_step > (most := largest_timestep(damping)):
         what = f"{rules.time_step:g} sqrt(m/K) is above {most:g} at a damping of {damping:g}"
-        yield Limit("timestep-damping", "protocol.time_step", what, "lower it, or the damping")
+        yield Limit(
+            "timestep-damping", "protocol.time_step", what, "lower it, or the damping"
+        )
     if damping < LEAST_DAMPING:
         what = f"at a damping of {damping:g} a bed does not come to rest"
         yield Limit("timestep-damping", "grain.damping", what, "0.1 is sound")
@@ -212,4 +239,6 @@ def _dem(scene: Scene) -> Iterator[Limit]:
         yield Limit("quiet-step", "protocol.waiting_time", what, remedy, refused=False)
     if (step := rules.load_increment) > COARSE_STEP:
         what = f"load steps {step:.0%} apart leave the threshold that wide an interval"
-        yield Limit("quiet-step", "protocol.load_increment", what, "lower it", refused=False)
+        yield Limit(
+            "quiet-step", "protocol.load_increment", what, "lower it", refused=False
+        )

@@ -42,7 +42,9 @@ FINE = 80  # cells per face from which a flow starts from that on half of them
 LEAST_CELL = 0.04
 """Shortest cell along the bed, over the height of the first cells: with cells of a hundredth the
 stress upstream was 3 to 12 % off, and up to fourfold with cells of a thousandth."""
-MOST_GROWTH = 3.0  # largest ratio of neighbouring cells: rows of more do not fit under a crest
+MOST_GROWTH = (
+    3.0  # largest ratio of neighbouring cells: rows of more do not fit under a crest
+)
 LEAST_LID = 5.0
 """Lowest lid of a boundary layer, h: under lower ones iterations cycle, and none ends."""
 PATCHES = {
@@ -133,7 +135,10 @@ class FlowCase(Case):
     @property
     def bed_line(self) -> BedLine:
         """The bed line, m, from the inlet to the outlet."""
-        line, settings = self.line or triangle(self.slope_deg, self.height_m), self.settings
+        line, settings = (
+            self.line or triangle(self.slope_deg, self.height_m),
+            self.settings,
+        )
         ends = (settings.upstream * self.height_m, settings.downstream * self.height_m)
         whole = extended(line, *ends)
         x, z = digits.on_grid(whole.corners, self.height_m).T.tolist()
@@ -144,7 +149,9 @@ class FlowCase(Case):
     @cached_property
     def grid(self) -> Grid:
         """The grid lines of the mesh along it."""
-        return along(self.bed_line, self.slope_deg, self.settings.cells_per_face, self.growth)
+        return along(
+            self.bed_line, self.slope_deg, self.settings.cells_per_face, self.growth
+        )
 
     @cached_property
     def needs(self) -> tuple["FlowCase", ...]:
@@ -160,7 +167,9 @@ class FlowCase(Case):
     @property
     def growth(self) -> float:
         """Ratio of neighbouring cells: with twice the cells on a face all are half as long."""
-        return float(self.settings.expansion_ratio ** (40 / self.settings.cells_per_face))
+        return float(
+            self.settings.expansion_ratio ** (40 / self.settings.cells_per_face)
+        )
 
     @property
     def growth_far(self) -> float:
@@ -186,7 +195,9 @@ class FlowCase(Case):
             remedy = "make the obstacle larger, leave it out, or lower flow.first_cell_height"
             raise InputError(what, where="bed.obstacles", remedy=remedy)
         where = "bed.profile" if self.profile else "bed"
-        raise InputError(what, where=where, remedy="take corners apart that nearly coincide")
+        raise InputError(
+            what, where=where, remedy="take corners apart that nearly coincide"
+        )
 
     @property
     def cost_s(self) -> float:
@@ -205,7 +216,9 @@ class FlowCase(Case):
     def share(self, directory: Path) -> float:
         """Iterations over those that are expected, at most nearly all."""
         path = directory / "log.simpleFoam"
-        text = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+        text = (
+            path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+        )
         return min(text.count("\nTime = ") / self._iterations, 0.95)
 
     def versions(self) -> dict[str, str]:
@@ -224,16 +237,41 @@ class FlowCase(Case):
         # flow still changes at a residual at which that over a pile has ended
         residual = RESIDUAL * min(1.0, CELLS_ALONG / sum(self.grid.cells))
         h, closed = self.height_m, settings.top == "closed channel"
-        heights = {"speedHeight": SPEED_HEIGHT * h, "lidHeight": lid_m, "columnOffset": -h}
+        heights = {
+            "speedHeight": SPEED_HEIGHT * h,
+            "lidHeight": lid_m,
+            "columnOffset": -h,
+        }
         wall = {"firstCentre": self._first_centre, "roughnessLength": self.roughness_m}
         fluid = {"freeStream": settings.speed, "viscosity": self.viscosity_m2_s}
-        models = {"turbulence": settings.turbulence_model, "convection": settings.convection_scheme}
-        ends = {"correctors": settings.non_orthogonal_correctors, "residual": f"{residual:.3g}"}
-        every = {"top": TOPS[settings.top], **heights, **wall, **fluid, **models, **ends}
+        models = {
+            "turbulence": settings.turbulence_model,
+            "convection": settings.convection_scheme,
+        }
+        ends = {
+            "correctors": settings.non_orthogonal_correctors,
+            "residual": f"{residual:.3g}",
+        }
+        every = {
+            "top": TOPS[settings.top],
+            **heights,
+            **wall,
+            **fluid,
+            **models,
+            **ends,
+        }
         set_values(directory / "parameters", every)
-        form = {"slope_deg": self.slope_deg, "height": h, "lid": lid_m, "closed": int(closed)}
+        form = {
+            "slope_deg": self.slope_deg,
+            "height": h,
+            "lid": lid_m,
+            "closed": int(closed),
+        }
         cells = {"first_cell": self.first_cell_m, "growth": self.growth}
-        set_values(directory / "parameters.geo", {**form, **cells, "growth_far": self.growth_far})
+        set_values(
+            directory / "parameters.geo",
+            {**form, **cells, "growth_far": self.growth_far},
+        )
         self.grid.write(directory / "bed_line.geo")
         if self.profile:
             (directory / "profile.csv").write_text(self.profile.text, encoding="utf-8")
@@ -251,7 +289,9 @@ class FlowCase(Case):
             # a third of the iterations from a uniform flow
             ustar, over = self.ustar0_m_s, np.abs(z.ravel())
             speed = log_law_speed(ustar, over, self.roughness_m)
-            start_from(directory / "0/U", np.column_stack([speed, 0 * speed, 0 * speed]))
+            start_from(
+                directory / "0/U", np.column_stack([speed, 0 * speed, 0 * speed])
+            )
             frequency = ustar / (KARMAN * (over + self.roughness_m))
             start_from(directory / "0/epsilon", ustar**2 * frequency)
             start_from(directory / "0/omega", frequency / np.sqrt(0.09))
@@ -269,14 +309,19 @@ class FlowCase(Case):
         stress = solved.stress(self.roughness_m)
         self._check_stress(stress, directory)
         stress.to_csv(directory / WALL_STRESS)
-        approach, reynolds = solved.ustar0 / self.ustar0_m_s, self.ustar0_m_s / self.viscosity_m2_s
+        approach, reynolds = (
+            solved.ustar0 / self.ustar0_m_s,
+            self.ustar0_m_s / self.viscosity_m2_s,
+        )
         speed = self.mean_speed_over_log_law(solved) if self.settings.depth else None
         bed = (self.slope_deg, self.height_m, self.roughness_m)
         table = diagnostics(stress, approach, reynolds, *bed, mean_speed=speed)
         table.to_csv(directory / DIAGNOSTICS, float_format="%.6g", lineterminator="\n")
         if table.loc["approach_ustar_over_log_law", "sound"] != "yes":
             what = f"on flat bed u* is {approach:.3f} of the log law's: the wall function fails"
-            remedy = f"{DIAGNOSTICS} says more; raise the first cell's height or the speed"
+            remedy = (
+                f"{DIAGNOSTICS} says more; raise the first cell's height or the speed"
+            )
             raise SolverError(what, where=str(directory), remedy=remedy)
 
     def mean_speed_over_log_law(self, solved: SolvedFlow) -> float:
@@ -287,10 +332,18 @@ class FlowCase(Case):
 
     def _check_stress(self, stress: WallStress, directory: Path) -> None:
         if not np.isfinite([stress.tau_wall, stress.ustar_over_ustar0_eq10]).all():
-            raise Exploded("the stress on the bed is not a number", where=str(directory))
+            raise Exploded(
+                "the stress on the bed is not a number", where=str(directory)
+            )
         line = self.bed_line
-        segment = np.clip(np.searchsorted(line.x, stress.x_m) - 1, 0, len(line.slopes_deg) - 1)
-        over = stress.z_e_m / np.cos(np.radians(line.slopes_deg[segment])) / self._first_centre
+        segment = np.clip(
+            np.searchsorted(line.x, stress.x_m) - 1, 0, len(line.slopes_deg) - 1
+        )
+        over = (
+            stress.z_e_m
+            / np.cos(np.radians(line.slopes_deg[segment]))
+            / self._first_centre
+        )
         if not 0.98 < over.min() <= over.max() < 1.02:
             what = f"z_e is {over.min():.3g} to {over.max():.3g} of that of the first cells"
             remedy = "lower flow.expansion_ratio, or raise flow.first_cell_height"

@@ -51,7 +51,9 @@ def read_list(path: Path, after: str = "", kind: type = float) -> NDArray[Any]:
     start = text.find("\n(\n", max(text.find(after), 0)) if after in text else -1
     if start < 0 or _END not in text[-100:]:
         what = f"the results are not whole: {path.name}"
-        raise SolverError(what, where=str(path), remedy="is the disk full? Run the case again")
+        raise SolverError(
+            what, where=str(path), remedy="is the disk full? Run the case again"
+        )
     count = int(text[:start].rsplit(maxsplit=1)[-1])
     numbers = text[start + 3 : text.find("\n)", start)].translate(_WITHOUT_BRACKETS)
     return np.fromstring(numbers, kind, sep=" ").reshape(count, -1)
@@ -64,11 +66,17 @@ def write_poly_mesh(mesh: Any, directory: Path, types: Mapping[str, str]) -> Flo
     has one face for each column of cells. Returned are the middles of the cells in their order, m:
     downstream, in a column upwards; shape (columns, cells of a column, 3).
     """
-    points, cells, quads = mesh.points, mesh.cells_dict["hexahedron"], mesh.cells_dict["quad"]
+    points, cells, quads = (
+        mesh.points,
+        mesh.cells_dict["hexahedron"],
+        mesh.cells_dict["quad"],
+    )
     patches = {name: quads[rows["quad"]] for name, rows in mesh.cell_sets_dict.items()}
     middles = points[cells].mean(axis=1)
     columns = np.argsort(middles[:, 0]).reshape(len(patches["bed"]), -1)
-    columns = np.take_along_axis(columns, np.argsort(middles[columns, 2], axis=1), axis=1)
+    columns = np.take_along_axis(
+        columns, np.argsort(middles[columns, 2], axis=1), axis=1
+    )
     faces = cells[columns.ravel()][:, SIDES].reshape(-1, 4)
     owner = np.repeat(np.arange(len(cells)), len(SIDES))
 
@@ -81,7 +89,9 @@ def write_poly_mesh(mesh: Any, directory: Path, types: Mapping[str, str]) -> Flo
     order = np.argsort(keys, kind="stable")
     twins = np.flatnonzero(keys[order][1:] == keys[order][:-1])
     inner, outer = order[twins], order[twins + 1]
-    inside = np.lexsort((owner[outer], owner[inner]))  # as OpenFOAM orders the faces of cells
+    inside = np.lexsort(
+        (owner[outer], owner[inner])
+    )  # as OpenFOAM orders the faces of cells
     chosen, neighbour = [inner[inside]], owner[outer[inside]]
     boundary, start = [], len(neighbour)
     for name, quads in patches.items():
@@ -113,7 +123,9 @@ def start_from(path: Path, values: FloatArray, digits: int = DIGITS) -> None:
         field = f"nonuniform List<scalar>\n{listed(values, f'%.{digits}g')};"
     text = path.read_text(encoding="utf-8")
     field = f"internalField {field}"
-    path.write_text(re.sub(r"internalField [^;]+;", lambda _: field, text), encoding="utf-8")
+    path.write_text(
+        re.sub(r"internalField [^;]+;", lambda _: field, text), encoding="utf-8"
+    )
 
 
 @dataclass(frozen=True)
@@ -126,7 +138,9 @@ class SolvedFlow:
 
     directory: Path
 
-    def at(self, name: str, x: FloatArray, heights: FloatArray, bed: BedLine) -> FloatArray:
+    def at(
+        self, name: str, x: FloatArray, heights: FloatArray, bed: BedLine
+    ) -> FloatArray:
         """A field of a study's case at the middles of the cells of another mesh over the same bed.
 
         In m, x (columns,) and heights over the bed (columns, cells); a row of the result for each.
@@ -141,7 +155,9 @@ class SolvedFlow:
         part = ((x - places[after - 1]) / np.diff(places)[after - 1])[:, None, None]
         columns = (1 - part) * old[after - 1] + part * old[after]
         pairs = zip(np.log(heights), columns, strict=True)
-        fields = ([np.interp(up, old[:, 0], c) for c in old[:, 1:].T] for up, old in pairs)
+        fields = (
+            [np.interp(up, old[:, 0], c) for c in old[:, 1:].T] for up, old in pairs
+        )
         return np.concatenate([np.column_stack(each) for each in fields])
 
     @property
@@ -170,11 +186,15 @@ class SolvedFlow:
         # the mean of a hexahedron's corners is that of the means of its sides
         middles = np.zeros((owner.max() + 1, 3))
         np.add.at(middles, owner, corners.mean(axis=1) / len(SIDES))
-        np.add.at(middles, neighbour, corners[: len(neighbour)].mean(axis=1) / len(SIDES))
+        np.add.at(
+            middles, neighbour, corners[: len(neighbour)].mean(axis=1) / len(SIDES)
+        )
         boundary = (folder / "boundary").read_text(encoding="utf-8")
         match = re.search(r"\bbed\b[^}]*nFaces\s+(\d+);\s+startFace\s+(\d+);", boundary)
         if match is None:
-            raise SolverError("a mesh without a bed", where=str(folder), remedy="mesh it again")
+            raise SolverError(
+                "a mesh without a bed", where=str(folder), remedy="mesh it again"
+            )
         count, start = map(int, match.groups())
         bed = slice(start, start + count)
         return corners[bed], owner[bed], middles
@@ -215,16 +235,22 @@ class SolvedFlow:
         for field, values in zip(fields, self._on_bed, strict=True):
             expected = (field * tangents).sum(axis=1)
             most = READ_ERROR * np.abs(expected).max()
-            if len(values) != len(expected) or not np.all(np.abs(values - expected) <= most):
+            if len(values) != len(expected) or not np.all(
+                np.abs(values - expected) <= most
+            ):
                 what = f"{BED_FLOW} is not of these fields"
-                raise SolverError(what, where=str(self.directory), remedy="run ./Allrun there")
+                raise SolverError(
+                    what, where=str(self.directory), remedy="run ./Allrun there"
+                )
 
     @cached_property
     def ustar0(self) -> float:
         """Friction velocity in the column before the inlet, m/s."""
         tau = float(self._on_bed[0][np.argmin(self.mesh[0][..., 0].mean(axis=1))])
         if not tau > 0:
-            raise SolverError("no flow in the column before the inlet", where=str(self.directory))
+            raise SolverError(
+                "no flow in the column before the inlet", where=str(self.directory)
+            )
         return float(np.sqrt(tau))
 
     def stress(self, z0: float) -> WallStress:
@@ -242,7 +268,10 @@ class SolvedFlow:
         z_e = ((middles[cells[order]] - centres) * normals).sum(axis=1)
         on_wall, u_t = (values[order] for values in self._on_bed)
         tau = on_wall / self.ustar0**2
-        eq10 = [log_law_ustar(u_t, z_e, z0, printed=as_printed) for as_printed in (False, True)]
+        eq10 = [
+            log_law_ustar(u_t, z_e, z0, printed=as_printed)
+            for as_printed in (False, True)
+        ]
         ustar = [velocity / self.ustar0 for velocity in eq10]
         columns = (s, centres[:, 0], centres[:, 2], lengths, z_e, tau, *ustar)
         return WallStress(*(values[1:] for values in columns))

@@ -59,13 +59,17 @@ class Grid:
     def shortest(self) -> tuple[float, float, float]:
         """Length of the shortest cell and the two ends of its piece, m."""
         pieces = zip(self.cells, self.ratio, np.diff(self.line.x).tolist(), strict=True)
-        shorter = [_first((n, max(ratio, 1 / ratio)), length) for n, ratio, length in pieces]
+        shorter = [
+            _first((n, max(ratio, 1 / ratio)), length) for n, ratio, length in pieces
+        ]
         piece = int(np.argmin(shorter))
         return shorter[piece], self.line.x[piece], self.line.x[piece + 1]
 
     def write(self, path: Path) -> None:
         """Write the bed line and the cells along it as `pile.geo` includes them."""
-        rows = zip(self.line.x, self.line.z, (*self.cells, 0), (*self.ratio, 1.0), strict=True)
+        rows = zip(
+            self.line.x, self.line.z, (*self.cells, 0), (*self.ratio, 1.0), strict=True
+        )
         form = f"  {FORMAT}, {FORMAT}, %d, {FORMAT}"
         lines = ",\n".join(form % row for row in rows)
         path.write_text(f"{LINE_HEAD}bed_line() = {{\n{lines}\n}};\n", encoding="utf-8")
@@ -78,7 +82,9 @@ def growth_far(growth: float, cells_per_face: int) -> float:
 
 def extended(line: BedLine, upstream: float, downstream: float) -> BedLine:
     """A line with flat bed of some lengths, m, before and behind it in place of its own."""
-    return replace(line, x=(line.x[1] - upstream, *line.x[1:-1], line.x[-2] + downstream))
+    return replace(
+        line, x=(line.x[1] - upstream, *line.x[1:-1], line.x[-2] + downstream)
+    )
 
 
 def along(line: BedLine, slope_deg: float, cells_per_face: int, growth: float) -> Grid:
@@ -96,7 +102,10 @@ def along(line: BedLine, slope_deg: float, cells_per_face: int, growth: float) -
     line = _divided(line.with_corners(inside), cell)
     sizes = _sizes(line, cell, foot, max(growth, face_ratio))
     lengths = np.diff(line.x)
-    inner = [_piece(*one) for one in zip(lengths[1:-1], sizes[1:-2], sizes[2:-1], strict=True)]
+    inner = [
+        _piece(*one)
+        for one in zip(lengths[1:-1], sizes[1:-2], sizes[2:-1], strict=True)
+    ]
     far = growth_far(growth, cells_per_face)
     up, ratio_up = _away(lengths[0], _first(inner[0], lengths[1]), far)
     last, ratio_last = inner[-1]
@@ -116,7 +125,9 @@ def ratio_of(cells: int, first: float, length: float) -> float:
     from scipy.optimize import brentq  # a third of a second, for which no page waits
 
     # the last cell alone would fill the length at the upper end
-    return float(brentq(beyond, 1 + 1e-9, (length / first) ** (1 / (cells - 1)), xtol=1e-15))
+    return float(
+        brentq(beyond, 1 + 1e-9, (length / first) ** (1 / (cells - 1)), xtol=1e-15)
+    )
 
 
 def _divided(line: BedLine, cell: float) -> BedLine:
@@ -131,7 +142,12 @@ def _divided(line: BedLine, cell: float) -> BedLine:
 
 def _sizes(line: BedLine, cell: float, foot: float, growth: float) -> FloatArray:
     """Length of the cells at each corner, m; the ends of the line have none of their own."""
-    x, z, bends, lengths = np.array(line.x), np.array(line.z), line.bends_deg, np.diff(line.x)
+    x, z, bends, lengths = (
+        np.array(line.x),
+        np.array(line.z),
+        line.bends_deg,
+        np.diff(line.x),
+    )
     sizes = np.full(len(x), cell)
     sizes[bends > SHARP_DEG] = TOP * cell
     sizes[bends < -SHARP_DEG] = foot
@@ -175,7 +191,11 @@ def _first(piece: tuple[int, float], length: float) -> float:
     cells, ratio = piece
     if ratio < 1:
         return _first((cells, 1 / ratio), length) * ratio ** (1 - cells)
-    return length / cells if ratio == 1 else length * (ratio - 1) / float(expm1(cells * log(ratio)))
+    return (
+        length / cells
+        if ratio == 1
+        else length * (ratio - 1) / float(expm1(cells * log(ratio)))
+    )
 
 
 def made_by_gmsh(directory: Path) -> "meshio.Mesh":
@@ -190,7 +210,9 @@ def made_by_gmsh(directory: Path) -> "meshio.Mesh":
     try:
         import gmsh
     except OSError as error:
-        remedy = "install the Debian packages libglu1-mesa libxft2 libxcursor1 libxinerama1"
+        remedy = (
+            "install the Debian packages libglu1-mesa libxft2 libxcursor1 libxinerama1"
+        )
         raise SolverError(f"gmsh does not load: {error}", remedy=remedy) from error
     with _GMSH:
         # the default installs a signal handler, which only the main thread may
@@ -200,7 +222,9 @@ def made_by_gmsh(directory: Path) -> "meshio.Mesh":
             gmsh.open(str(directory / "pile.geo"))
             model, mesh = gmsh.model, gmsh.model.mesh
             mesh.generate(3)
-            names = {model.getPhysicalName(*group) for group in model.getPhysicalGroups()}
+            names = {
+                model.getPhysicalName(*group) for group in model.getPhysicalGroups()
+            }
             if missing := GROUPS - names:
                 raise ValueError(f"without the physical groups {sorted(missing)}")
             if list(mesh.getElementTypes(3)) != [_HEXAHEDRON]:
@@ -219,7 +243,10 @@ def made_by_gmsh(directory: Path) -> "meshio.Mesh":
             ends = np.cumsum([len(corners) for corners in patches.values()])
             rows = np.split(np.arange(ends[-1]), ends[:-1])
             sets = {name: [None, of] for name, of in zip(patches, rows, strict=True)}
-            sides, hexahedra = np.concatenate([*patches.values()]), number[cells].reshape(-1, 8)
+            sides, hexahedra = (
+                np.concatenate([*patches.values()]),
+                number[cells].reshape(-1, 8),
+            )
             blocks = [("hexahedron", hexahedra), ("quad", sides)]
             return meshio.Mesh(points.reshape(-1, 3), blocks, cell_sets=sets)
         except Exception as error:  # gmsh raises nothing narrower

@@ -36,7 +36,9 @@ class FlowModel:
     @property
     def lid_speed_ratio(self) -> float:
         """U_e over u*_0: the approaching flow's speed at 10 h over its friction velocity."""
-        return float(log_law_speed(1.0, SPEED_HEIGHT * self.line.h, self.scene.solve_roughness))
+        return float(
+            log_law_speed(1.0, SPEED_HEIGHT * self.line.h, self.scene.solve_roughness)
+        )
 
     @cached_property
     def cases(self) -> tuple[FlowCase, ...]:
@@ -73,7 +75,10 @@ def _case(scene: Scene) -> FlowCase:
     """The run of a scene whose flow is solved."""
     bed, update = scene.bed, {"roughness": scene.solve_roughness}
     assert isinstance(bed, PileBed)
-    update |= {"viscosity": scene.solve_viscosity, "first_cell_height": scene.first_cell_height}
+    update |= {
+        "viscosity": scene.solve_viscosity,
+        "first_cell_height": scene.first_cell_height,
+    }
     # on a gentle profile cells are as fine as on flat bed
     slope = bed.slope_deg if bed.slope_deg >= FACE_DEG or not bed.profile else 0.0
     settings = scene.flow.model_copy(update=update)
@@ -82,7 +87,11 @@ def _case(scene: Scene) -> FlowCase:
 
 @cache
 def _shared(
-    height: float, slope_deg: float, settings: Flow, line: BedLine, profile: Profile | None
+    height: float,
+    slope_deg: float,
+    settings: Flow,
+    line: BedLine,
+    profile: Profile | None,
 ) -> FlowCase:
     """One case for all scenes that share it, checked and digested once."""
     case = FlowCase(height, slope_deg, settings, line, profile)

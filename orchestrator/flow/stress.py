@@ -73,14 +73,23 @@ class WallStress:
         face's value as its mean and the slope that its neighbours give. Raises an InputError if a
         length is not positive, or reaches beyond the bed.
         """
-        centre, length = np.broadcast_arrays(np.asarray(s_m, float), np.asarray(length_m, float))
+        centre, length = np.broadcast_arrays(
+            np.asarray(s_m, float), np.asarray(length_m, float)
+        )
         low, high, edges = centre - length / 2.0, centre + length / 2.0, self.edges_m
-        if not (np.all(low < high) and np.all(low >= edges[0]) and np.all(high <= edges[-1])):
+        if not (
+            np.all(low < high) and np.all(low >= edges[0]) and np.all(high <= edges[-1])
+        ):
             span = f"s = {edges[0]:.4g} ... {edges[-1]:.4g} m"
-            raise InputError(f"a mean of the stress needs a length within the bed, {span}")
+            raise InputError(
+                f"a mean of the stress needs a length within the bed, {span}"
+            )
         ustar = self.ustar_over_ustar0_eq10
         tau = self.tau_wall if measure == "wall" else ustar * np.abs(ustar)
-        slope, sums = self._slopes(tau), np.concatenate([[0.0], np.cumsum(tau * self.length_m)])
+        slope, sums = (
+            self._slopes(tau),
+            np.concatenate([[0.0], np.cumsum(tau * self.length_m)]),
+        )
 
         def integral(s: FloatArray) -> FloatArray:
             face = np.clip(np.searchsorted(edges, s, side="right") - 1, 0, len(tau) - 1)
@@ -102,19 +111,25 @@ class WallStress:
         # limited so that no face reaches beyond its neighbours' values
         slope = np.where(behind * ahead > 0.0, (behind + ahead) / 2.0, 0.0)
         most = 2.0 * np.minimum(np.abs(behind), np.abs(ahead))
-        return np.asarray(np.nan_to_num(np.sign(slope) * np.minimum(np.abs(slope), most)))
+        return np.asarray(
+            np.nan_to_num(np.sign(slope) * np.minimum(np.abs(slope), most))
+        )
 
     def to_csv(self, path: Path) -> None:
         """Write a table of nine digits, which `from_csv` reads."""
         columns = {one.name: getattr(self, one.name) for one in fields(self)}
-        table = pd.DataFrame({**columns, "ustar_over_ustar0_wall": self.ustar_over_ustar0_wall})
+        table = pd.DataFrame(
+            {**columns, "ustar_over_ustar0_wall": self.ustar_over_ustar0_wall}
+        )
         table.to_csv(path, index=False, lineterminator="\n", float_format=FORMAT)
 
     @classmethod
     def from_csv(cls, path: Path) -> "WallStress":
         """Read a table of `to_csv`."""
         columns = read_texts(path)
-        return cls(**{each.name: columns[each.name].astype(float) for each in fields(cls)})
+        return cls(
+            **{each.name: columns[each.name].astype(float) for each in fields(cls)}
+        )
 
 
 def diagnostics(
@@ -138,11 +153,23 @@ def diagnostics(
         # y+: the eddy viscosity is kappa y+ times the molecular one
         "y_plus": (reynolds * centre, 1 / KARMAN, inf),
         "z_e_over_z0": (centre / roughness, 0.5, inf),
-        "approach_ustar_over_log_law": (approach, 1 - APPROACH_ERROR, 1 + APPROACH_ERROR),
-        "reattachment_over_h": ((bubble(stress, height) or (0.0, 0.0))[1], shortest, inf),
+        "approach_ustar_over_log_law": (
+            approach,
+            1 - APPROACH_ERROR,
+            1 + APPROACH_ERROR,
+        ),
+        "reattachment_over_h": (
+            (bubble(stress, height) or (0.0, 0.0))[1],
+            shortest,
+            inf,
+        ),
     }
     if mean_speed is not None:
-        rows["mean_speed_over_log_law"] = (mean_speed, 1 - MEAN_SPEED_ERROR, 1 + MEAN_SPEED_ERROR)
+        rows["mean_speed_over_log_law"] = (
+            mean_speed,
+            1 - MEAN_SPEED_ERROR,
+            1 + MEAN_SPEED_ERROR,
+        )
     columns = ["value", "sound_from", "sound_to"]
     table = pd.DataFrame.from_dict(rows, orient="index", columns=columns)
     sound = table["value"].between(table["sound_from"], table["sound_to"])

@@ -61,7 +61,9 @@ def waves(line: BedLine, roughness_m: float) -> WallStress:
     return _stress(line, lambda wavelength: of_wavelength(wavelength / roughness_m))
 
 
-def of_wavelength(wavelength_over_roughness: FloatArray) -> tuple[FloatArray, FloatArray]:
+def of_wavelength(
+    wavelength_over_roughness: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
     """A0 and B0 for wavelengths over z0; waves shorter than z0 have those of z0."""
     r = np.log(np.maximum(wavelength_over_roughness, 1))
     a = 1.0702 + 0.093069 * r + 0.10838 * r**2 + 0.024835 * r**3
@@ -100,7 +102,10 @@ def seen_by_the_flow(line: BedLine) -> Seen:
     end = line.x[0]
     for corner in np.flatnonzero(sharp | (slopes[1:] < -STEEPEST)) + 1:
         start, top = line.x[corner], line.z[corner]
-        if start < end or (streamline := _streamline(x, z, start, top, slopes[corner - 1])) is None:
+        if (
+            start < end
+            or (streamline := _streamline(x, z, start, top, slopes[corner - 1])) is None
+        ):
             continue
         behind, heights = streamline
         z[behind], end = heights, float(x[behind][-1])
@@ -133,7 +138,9 @@ Coefficients = Callable[[FloatArray], tuple[FloatArray | float, FloatArray | flo
 
 def _stress(line: BedLine, coefficients: Coefficients) -> WallStress:
     seen = seen_by_the_flow(line)
-    tau = np.maximum(1 + response(seen.slopes, float(seen.x[1] - seen.x[0]), coefficients), 0)
+    tau = np.maximum(
+        1 + response(seen.slopes, float(seen.x[1] - seen.x[0]), coefficients), 0
+    )
     middle = (seen.x[1:] + seen.x[:-1]) / 2
     for start, end in seen.bubbles:
         tau[(middle > start + LASTS * line.h) & (middle < end)] = 0
@@ -163,7 +170,9 @@ def response(slopes: FloatArray, cell: float, coefficients: Coefficients) -> Flo
     return np.asarray(irfft((a * rfft(kernel) + b) * modes, size)[:count])
 
 
-def _wall_stress(line: BedLine, integral: Callable[[FloatArray], FloatArray]) -> WallStress:
+def _wall_stress(
+    line: BedLine, integral: Callable[[FloatArray], FloatArray]
+) -> WallStress:
     """The stress on faces of h/100 from its integral along x."""
     counts = (whole_up(length / line.h * FACES) + 1 for length in np.diff(line.x))
     pieces = zip(pairwise(line.x), counts, strict=True)

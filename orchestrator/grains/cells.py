@@ -46,7 +46,12 @@ class GrainCase(Case):
     """A case that runs the deck ``in.bed``."""
 
     template: ClassVar[str] = "liggghts/bed"
-    results: ClassVar[tuple[str, ...]] = ("settling.csv", "samples.csv", "passage.dump", "bed.dump")
+    results: ClassVar[tuple[str, ...]] = (
+        "settling.csv",
+        "samples.csv",
+        "passage.dump",
+        "bed.dump",
+    )
     derived: ClassVar[tuple[str, ...]] = ("load_steps.csv", "motion.csv")
     made: ClassVar[tuple[str, ...]] = ("log.liggghts", "counted.csv")
     bulky: ClassVar[tuple[str, ...]] = ("passage.dump", "bed.dump")
@@ -76,7 +81,11 @@ class SingleGrainCase(GrainCase):
     def parameters(self) -> dict[str, Any]:
         """The scenes, but for what only the reading of the results depends on."""
         hidden = {"protocol": UNUSED}
-        return {"scenes": [scene.model_dump(mode="json", exclude=hidden) for scene in self.scenes]}
+        return {
+            "scenes": [
+                scene.model_dump(mode="json", exclude=hidden) for scene in self.scenes
+            ]
+        }
 
     @property
     def grain(self) -> Grain:
@@ -94,7 +103,12 @@ class SingleGrainCase(GrainCase):
         """Write the grains with their forces, and the load steps of the protocol."""
         rules = self.scenes[0].protocol
         parameters = {
-            **{"diameter": DIAMETER, "smallest": 1.0, "density": DENSITY, "gravity": GRAVITY},
+            **{
+                "diameter": DIAMETER,
+                "smallest": 1.0,
+                "density": DENSITY,
+                "gravity": GRAVITY,
+            },
             **deck.protocol(self.grain, rules),
             # a grain that falls out of its cell never comes to rest
             "noise": 0.0,
@@ -106,18 +120,26 @@ class SingleGrainCase(GrainCase):
         pushes = np.zeros((len(rising), 3 * len(self.scenes), 2))
         for place, scene in enumerate(self.scenes):
             pushes[:, 3 * place + 2] = force(scene, rising) * WEIGHT / scene.weight
-        deck.write(directory, self._grains(), parameters, rising, pushes, margin=4 * DIAMETER)
+        deck.write(
+            directory, self._grains(), parameters, rising, pushes, margin=4 * DIAMETER
+        )
 
     def collect(self, directory: Path) -> None:
         """Check the run and write what each grain did to ``motion.csv``."""
         liggghts.check_log(directory)
         grains = self._grains()
-        motion.check_rest(directory, grains, WEIGHT, self.grain.stiffness, all_rest=False)
+        motion.check_rest(
+            directory, grains, WEIGHT, self.grain.stiffness, all_rest=False
+        )
         criterion = self.scenes[0].protocol.displacement_criterion
-        motion.read(directory, grains, criterion, falls_out=True).to_csv(directory, grains)
+        motion.read(directory, grains, criterion, falls_out=True).to_csv(
+            directory, grains
+        )
 
     def _grains(self) -> deck.GrainTable:
-        centres, along, sizes = zip(*(cell(scene) for scene in self.scenes), strict=True)
+        centres, along, sizes = zip(
+            *(cell(scene) for scene in self.scenes), strict=True
+        )
         x, z = np.concatenate(centres).T * DIAMETER
         largest = np.concatenate(sizes).max()
         across = np.repeat(np.arange(len(centres)) * SPACING * largest * DIAMETER, 3)
@@ -137,14 +159,22 @@ def cell(scene: Scene) -> tuple[FloatArray, FloatArray, FloatArray]:
     Between them the unit vector up the slope, shape (2,).
     """
     alpha = np.radians(scene.bed.slope_deg)
-    beta, apart = np.radians(scene.pocket_angle_deg), (1 + 1 / scene.bed.relative_size) / 2
+    beta, apart = (
+        np.radians(scene.pocket_angle_deg),
+        (1 + 1 / scene.bed.relative_size) / 2,
+    )
     along = np.array([np.cos(alpha), np.sin(alpha)])
     outward = np.array([-along[1], along[0]])
     behind, ahead = (
-        apart * (side * np.cos(beta) * along - np.sin(beta) * outward) for side in (-1, 1)
+        apart * (side * np.cos(beta) * along - np.sin(beta) * outward)
+        for side in (-1, 1)
     )
     neighbour = 1 / scene.bed.relative_size
-    return np.vstack([behind, ahead, [0.0, 0.0]]), along, np.array([neighbour, neighbour, 1.0])
+    return (
+        np.vstack([behind, ahead, [0.0, 0.0]]),
+        along,
+        np.array([neighbour, neighbour, 1.0]),
+    )
 
 
 def flows(scene: Scene) -> FloatArray:

@@ -31,7 +31,9 @@ from orchestrator.study.scene import Scene
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
 TOE = 0.05  # part of the windward face, from its foot, that `forces.loaded_grains` may leave out
-KINDS = 20  # kinds of grains in a bed beyond which their tables of forces have fewer places
+KINDS = (
+    20  # kinds of grains in a bed beyond which their tables of forces have fewer places
+)
 LONG = 5000.0
 """Length of a bed, d, beyond which a range that is counted is packed alone, and of which no grain
 is packed where no method is asked for."""
@@ -114,8 +116,12 @@ def on_slopes(scene: Scene, slopes_deg: FloatArray) -> FloatArray:
     slopes, place = np.unique(np.round(slopes_deg, 9), return_inverse=True)
     grain = single_grain(scene)
     grains = [grain._replace(slope_deg=slope) for slope in slopes.tolist()]
-    each = [answer.friction_velocity for answer in thresholds_of(scene.forces.law, grains)]
-    speeds = np.nan_to_num(np.array(each, float), nan=0.0, posinf=np.inf) / np.sqrt(scene.gust)
+    each = [
+        answer.friction_velocity for answer in thresholds_of(scene.forces.law, grains)
+    ]
+    speeds = np.nan_to_num(np.array(each, float), nan=0.0, posinf=np.inf) / np.sqrt(
+        scene.gust
+    )
     is_loose = speeds < LOOSE * float(closed_form(scene).friction_velocity)
     return np.where(is_loose, 0.0, speeds)[place]
 
@@ -219,7 +225,10 @@ class Geometry:
         packed = self._packing
         if self.turned and self.cases is not None:
             ahead = self.felt(self.model.stress(self.cases), packed.arc_length) > 0
-            windward, lee = packed.windward & ahead, packed.lee | packed.windward & ~ahead
+            windward, lee = (
+                packed.windward & ahead,
+                packed.lee | packed.windward & ~ahead,
+            )
             packed = replace(packed, windward=windward, lee=lee)
         return packed
 
@@ -313,7 +322,11 @@ class Geometry:
     @cached_property
     def patches(self) -> tuple[IntArray, FloatArray]:
         """Number of each grain's patch, and the areas of the patches, d^2."""
-        length = self.scene.forces.averaging_length * self.bed.relief / self.scene.grain.diameter
+        length = (
+            self.scene.forces.averaging_length
+            * self.bed.relief
+            / self.scene.grain.diameter
+        )
         return sheltering.patches(self.packing, max(1.0, length))
 
     def sheltered(self, exposed: BoolArray, chosen: BoolArray) -> Shelter:
@@ -329,13 +342,17 @@ class Geometry:
             drag, *given, areas * d**2, diameter=d, unit=unit, density=density
         )
 
-    def force_tables(self, exposed: BoolArray, only: int | None = None) -> dict[int, ForceTable]:
+    def force_tables(
+        self, exposed: BoolArray, only: int | None = None
+    ) -> dict[int, ForceTable]:
         """Force tables of exposed grains that may move, over their own weight, by their numbers.
 
         `only` those on the patch of one grain.
         """
         scene, unit = self.scene, float(closed_form(self.scene).friction_velocity)
-        patch, _ = self.patches if self.is_balanced else (np.zeros(len(exposed), int), None)
+        patch, _ = (
+            self.patches if self.is_balanced else (np.zeros(len(exposed), int), None)
+        )
         chosen = exposed if only is None else exposed & (patch == patch[only])
         pushed = chosen & self.packing.mobile
         columns = self.packing.sizes, self.gaps(exposed), patch
@@ -363,7 +380,10 @@ class Geometry:
         return np.asarray(angles[packed.windward])
 
     def under(
-        self, stress: WallStress, line: BedLine | None = None, present: BoolArray | None = None
+        self,
+        stress: WallStress,
+        line: BedLine | None = None,
+        present: BoolArray | None = None,
     ) -> "Loads":
         """The grains under the stress along the bed line, or along the line it has worn down to.
 
@@ -374,7 +394,9 @@ class Geometry:
             x = np.interp(s, self.line.arc_lengths, self.line.x)
             s = np.interp(x, line.x, line.arc_lengths)
         ratio = np.where(self._unloaded, 0, self.felt(stress, s))
-        return Loads(self, ratio, np.ones(len(ratio), bool) if present is None else present)
+        return Loads(
+            self, ratio, np.ones(len(ratio), bool) if present is None else present
+        )
 
     def felt(self, stress: WallStress, s: FloatArray) -> FloatArray:
         """Signed friction velocity over u*_0 of the mean stress around some arc lengths, d."""
@@ -485,11 +507,18 @@ class Loads:
         bed, counted = self.geometry, self.geometry.packing.windward
         speed = self.ratio[counted]
         if not np.any(speed != 0):
-            where, remedy = f"scene {bed.scene.id}: flow", "the mesh or the stress is wrong"
-            raise InputError("no counted grain feels a flow", where=where, remedy=remedy)
+            where, remedy = (
+                f"scene {bed.scene.id}: flow",
+                "the mesh or the stress is wrong",
+            )
+            raise InputError(
+                "no counted grain feels a flow", where=where, remedy=remedy
+            )
         if bed.pouring:
             places, sizes = bed.packing.places, bed.packing.sizes
-            loading = replace(self.loading, ratio=np.where(counted, self.loading.ratio, 0.0))
+            loading = replace(
+                self.loading, ratio=np.where(counted, self.loading.ratio, 0.0)
+            )
             flows = peeling.pivots(places, sizes, loading, self.tables, bed.scene.bond)
             return digits.all_rounded(flows[counted])
         if bed.is_balanced:
@@ -500,7 +529,9 @@ class Loads:
     def _slopes_deg(self) -> FloatArray:
         """Slope that the flow goes up at each counted grain, degrees, shape (N,)."""
         bed, counted = self.geometry, self.geometry.packing.windward
-        slopes = np.degrees(np.arctan2(bed.tangents[counted, 1], bed.tangents[counted, 0]))
+        slopes = np.degrees(
+            np.arctan2(bed.tangents[counted, 1], bed.tangents[counted, 0])
+        )
         return np.asarray(np.where(self.ratio[counted] < 0, -slopes, slopes))
 
     def _undisturbed(self, local: FloatArray) -> FloatArray:
@@ -516,7 +547,9 @@ class Loads:
         """
         bed, scene = self.geometry, self.geometry.scene
         beta, tables = np.radians(scene.pocket_angle_deg), self.tables
-        goals = np.cos(np.radians(self._slopes_deg) - beta) + scene.bond * np.sin(2 * beta)
+        goals = np.cos(np.radians(self._slopes_deg) - beta) + scene.bond * np.sin(
+            2 * beta
+        )
         arms = float(np.sin(beta)), float(np.cos(beta))
         numbers = np.flatnonzero(bed.packing.windward)
         each = zip(numbers.tolist(), goals.tolist(), strict=True)
@@ -529,7 +562,12 @@ class Loads:
         Where the grains share the stress, those that are left share it anew after each that leaves;
         under DEM, whose forces a run keeps, they do not.
         """
-        bed, packed, loading, renew = self.geometry, self.geometry.packing, self.loading, None
+        bed, packed, loading, renew = (
+            self.geometry,
+            self.geometry.packing,
+            self.loading,
+            None,
+        )
         if bed.is_balanced and bed.scene.protocol.method == "peeling":
             there = self.present.copy()
             ratio = np.where(packed.mobile, self.ratio * np.sqrt(bed.scene.gust), 0.0)
@@ -550,11 +588,20 @@ class Loads:
         It then bears the weight normal to the bed, and what the contacts of a pocket pull. Infinite
         for a grain that leaves before, at the flow `rolling`, (N,).
         """
-        bed, scene, counted = self.geometry, self.geometry.scene, self.geometry.packing.windward
-        hold = 2 * scene.bond * np.sin(np.radians(scene.pocket_angle_deg)) + bed.tangents[:, 0]
+        bed, scene, counted = (
+            self.geometry,
+            self.geometry.scene,
+            self.geometry.packing.windward,
+        )
+        hold = (
+            2 * scene.bond * np.sin(np.radians(scene.pocket_angle_deg))
+            + bed.tangents[:, 0]
+        )
         hold *= scene.weight * bed.packing.sizes**3
         ratio = np.abs(self.ratio) * np.sqrt(scene.gust)
-        last = np.full(len(ratio), RANGE[1] * float(closed_form(scene).friction_velocity))
+        last = np.full(
+            len(ratio), RANGE[1] * float(closed_form(scene).friction_velocity)
+        )
         with np.errstate(divide="ignore", invalid="ignore"):
             last[counted] = np.minimum(rolling * ratio[counted], last[counted])
             # to climb straight up is to lift
@@ -564,7 +611,9 @@ class Loads:
             bounds = RANGE[0] * last, LIFT_OFF * last
             local = root(lambda ustar: self.loading.lift(ustar) - hold, *bounds)
             flows = np.where(lifted, local / ratio, np.inf)[counted]
-        return np.where(np.isfinite(flows), np.minimum(digits.all_rounded(flows), rolling), np.inf)
+        return np.where(
+            np.isfinite(flows), np.minimum(digits.all_rounded(flows), rolling), np.inf
+        )
 
     def row_hold(self) -> float:
         """The flow (u*_0) at which the first counted grain leaves by peeling over that of pivots.

@@ -13,7 +13,14 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from orchestrator.bed.deck import NOISE, SETTLE_FLOW, GrainTable, read_dump, read_table, read_texts
+from orchestrator.bed.deck import (
+    NOISE,
+    SETTLE_FLOW,
+    GrainTable,
+    read_dump,
+    read_table,
+    read_texts,
+)
 from orchestrator.bed.packing import across
 from orchestrator.digits import FORMAT
 from orchestrator.errors import Exploded, Noisy, SolverError
@@ -35,7 +42,9 @@ GROWS = 2.0
 """The energy of a bed that does not come to rest grows when the last quarter of the settling has
 more than this times that of the second."""
 BURST = 10.0  # kinetic energy per grain, over W d, that no fall of a grain can give it
-REMEDY = "a smaller protocol.time_step or grain.damping, or look for grains that overlap"
+REMEDY = (
+    "a smaller protocol.time_step or grain.damping, or look for grains that overlap"
+)
 
 
 @dataclass(frozen=True)
@@ -60,23 +69,36 @@ class Motion:
     before and that one."""
 
     @classmethod
-    def of_flows(cls, rolling: FloatArray, lifting: FloatArray | float = np.inf) -> "Motion":
+    def of_flows(
+        cls, rolling: FloatArray, lifting: FloatArray | float = np.inf
+    ) -> "Motion":
         """The motion of grains that roll or are lifted at given flows, (N,); infinite for never."""
         flows = np.minimum(rolling, lifting)
         # to be lifted straight over a neighbour is to be lifted
         moves, carried = np.isfinite(flows), np.isfinite(lifting) & (lifting <= rolling)
         levels = np.unique(flows[moves])
         # before the first level nothing moves
-        flow = np.concatenate([levels[:1] * SETTLE_FLOW, levels]) if len(levels) else np.zeros(1)
+        flow = (
+            np.concatenate([levels[:1] * SETTLE_FLOW, levels])
+            if len(levels)
+            else np.zeros(1)
+        )
         level = np.where(moves, np.searchsorted(levels, flows) + 1, 0)
-        mode = np.select([carried, moves], [MODES.index("lifted"), MODES.index("rolled")], 0)
+        mode = np.select(
+            [carried, moves], [MODES.index("lifted"), MODES.index("rolled")], 0
+        )
         return cls(flow, level, np.zeros_like(level), carried, mode, exact=True)
 
     @classmethod
     def chained(cls, runs: "Sequence[tuple[BoolArray, Motion]]") -> "Motion":
         """The motion in runs that go on from one another: of each which of the N it counts."""
         whole = cls.of_flows(np.full(len(runs[0][0]), np.inf))
-        level, fallen, carried, mode = whole.level, whole.fallen, whole.carried, whole.mode
+        level, fallen, carried, mode = (
+            whole.level,
+            whole.fallen,
+            whole.carried,
+            whole.mode,
+        )
         flow, before = [runs[0][1].flow[:1]], 0
         for counted, run in runs:
             level[counted] = np.where(run.level > 0, run.level + before, 0)
@@ -194,7 +216,11 @@ class Count(NamedTuple):
 
 
 def count(
-    travel: FloatArray, criterion: float, *, falls_out: bool, aside: FloatArray | float = 0.0
+    travel: FloatArray,
+    criterion: float,
+    *,
+    falls_out: bool,
+    aside: FloatArray | float = 0.0,
 ) -> Count:
     """Apply the counting rule to `Track.travel` and `Track.aside`, with a criterion in d.
 
@@ -202,7 +228,10 @@ def count(
     upstream: from the two neighbours of a single grain it did, for no bed is behind them; only lift
     can have taken it from a pile.
     """
-    ahead, back = _ever((travel >= criterion) | (aside >= criterion)), _ever(travel <= -criterion)
+    ahead, back = (
+        _ever((travel >= criterion) | (aside >= criterion)),
+        _ever(travel <= -criterion),
+    )
     vanished = _ever(np.isnan(travel) & ~ahead)
     if falls_out:
         return Count(ahead, back | vanished, np.zeros_like(vanished))
@@ -213,7 +242,9 @@ def _ever(happened: BoolArray) -> BoolArray:
     return np.logical_or.accumulate(happened, axis=0)
 
 
-def read(directory: Path, grains: GrainTable, criterion: float, *, falls_out: bool) -> Motion:
+def read(
+    directory: Path, grains: GrainTable, criterion: float, *, falls_out: bool
+) -> Motion:
     """Read the deck's tables of a finished run; the other arguments are those of `count`.
 
     Raises a SolverError if a table is cut short, grains were lost, or the counts do not reconcile.
@@ -280,7 +311,9 @@ def read_track(directory: Path, grains: GrainTable, samples: pd.DataFrame) -> Tr
         values[row, column] = rows[name]
     listed = ~np.isnan(state[0, 1:])
     resting = ~listed & _present(listed, directory, ids, samples)
-    for values, still in zip(state, (*state[:2, 0], 0.0, 0.0, 0.0, state[5, 0]), strict=True):
+    for values, still in zip(
+        state, (*state[:2, 0], 0.0, 0.0, 0.0, state[5, 0]), strict=True
+    ):
         np.copyto(values[1:], still, where=resting)
     diameter, along = grains.diameter * grains.sizes[ids - 1], grains.along[ids - 1].T
     right, up = (state[:2, 1:] - state[:2, :1]) / diameter
@@ -291,23 +324,30 @@ def read_track(directory: Path, grains: GrainTable, samples: pd.DataFrame) -> Tr
         travel=right * along[0] + up * along[1],
         # out of the bed, whichever way is along it
         rise=np.sign(along[0]) * (up * along[0] - right * along[1]),
-        aside=np.abs(across(y - state[5, :1], grains.diameter * grains.width)) / diameter,
+        aside=np.abs(across(y - state[5, :1], grains.diameter * grains.width))
+        / diameter,
         roll=roll,
     )
 
 
-def _present(listed: BoolArray, directory: Path, ids: IntArray, samples: pd.DataFrame) -> BoolArray:
+def _present(
+    listed: BoolArray, directory: Path, ids: IntArray, samples: pd.DataFrame
+) -> BoolArray:
     """Which grains were there at each sample: listed ones, or seen later in the load step."""
     steps, rows = read_dump(directory / BED, BED_COLUMNS)
     load_step = samples["load_step"].to_numpy(np.int64)
     last = np.append(np.flatnonzero(np.diff(load_step)), len(load_step) - 1)
     if not np.array_equal(steps, samples["step"].to_numpy()[last]):
-        raise _of_another_run(directory / BED, "its frames are not the ends of the load steps")
+        raise _of_another_run(
+            directory / BED, "its frames are not the ends of the load steps"
+        )
     rows = rows[rows["id"].isin(ids)]
     left = np.zeros((len(steps), len(ids)), bool)
     left[np.searchsorted(steps, rows["step"]), np.searchsorted(ids, rows["id"])] = True
     present = listed.copy()
-    for at_the_end, first, end in zip(left, [0, *(last[:-1] + 1)], last + 1, strict=True):
+    for at_the_end, first, end in zip(
+        left, [0, *(last[:-1] + 1)], last + 1, strict=True
+    ):
         group = listed[first:end]
         present[first:end] = np.logical_or.accumulate(group[::-1])[::-1] | at_the_end
     return present
@@ -318,7 +358,12 @@ def _of_another_run(path: Path, what: str) -> SolverError:
 
 
 def check_rest(
-    directory: Path, grains: GrainTable, weight: float, stiffness: float, *, all_rest: bool
+    directory: Path,
+    grains: GrainTable,
+    weight: float,
+    stiffness: float,
+    *,
+    all_rest: bool,
 ) -> None:
     """See that a bed of grains came to rest before the flow rose, judged by their energy.
 
@@ -326,8 +371,15 @@ def check_rest(
     some grains may fall out. Raises `Exploded` if the energy is no number, grows, or has driven
     grains away, `Noisy` if the grains keep moving.
     """
-    settling, where = read_table(directory / SETTLING, rows=4), str(directory / SETTLING)
-    energy = settling["ke"].to_numpy(float) / grains.mobile_count / (weight * grains.diameter)
+    settling, where = (
+        read_table(directory / SETTLING, rows=4),
+        str(directory / SETTLING),
+    )
+    energy = (
+        settling["ke"].to_numpy(float)
+        / grains.mobile_count
+        / (weight * grains.diameter)
+    )
     if not energy.max() < BURST:
         what = f"the bed burst as it settled: {energy.max():.2g} W d of kinetic energy per grain"
         raise Exploded(what, where=where, remedy=REMEDY)
@@ -347,5 +399,7 @@ def check_rest(
         ratio = quarters[3] / quarters[1]
         what = f"the energy of the bed at rest grows: {text}, {ratio:.1f} times the earlier"
         raise Exploded(what, where=where, remedy=REMEDY)
-    what = f"the bed does not come to rest: {text}; {NOISE:g} is the most of a bed at rest"
+    what = (
+        f"the bed does not come to rest: {text}; {NOISE:g} is the most of a bed at rest"
+    )
     raise Noisy(what, where=where, remedy=REMEDY)

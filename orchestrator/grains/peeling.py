@@ -62,7 +62,10 @@ class Loading:
     def at(self, ustar0: ArrayLike) -> FloatArray:
         """Force on each grain (N) at undisturbed friction velocities (m/s), shape (..., n, 2)."""
         loaded = self.ratio != 0
-        local = np.where(loaded, np.abs(self.ratio), 1.0) * np.asarray(ustar0, float)[..., None]
+        local = (
+            np.where(loaded, np.abs(self.ratio), 1.0)
+            * np.asarray(ustar0, float)[..., None]
+        )
         drag, lift = self.drag(local) * np.sign(self.ratio), self.lift(local)
         force = drag[..., None] * self.along + lift[..., None] * self.outward
         return np.where(loaded[:, None], force, 0.0)
@@ -75,7 +78,9 @@ class ForceTable:
     spline of the logarithms: with all places it reproduces the force laws within 1e-12.
     """
 
-    def __init__(self, log_ustar: FloatArray, forces: FloatArray, pieces: FloatArray) -> None:
+    def __init__(
+        self, log_ustar: FloatArray, forces: FloatArray, pieces: FloatArray
+    ) -> None:
         self._log_ustar, self._forces, self._pieces = log_ustar, forces, pieces
         self._reached: dict[tuple[float, float, float], float] = {}
 
@@ -173,7 +178,9 @@ class _Roller:
         size = 2 * self.start.radius
         moment = 0.0
         for other in (self.others[k] for k in numbers):
-            if math.dist(other[:2], place) < (1 + TOUCH) * (self.start.radius + other.radius):
+            if math.dist(other[:2], place) < (1 + TOUCH) * (
+                self.start.radius + other.radius
+            ):
                 pull = self.bond * _pull(size, 2 * other.radius)
                 moment += pull * math.sin(lean - _lean(place, other[:2]))
         return moment
@@ -194,20 +201,26 @@ class _Roller:
                 break
             place, pivot = met
             travel = sum(
-                (a - b) * t for a, b, t in zip(place, self.start[:2], self.along, strict=True)
+                (a - b) * t
+                for a, b, t in zip(place, self.start[:2], self.along, strict=True)
             )
             if travel >= (criterion - 1e-9) * 2 * self.start.radius:
                 break
         return flow, rolled
 
-    def _next(self, place: Place, pivot: Disc, numbers: Sequence[int]) -> tuple[Place, int] | None:
+    def _next(
+        self, place: Place, pivot: Disc, numbers: Sequence[int]
+    ) -> tuple[Place, int] | None:
         """Where the grain, rolling over its pivot, touches another neighbour, and which."""
         arm = self.start.radius + pivot.radius
         turned = math.atan2(place[1] - pivot.z, place[0] - pivot.x)
         nearest: tuple[float, int] | None = None
         for k in numbers:
             other = self.others[k]
-            apart, touch = math.dist(other[:2], pivot[:2]), self.start.radius + other.radius
+            apart, touch = (
+                math.dist(other[:2], pivot[:2]),
+                self.start.radius + other.radius,
+            )
             if not abs(arm - touch) < apart < arm + touch:
                 continue
             cosine = (arm * arm + apart * apart - touch * touch) / (2 * arm * apart)
@@ -309,7 +322,9 @@ def pivots(
         lift = -_in_plane(sides, loading.outward[i])
         goal = bond * held - sides[:, 2]
         arms = zip(drag.tolist(), lift.tolist(), goal.tolist(), strict=True)
-        least[i] = min((tables[i].reaching(*arm) for arm in arms), default=np.inf) / abs(ratio)
+        least[i] = min(
+            (tables[i].reaching(*arm) for arm in arms), default=np.inf
+        ) / abs(ratio)
     return least
 
 
@@ -392,7 +407,8 @@ def _foremost(
     touching = [
         k
         for k in numbers
-        if math.dist(discs[k][:2], grain[:2]) < (1 + TOUCH) * (grain.radius + discs[k].radius)
+        if math.dist(discs[k][:2], grain[:2])
+        < (1 + TOUCH) * (grain.radius + discs[k].radius)
     ]
     return max(touching, key=lambda k: _lean(grain[:2], discs[k][:2]), default=None)
 
@@ -419,7 +435,9 @@ def _pyramids(
             if (others > -FLAT).all() or (others < FLAT).all():
                 sides.append(normal * (1 if others.sum() > 0 else -1))
         # a pyramid of fewer than three contacts contains no direction: its one side faces up
-        normals = np.array(sides if len(touching) > 2 else [[0.0, 0.0, 1.0]]).reshape(-1, 3)
+        normals = np.array(sides if len(touching) > 2 else [[0.0, 0.0, 1.0]]).reshape(
+            -1, 3
+        )
         pull = _pull(sizes[i], sizes[second[rows]])
         yield i, normals, normals @ (pull[:, None] * touching).sum(axis=0)
 

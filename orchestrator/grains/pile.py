@@ -245,10 +245,17 @@ def sunk(geometry: Geometry, worn: Worn) -> BedLine:
     depth = np.convolve(depth, window, mode="same")
     # corners, one per diameter, where the depth changes
     step = round(EDGE / 2 / SPACING)
-    changes = np.convolve(np.abs(np.gradient(depth)) > 1e-3, np.ones(2 * step + 1), mode="same") > 0
+    changes = (
+        np.convolve(
+            np.abs(np.gradient(depth)) > 1e-3, np.ones(2 * step + 1), mode="same"
+        )
+        > 0
+    )
     places = x[changes & (np.arange(len(x)) % step == 0)]
     apart = np.abs(places[:, None] - line.x).min(axis=1) > NEAREST + digits.SLACK
-    finer = line.with_corners(places[apart & (places > line.x[0]) & (places < line.x[-1])].tolist())
+    finer = line.with_corners(
+        places[apart & (places > line.x[0]) & (places < line.x[-1])].tolist()
+    )
     whole, ground = np.array(finer.z), min(line.z[0], line.z[-1])
     z = whole - np.interp(finer.x, x, depth, left=0.0, right=0.0)
     # a form wears down to the flat bed around it, unless counted grains lie as low as that
@@ -293,7 +300,11 @@ class PileCase(GrainCase):
     def needs(self) -> tuple[Case, ...]:
         """The runs of its flow model, the one that it goes on from, and the one that pours."""
         flows = self.geometry.model.cases if self.flow is None else (self.flow,)
-        return (*flows, *((self.before,) if self.before else ()), *self.geometry.pouring)
+        return (
+            *flows,
+            *((self.before,) if self.before else ()),
+            *self.geometry.pouring,
+        )
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -309,12 +320,19 @@ class PileCase(GrainCase):
     @property
     def cost_s(self) -> float:
         """Expected time of one core, s."""
-        rules, grain, width = self.scene.protocol, self.scene.grain, self.geometry.bed.width
+        rules, grain, width = (
+            self.scene.protocol,
+            self.scene.grain,
+            self.geometry.bed.width,
+        )
         load_steps = np.log(3.5) / np.log1p(rules.load_increment) / rounds(self.scene)
         # of a lattice the layers that may move take the time, and decks of one of four were timed
         size, exposed = 4 * self._length * self._layers, np.nan
         if self.geometry.pouring:
-            size, exposed = self._size * (IN_SPACE if width else 1), self._length * (width or 1)
+            size, exposed = (
+                self._size * (IN_SPACE if width else 1),
+                self._length * (width or 1),
+            )
         return deck.cost_s(load_steps, size, REST, rules, grain, exposed)
 
     @property
@@ -342,7 +360,11 @@ class PileCase(GrainCase):
 
     def write(self, directory: Path, cases: Path) -> None:
         """Write the grains with their forces, and the load steps of the protocol."""
-        scene, rules, (loads, worn) = self.scene, self.scene.protocol, self._state(cases)
+        scene, rules, (loads, worn) = (
+            self.scene,
+            self.scene.protocol,
+            self._state(cases),
+        )
         geometry, d = loads.geometry, scene.grain.diameter
         if self.before is None:
             rising = flows(loads)
@@ -351,7 +373,9 @@ class PileCase(GrainCase):
             # the run goes on from the flow that the one before has reached
             thresholds, step = loads.leaving(), rules.load_increment
             last = thresholds[np.isfinite(thresholds)].max(initial=reached)
-            rising = deck.flows(reached, max(deck.BEYOND * last, reached * (1 + step)), step)
+            rising = deck.flows(
+                reached, max(deck.BEYOND * last, reached * (1 + step)), step
+            )
             if scene.is_poured:
                 # poured without a flow, it rests without one: some go at once that were hidden
                 rising[0] = 0.0
@@ -359,13 +383,21 @@ class PileCase(GrainCase):
         enough = int((1 - scene.last_fraction) * packed.count + 1e-9)
         if rules.update:
             enough = packed.count - goal(geometry, self.flow)
-        grains, (slope, ridge) = table(loads, worn), geometry.packed_line.roof(MARGIN + 0.5)
+        grains, (slope, ridge) = (
+            table(loads, worn),
+            geometry.packed_line.roof(MARGIN + 0.5),
+        )
         mobile = grains.kind > deck.FIXED
         smallest = float(grains.sizes[mobile].min())
         density, gravity = scene.grain.density, scene.reduced_gravity
         behind = grains.position[mobile, 0].max() + deck.AWAY * d
         numbers = {
-            **{"diameter": d, "smallest": smallest, "density": density, "gravity": gravity},
+            **{
+                "diameter": d,
+                "smallest": smallest,
+                "density": density,
+                "gravity": gravity,
+            },
             **deck.protocol(scene.grain, rules, enough, smallest, scene.flow.gusts),
             "settle_drag": deck.POURED_DRAG if scene.is_poured else 0.0,
             **{"slope": slope, "ceiling_x": ridge[0] * d, "ceiling_z": ridge[1] * d},
@@ -374,14 +406,18 @@ class PileCase(GrainCase):
         force, gusts = loads.loading.at(rising), deck.STEADY
         if scene.flow.gusts:
             gusts = in_time(scene.flow.gusts, loads, rising[1:])
-        deck.write(directory, grains, numbers, rising, force, MARGIN * d, self.ranks, gusts)
+        deck.write(
+            directory, grains, numbers, rising, force, MARGIN * d, self.ranks, gusts
+        )
 
     def collect(self, directory: Path) -> None:
         """Check the run and write what each counted grain did to ``motion.csv``."""
         liggghts.check_log(directory)
         scene, (loads, worn) = self.scene, self._state(directory.parent)
         grains = table(loads, worn)
-        motion.check_rest(directory, grains, scene.weight, scene.grain.stiffness, all_rest=True)
+        motion.check_rest(
+            directory, grains, scene.weight, scene.grain.stiffness, all_rest=True
+        )
         criterion = scene.protocol.displacement_criterion
         moved = motion.read(directory, grains, criterion, falls_out=False)
         moved.to_csv(directory, grains)
@@ -389,7 +425,9 @@ class PileCase(GrainCase):
             return
         # the grains when the run has ended; those that have moved are taken off the bed
         left = worn.left.copy()
-        left[grains.counted_ids - 1] = np.where(moved.level > 0, moved.flow[moved.level], np.inf)
+        left[grains.counted_ids - 1] = np.where(
+            moved.level > 0, moved.flow[moved.level], np.inf
+        )
         steps, rows = deck.read_dump(directory / motion.BED, motion.BED_COLUMNS)
         last = rows[rows["step"] == steps[-1]]
         places = np.where((grains.kind == deck.FIXED)[:, None], worn.places, np.nan)
@@ -417,7 +455,9 @@ def flows(loads: Loads) -> FloatArray:
         # no peeling in space says which grain frees which
         thresholds = pivots[(pivots > 0) & np.isfinite(pivots)]
         first = _first(thresholds, geometry)
-        place = min(int(geometry.scene.last_fraction * len(pivots)), len(thresholds) - 1)
+        place = min(
+            int(geometry.scene.last_fraction * len(pivots)), len(thresholds) - 1
+        )
     else:
         thresholds = np.sort(loads.leaving())
         first = _first(thresholds, geometry)
@@ -454,7 +494,9 @@ def in_time(gusts: Gusts, loads: Loads, rising: FloatArray) -> FloatArray:
     span = peak if peak > HARDLY else STRONGER
     ratio = _size(loads, mean * np.sqrt(span)) / _size(loads, mean)
     power = np.log(ratio) / np.log(span)
-    stress = gust_stresses(gusts.intensity, gusts.events, len(rising), loads.geometry.bed.seed)
+    stress = gust_stresses(
+        gusts.intensity, gusts.events, len(rising), loads.geometry.bed.seed
+    )
     with_mean = np.pad(stress, ((0, 0), (0, 1)), constant_values=1.0)
     each = (with_mean / peak) ** power[:, None]
     settling = peak ** -power[0]
@@ -544,7 +586,9 @@ class Peeling(Method):
     def motion(self, cases: Path) -> Motion:
         """Motion at the flows that `orchestrator.grains.peeling` finds."""
         if self.geometry.scene.protocol.update:
-            return Motion.of_flows(self.last(cases).left[self.geometry.packing.windward])
+            return Motion.of_flows(
+                self.last(cases).left[self.geometry.packing.windward]
+            )
         loads = self.geometry.loads(cases)
         return Motion.of_flows(rolling := loads.leaving(), loads.lifting(rolling))
 
@@ -560,7 +604,9 @@ class Dem(Method):
     @property
     def cases(self) -> tuple[Case, ...]:
         """The run; on a bed that changes a run for each flow, which goes on from the last one."""
-        return tuple(case for run in self.runs for case in (run.flow, run) if case is not None)
+        return tuple(
+            case for run in self.runs for case in (run.flow, run) if case is not None
+        )
 
     @cached_property
     def runs(self) -> tuple[PileCase, ...]:
@@ -655,7 +701,9 @@ class Pile(Geometry):
         least = np.flatnonzero(flows == np.nanmin(flows, initial=np.inf))
         if not len(least):
             return np.nan, np.nan
-        at = int(least[len(least) // 2])  # of places that go at one flow the one in the middle
+        at = int(
+            least[len(least) // 2]
+        )  # of places that go at one flow the one in the middle
         x = self.packing.centres[self.packing.windward, 0]
         return float(x[at]) * self.scene.grain.diameter, float(flows[at])
 
@@ -672,7 +720,9 @@ class Pile(Geometry):
         """Motion of the counted grains; `cases` is the directory of the finished runs."""
         return self.method.motion(cases)
 
-    def thresholds(self, cases: Path, fractions: Iterable[float]) -> list[PileThreshold]:
+    def thresholds(
+        self, cases: Path, fractions: Iterable[float]
+    ) -> list[PileThreshold]:
         """Its thresholds at some n/N; `cases` is the directory of the finished runs."""
         motion, speed = self.motion(cases), self.speed(cases)
         return [of_pile(motion, speed, n, self.scene.fluid.density) for n in fractions]

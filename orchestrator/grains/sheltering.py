@@ -41,7 +41,9 @@ def patches(packing: Packing, length: float) -> tuple[IntArray, FloatArray]:
     # half of the way to the next grain belongs to each
     middle = (s[1:] + s[:-1]) / 2
     alone = len(s) < 2
-    first, last = (-np.inf, np.inf) if alone else (2 * s[0] - middle[0], 2 * s[-1] - middle[-1])
+    first, last = (
+        (-np.inf, np.inf) if alone else (2 * s[0] - middle[0], 2 * s[-1] - middle[-1])
+    )
     edges, starts = np.concatenate([[first], middle, [last]]), [0]
     for i in range(1, len(s)):
         begun = starts[-1]
@@ -99,7 +101,9 @@ def balanced(
     """
     order = np.argsort(patch, kind="stable")
     sizes, gaps = sizes[order], gaps[order]
-    known, starts, place = np.unique(patch[order], return_index=True, return_inverse=True)
+    known, starts, place = np.unique(
+        patch[order], return_index=True, return_inverse=True
+    )
     ustar = unit * np.geomspace(*RANGE, PLACES)[:, None]
     stress = density * ustar**2 * areas[known]
 

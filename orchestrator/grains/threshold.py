@@ -13,7 +13,9 @@ from orchestrator.grains.motion import Motion
 from orchestrator.types import BoolArray, FloatArray
 
 OUTSIDE = 0.1  # part of samples beyond each end of the interval of a size class
-STEP = np.sqrt(2)  # ratio of the ends of a class: half a phi; d lies in the middle of one
+STEP = np.sqrt(
+    2
+)  # ratio of the ends of a class: half a phi; d lies in the middle of one
 
 
 @dataclass(frozen=True)
@@ -164,7 +166,9 @@ def of_pile(
     tau_high = max(held)
     if above is None:
         tau_high = math.nan
-    return PileThreshold(fraction, ustar0, tau, tau_low, tau_high, carried_off, against_the_flow)
+    return PileThreshold(
+        fraction, ustar0, tau, tau_low, tau_high, carried_off, against_the_flow
+    )
 
 
 def first_level(motion: Motion, fraction: float) -> int | None:
@@ -208,10 +212,14 @@ def at_size(size: float, sizes: FloatArray, stress: FloatArray) -> float:
     the size has no threshold, or grains that lie loose.
     """
     above = int(np.searchsorted(sizes, size))
-    below = int(np.searchsorted(sizes, size, side="right")) - 1  # the same class if one is as large
+    below = (
+        int(np.searchsorted(sizes, size, side="right")) - 1
+    )  # the same class if one is as large
     if below < 0 or above == len(sizes):
         return math.nan
     pair = [below, above]
     if not np.all(stress[pair] > 0):
         return math.nan
-    return float(np.exp(np.interp(np.log(size), np.log(sizes[pair]), np.log(stress[pair]))))
+    return float(
+        np.exp(np.interp(np.log(size), np.log(sizes[pair]), np.log(stress[pair])))
+    )

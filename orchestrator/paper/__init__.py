@@ -20,7 +20,9 @@ def cards(study: "Study", tables: "Tables") -> "list[Guest]":
 
     The paper's studies are the presets of this package, word for word.
     """
-    if study.text not in [path.read_text(encoding="utf-8") for path in PRESETS.glob("*.toml")]:
+    if study.text not in [
+        path.read_text(encoding="utf-8") for path in PRESETS.glob("*.toml")
+    ]:
         return []
     from orchestrator.paper import claims
 

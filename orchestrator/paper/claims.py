@@ -62,7 +62,9 @@ class Judged:
         if self.verdict == "no data":
             lines = (one for one in self.comparisons if one.is_decisive)
             lacking = "; ".join(one.name for one in lines if one.verdict == "no data")
-            return f"The study has no scenes for: {lacking or 'any of its comparisons'}."
+            return (
+                f"The study has no scenes for: {lacking or 'any of its comparisons'}."
+            )
         there = f"on the preset `paper` without a tolerance it is {self.claim.verdict}"
         return f"Not explained: {there}."
 
@@ -85,8 +87,15 @@ def card(judged: Sequence[Judged], has_tolerance: bool, file: str) -> Guest:
 
     def section(figures: Sequence[str]) -> Markup:
         each = list(enumerate(figures, 1))
-        shown = [[n for n, name in each if name.startswith(one.claim.figures)] for one in judged]
-        values = {"entries": list(zip(judged, shown, strict=True)), "said": said, "rule": RULE}
+        shown = [
+            [n for n, name in each if name.startswith(one.claim.figures)]
+            for one in judged
+        ]
+        values = {
+            "entries": list(zip(judged, shown, strict=True)),
+            "said": said,
+            "rule": RULE,
+        }
         return Markup(page.fill("card.html.j2", FILE.parent, **values, words=WORDS))
 
     return Guest("claims", said, section, {file: frame(judged).to_csv(index=False)})
@@ -106,8 +115,12 @@ def frame(judged: Sequence[Judged]) -> pd.DataFrame:
 def _claims() -> Iterator[Claim]:
     for entry in tomllib.loads(FILE.read_text(encoding="utf-8"))["claim"]:
         pairs, measure = entry.pop("pairs", None), entry.pop("measure", "")
-        function = partial(measures.along, **pairs) if pairs else getattr(measures, measure)
-        yield Claim(**{**entry, "measure": function, "figures": tuple(entry["figures"])})
+        function = (
+            partial(measures.along, **pairs) if pairs else getattr(measures, measure)
+        )
+        yield Claim(
+            **{**entry, "measure": function, "figures": tuple(entry["figures"])}
+        )
 
 
 CLAIMS: tuple[Claim, ...] = tuple(_claims())

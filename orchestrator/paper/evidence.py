@@ -19,9 +19,13 @@ RULE = (
     f"reproduced: so in at least {SHARE:.0%} of the comparisons of each judged line; not: in at "
     f"most {1 - SHARE:.0%} of each; else partly; no data: if a judged line has none"
 )
-WAITING_TIME = 5.0  # least of a held flow, sqrt(d/g'); load steps that wait less make a ramp
+WAITING_TIME = (
+    5.0  # least of a held flow, sqrt(d/g'); load steps that wait less make a ramp
+)
 REGIMES = {"low": "low regime", "high": "high regime"}
-BRIDGED = "bridged"  # the force law that has an answer where neither of the paper's has one
+BRIDGED = (
+    "bridged"  # the force law that has an answer where neither of the paper's has one
+)
 ANSWERS = ("pile_threshold", "wall_stress")
 """Tables that any threshold method fills; of all others the rows by DEM are taken."""
 BESIDE = ("fraction", "flow_level", "grain_level")
@@ -56,7 +60,9 @@ class Comparison:
     @property
     def is_decisive(self) -> bool:
         """Whether the verdict of a claim depends on these values."""
-        return self.is_judged and (self.has_bools or self.above > -np.inf or self.below < np.inf)
+        return self.is_judged and (
+            self.has_bools or self.above > -np.inf or self.below < np.inf
+        )
 
     @cached_property
     def numbers(self) -> FloatArray:
@@ -76,7 +82,13 @@ class Comparison:
         if not len(self.numbers):
             return "no data"
         share = self.true.mean()
-        return "reproduced" if share >= SHARE else "not" if share <= 1 - SHARE else "partly"
+        return (
+            "reproduced"
+            if share >= SHARE
+            else "not"
+            if share <= 1 - SHARE
+            else "partly"
+        )
 
     def __str__(self) -> str:
         if not len(self.numbers):
@@ -86,9 +98,13 @@ class Comparison:
             return f"{self.name}: {count}"
         ends = np.quantile(self.numbers, [0.5, 0.0, 1.0]).tolist()
         middle, least, most = (format(end, self.form) for end in ends)
-        spread = middle if least == most else f"{middle} in the median ({least} … {most})"
+        spread = (
+            middle if least == most else f"{middle} in the median ({least} … {most})"
+        )
         bounds = {"above": self.above, "at most": self.below}
-        limits = [f"{word} {x:{self.form}}" for word, x in bounds.items() if np.isfinite(x)]
+        limits = [
+            f"{word} {x:{self.form}}" for word, x in bounds.items() if np.isfinite(x)
+        ]
         judged = f", {' and '.join(limits)} {count}" if limits else ""
         missing = np.size(self.values) - len(self.numbers)
         lacking = f"; {missing} without a value" if missing else ""
@@ -119,10 +135,18 @@ class Evidence:
     def joined(self, name: str) -> pd.DataFrame:
         """A table with the columns of its scenes; it has all columns even without rows."""
         if name not in self._joined:
-            table = self._tables.get(name, pd.DataFrame(columns=list(COLUMNS), dtype=float))
+            table = self._tables.get(
+                name, pd.DataFrame(columns=list(COLUMNS), dtype=float)
+            )
             if len(table):
-                extra = [item for item in self.scenes if item not in table or item == "scene_id"]
-                table = table.merge(self.scenes[extra], on="scene_id", validate="many_to_one")
+                extra = [
+                    item
+                    for item in self.scenes
+                    if item not in table or item == "scene_id"
+                ]
+                table = table.merge(
+                    self.scenes[extra], on="scene_id", validate="many_to_one"
+                )
                 by_dem = table["answered_method"] == "dem"
                 table = table if name in ANSWERS else table[by_dem]
             # one block: columns are added to more than a hundred others
@@ -146,10 +170,14 @@ class Evidence:
         table = self.joined("single_grain")
         return commonest(table[table["force_law"] == BRIDGED])
 
-    def piles(self, name: str, packing: str = "aligned", *stresses: str) -> pd.DataFrame:
+    def piles(
+        self, name: str, packing: str = "aligned", *stresses: str
+    ) -> pd.DataFrame:
         """A table of piles of a packing whose force law holds; by default under the wall stress."""
         table = self.joined(name)
-        chosen = table["stress"].isin(stresses or ("wall",)) & (table["packing"] == packing)
+        chosen = table["stress"].isin(stresses or ("wall",)) & (
+            table["packing"] == packing
+        )
         return table[chosen & (table["force_law"] == table["regime"])]
 
     @cached_property
@@ -181,7 +209,9 @@ def parts(table: pd.DataFrame, *columns: str) -> Iterator[tuple[Any, pd.DataFram
         yield from table.groupby(by, dropna=False)
 
 
-def pairs(table: pd.DataFrame, along: str, value: str, ignore: Sequence[str] = ()) -> pd.DataFrame:
+def pairs(
+    table: pd.DataFrame, along: str, value: str, ignore: Sequence[str] = ()
+) -> pd.DataFrame:
     """Neighbours in one column that agree in all other parameters.
 
     A row for each pair has its ``force_law`` and the ``ratio`` of the value at the higher end to

@@ -32,8 +32,12 @@ SMALL_RE = 0.3  # Re* up to which a claim on Re* < 3 must be true to be partly r
 BETA, Z0_OVER_D = (50.0, 55.0), 1 / 30  # for these the paper claims the best fit
 POINTS = 60  # Re* at which a series of thresholds is compared with curves
 GOOD = 1.25  # mean factor from the curves up to which a fit is called good
-CREST = 0.9  # part of the counted grains, from the toe, above which they are at the crest
-RANKED = -0.9  # rank correlation of place and load step from which the motion runs downward
+CREST = (
+    0.9  # part of the counted grains, from the toe, above which they are at the crest
+)
+RANKED = (
+    -0.9
+)  # rank correlation of place and load step from which the motion runs downward
 COARSE_M = 5e-4  # diameter above which the paper sees wiggles, m
 STEEP = 0.2  # least n/N for wiggles: below it the curve rises too steeply for the load steps
 # the sum of five neighbours by these weights is the value of the parabola that fits them best
@@ -54,7 +58,9 @@ def by_regime(
         yield Comparison(f"{regime}: {name}", values, above, **others)
 
 
-def along(evidence: Evidence, table: str, along: str, rises: bool, name: str) -> Comparisons:
+def along(
+    evidence: Evidence, table: str, along: str, rises: bool, name: str
+) -> Comparisons:
     """Whether thresholds of single grains or of piles rise, or fall, along a column."""
     is_held = table == "held"
     rows = evidence.held if is_held else evidence.piles("pile_threshold")
@@ -71,7 +77,9 @@ def constant(evidence: Evidence) -> Comparisons:
     for (beta, z0), series in parts(flat, "beta_deg", "z0_over_d"):
         if len(series) > 1:
             unit = Exposure(1.0, z0, 1.0, 1.0, series["alpha_s"].iloc[0])
-            lifts.append(law.lift(1.0, unit) / law.drag(1.0, unit) / np.tan(np.radians(beta)))
+            lifts.append(
+                law.lift(1.0, unit) / law.drag(1.0, unit) / np.tan(np.radians(beta))
+            )
             ends = series.sort_values("reynolds")["shields_dem"]
             changes.append(ends.iloc[-1] / ends.iloc[0] - 1)
     lift, end = np.array(lifts, float), law.reynolds[1]
@@ -126,9 +134,15 @@ def _over_d(z0: float) -> str:
     return f"d/{1 / z0:.3g}"
 
 
-def _fits(grains: pd.DataFrame, lines: Iterable[tuple[FloatArray, FloatArray]]) -> pd.DataFrame:
+def _fits(
+    grains: pd.DataFrame, lines: Iterable[tuple[FloatArray, FloatArray]]
+) -> pd.DataFrame:
     """Mean factor of each series of one law from some curves, at the Re* that all cover."""
-    series = [(key, own) for key, own in parts(grains, "beta_deg", "z0_over_d") if len(own) > 1]
+    series = [
+        (key, own)
+        for key, own in parts(grains, "beta_deg", "z0_over_d")
+        if len(own) > 1
+    ]
     low = max((own["reynolds"].min() for _, own in series), default=1.0)
     high = min((own["reynolds"].max() for _, own in series), default=0.0)
     grid = np.geomspace(low, high, POINTS) if low < high else np.array([])
@@ -137,9 +151,13 @@ def _fits(grains: pd.DataFrame, lines: Iterable[tuple[FloatArray, FloatArray]]) 
     rows = []
     for (beta, z0), own in series if covered.any() else ():
         ordered = own.sort_values("reynolds")
-        tau = _read(ordered["reynolds"].to_numpy(), ordered["shields_dem"].to_numpy(), grid)
+        tau = _read(
+            ordered["reynolds"].to_numpy(), ordered["shields_dem"].to_numpy(), grid
+        )
         away = np.abs(tau[covered] - np.nanmean(table[:, covered], axis=0)).mean()
-        rows.append((beta, _over_d(z0), abs(z0 / Z0_OVER_D - 1) < 1e-3, float(np.exp(away))))
+        rows.append(
+            (beta, _over_d(z0), abs(z0 / Z0_OVER_D - 1) < 1e-3, float(np.exp(away)))
+        )
     fits = pd.DataFrame(rows, columns=["beta_deg", "z0", "is_z0_named", "factor"])
     return fits.sort_values("factor", kind="stable")
 
@@ -160,21 +178,31 @@ def order(evidence: Evidence) -> Comparisons:
         ("horizontal", "level rows"),
     ):
         downward, ranks = [], []
-        every = evidence.piles("pile_grain", packing)[["scene_id", "s_m", "moved_in_load_step"]]
+        every = evidence.piles("pile_grain", packing)[
+            ["scene_id", "s_m", "moved_in_load_step"]
+        ]
         for _, grains in parts(every, "scene_id"):
             step = grains.sort_values("s_m")["moved_in_load_step"].to_numpy(int)
             if (step > 0).any():
                 late = np.where(step > 0, step, step.max() + 1)
                 place = (np.arange(len(late)) + 0.5) / len(late)
                 _, each, many = np.unique(late, return_inverse=True, return_counts=True)
-                rank = (np.cumsum(many) - many / 2)[each]  # Spearman's, of ties the mean
-                ranks.append(float(np.corrcoef(place, rank)[0, 1]) if len(many) > 1 else np.nan)
-                downward.append(place[late == late.min()].max() > CREST and ranks[-1] <= RANKED)
+                rank = (np.cumsum(many) - many / 2)[
+                    each
+                ]  # Spearman's, of ties the mean
+                ranks.append(
+                    float(np.corrcoef(place, rank)[0, 1]) if len(many) > 1 else np.nan
+                )
+                downward.append(
+                    place[late == late.min()].max() > CREST and ranks[-1] <= RANKED
+                )
         if packing == "aligned":
             rule = f"the topmost tenth moves first, rank correlation at most {RANKED:g}"
             yield Comparison(f"{name}: {rule}", np.array(downward, bool))
         if ranks:
-            yield Comparison(f"{name}: rank correlation of place and load step of motion", ranks)
+            yield Comparison(
+                f"{name}: rank correlation of place and load step of motion", ranks
+            )
 
 
 def above_single(evidence: Evidence) -> Comparisons:
@@ -211,7 +239,11 @@ def wiggles(evidence: Evidence) -> Comparisons:
     for curve in evidence.curves:
         scene = curve.iloc[0]
         if scene["scene_id"] in grains:
-            stress = grains[scene["scene_id"]].sort_values("s_m")["ustar_over_ustar0"].to_numpy()
+            stress = (
+                grains[scene["scene_id"]]
+                .sort_values("s_m")["ustar_over_ustar0"]
+                .to_numpy()
+            )
             width = 2 * int(WINDOW * len(stress) / 2) + 1
             padded = np.pad(stress, width // 2, mode="edge")
             smoothed = np.convolve(padded, np.full(width, 1 / width), mode="valid")
@@ -222,8 +254,12 @@ def wiggles(evidence: Evidence) -> Comparisons:
     table = pd.DataFrame(rows, columns=columns, dtype=float).dropna()
     coarse, fine = table[table["d_m"] > COARSE_M], table[table["d_m"] <= COARSE_M]
     beside = coarse["DEM"] / (fine["DEM"].median() if len(fine) else np.nan)
-    yield Comparison("d > 0.5 mm: wiggle over the median of the finer piles", beside, 1.0)
-    yield Comparison("d > 0.5 mm: wiggle over 1/N", coarse["DEM"] / coarse["grain"], -np.inf, 1.0)
+    yield Comparison(
+        "d > 0.5 mm: wiggle over the median of the finer piles", beside, 1.0
+    )
+    yield Comparison(
+        "d > 0.5 mm: wiggle over 1/N", coarse["DEM"] / coarse["grain"], -np.inf, 1.0
+    )
     yield Comparison("d ≤ 0.5 mm: wiggle over 1/N", fine["DEM"] / fine["grain"])
     for name, part in (("d > 0.5 mm", coarse), ("d ≤ 0.5 mm", fine)):
         for method in columns[2:]:
@@ -256,14 +292,25 @@ def saturation(evidence: Evidence) -> Comparisons:
     """How the rise of the fraction slows down."""
     rows = []
     for curve in evidence.curves:
-        low, middle, high = (_stress_at(curve, fraction) for fraction in (0.2, 0.5, 0.8))
+        low, middle, high = (
+            _stress_at(curve, fraction) for fraction in (0.2, 0.5, 0.8)
+        )
         later = _fraction_at(curve, LATER * _stress_at(curve, 0.3))
         bend = (middle - low) / (high - middle)
-        rows.append({**curve.iloc[0].drop("fraction_moved"), "bend": bend, "later": later})
-    table = pd.DataFrame(rows) if rows else evidence.joined("none").assign(bend=[], later=[])
+        rows.append(
+            {**curve.iloc[0].drop("fraction_moved"), "bend": bend, "later": later}
+        )
+    table = (
+        pd.DataFrame(rows)
+        if rows
+        else evidence.joined("none").assign(bend=[], later=[])
+    )
     name = "slope of n/N against τ from 50 to 80 % over that from 20 to 50 %"
     yield Comparison(name, table["bend"], -np.inf, 1.0)
-    name, ends = f"n/N at {LATER:g} τ₃₀", ("largest d over smallest", "steepest over flattest")
+    name, ends = (
+        f"n/N at {LATER:g} τ₃₀",
+        ("largest d over smallest", "steepest over flattest"),
+    )
     for along, pair in zip(("d_m", "alpha_deg"), ends, strict=True):
         values = table.groupby(others(table, along), dropna=False)[along]
         at_end = (table[along] == values.transform("min")) | (
@@ -284,7 +331,9 @@ def _stress_at(curve: pd.DataFrame, fraction: float) -> float:
 def _fraction_at(curve: pd.DataFrame, shields: float) -> float:
     """The fraction that had moved when the mean stress first reached a value."""
     stress = np.maximum.accumulate(curve["shields"].to_numpy(float))
-    return float(np.interp(shields, stress, curve["fraction_moved"].to_numpy(float), left=0.0))
+    return float(
+        np.interp(shields, stress, curve["fraction_moved"].to_numpy(float), left=0.0)
+    )
 
 
 def fraction(evidence: Evidence) -> Comparisons:
@@ -333,7 +382,9 @@ def regimes(evidence: Evidence) -> Comparisons:
         yield Comparison(name, part["regime"] != "transition")
     holds = piles[piles["law_holds"].astype(bool)]
     if (holds["force_law"] == BRIDGED).any():
-        answered = each.merge(holds[keys].drop_duplicates(), on=keys, how="left", indicator=True)
+        answered = each.merge(
+            holds[keys].drop_duplicates(), on=keys, how="left", indicator=True
+        )
         name = "the same piles that have an answer of a law that holds, the bridged law included"
         yield Comparison(name, answered["_merge"] == "both", is_judged=False)
     law = LAWS["high"]
@@ -342,7 +393,10 @@ def regimes(evidence: Evidence) -> Comparisons:
         high = table[(table["force_law"] == "high") & table["reynolds"].notna()]
         if len(high):
             unit = Exposure(1.0, high["z0_over_d"].to_numpy(float), 1.0, 1.0, 1.0)
-            within = law.particle_reynolds(high["reynolds"].to_numpy(float), unit) <= law.drag_end
+            within = (
+                law.particle_reynolds(high["reynolds"].to_numpy(float), unit)
+                <= law.drag_end
+            )
             name = f"high regime: thresholds of {name} within the range of the drag law"
             yield Comparison(name, within, is_judged=False)
 
@@ -351,7 +405,10 @@ def stress(evidence: Evidence) -> Comparisons:
     """Eq. 10 against the wall stress, in the thresholds of piles."""
     table = evidence.piles("pile_threshold", "aligned", "wall", "eq10")
     coded = table.assign(code=(table["stress"] == "eq10").astype(float))
-    for symbol, column, bound in (("u*₀", "ustar0_m_s", NEARLY), ("τ", "shields", np.inf)):
+    for symbol, column, bound in (
+        ("u*₀", "ustar0_m_s", NEARLY),
+        ("τ", "shields", np.inf),
+    ):
         changes = pairs(coded, "code", column, ["stress"])
         changes["ratio"] -= 1
         name = f"{symbol} by Eq. 10 over that by the wall stress, less 1"

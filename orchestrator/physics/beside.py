@@ -22,13 +22,40 @@ from orchestrator.types import FloatArray
 FIELD = (0.0110, 0.0126, 0.0129)
 """Shields numbers of the fluid threshold at three sites, by R. L. Martin and J. F. Kok, 2018,
 doi:10.1029/2017JF004416: sand of 0.40 to 0.53 mm."""
-MEASURED = tuple(f"measured_{name}" for name in ("curve", "median", "low", "high", "rows"))
+MEASURED = tuple(
+    f"measured_{name}" for name in ("curve", "median", "low", "high", "rows")
+)
 TESTED = tuple(f"tested_{name}" for name in ("low", "high", "rows", "held"))
 """Columns of what was measured at the Re*, and of the interval; `tables/columns.csv` tells them."""
 OF_KIND = (
-    *("alpha_s", "cohesion_n_m", "alpha_deg", "relative_size", "rho_f_kg_m3", "force_law", "d_m"),
-    *("z0_m", "bed", "beta_deg", "bed_shape", "profile", "obstacles", "answered_width", "sizes"),
-    *("answered_method", "exposure", "sheltering", "fraction", "gusts", "phi_deg", "poured_depth"),
+    *(
+        "alpha_s",
+        "cohesion_n_m",
+        "alpha_deg",
+        "relative_size",
+        "rho_f_kg_m3",
+        "force_law",
+        "d_m",
+    ),
+    *(
+        "z0_m",
+        "bed",
+        "beta_deg",
+        "bed_shape",
+        "profile",
+        "obstacles",
+        "answered_width",
+        "sizes",
+    ),
+    *(
+        "answered_method",
+        "exposure",
+        "sheltering",
+        "fraction",
+        "gusts",
+        "phi_deg",
+        "poured_depth",
+    ),
     *("answered_mobile_layers", "counted", "loaded_grains", "length", "h_m"),
 )
 """Columns that the kind of a threshold follows from."""
@@ -40,13 +67,27 @@ LEAST_LENGTH = 20.0
 
 def beside(table: Any) -> dict[str, FloatArray]:
     """Columns `MEASURED` and `TESTED` for thresholds, from a table or a mapping of columns."""
-    names = ("reynolds", "d_m", "rho_sol_kg_m3", "rho_f_kg_m3", "nu_m2_s", "g_m_s2", "shields")
+    names = (
+        "reynolds",
+        "d_m",
+        "rho_sol_kg_m3",
+        "rho_f_kg_m3",
+        "nu_m2_s",
+        "g_m_s2",
+        "shields",
+    )
     re, d, rho_s, rho, nu, g, theta = (np.asarray(table[name], float) for name in names)
     excess, is_gas = (rho_s / rho - 1) * g, rho < GAS_BELOW
     in_gas = shao_lu(d, Air(rho_s, rho, nu, g)) ** 2 / (excess * d)
-    curve = np.where(is_gas, in_gas, soulsby_whitehouse(d * (excess / nu**2) ** (1 / 3)))
+    curve = np.where(
+        is_gas, in_gas, soulsby_whitehouse(d * (excess / nu**2) ** (1 / 3))
+    )
     none = (np.nan, np.nan, np.nan, 0.0)
-    bins = [none, *((b.median, b.tenth, b.ninetieth, float(b.count)) for b in VISUAL), none]
+    bins = [
+        none,
+        *((b.median, b.tenth, b.ninetieth, float(b.count)) for b in VISUAL),
+        none,
+    ]
     edges = [VISUAL[0].low, *(each.high for each in VISUAL)]
     flumes = np.array(bins)[np.searchsorted(edges, re, side="right")]
     # the sites have Re* 8.8 to 13.5 and grains 2,170 to 2,290 times as dense as the air: within 2
@@ -61,7 +102,9 @@ def beside(table: Any) -> dict[str, FloatArray]:
 
 def _kinds(table: Any) -> list[str]:
     """The kind of each row of a table; thousands of rows have few."""
-    given = {name: np.asarray(table[name]).tolist() for name in OF_KIND if name in table}
+    given = {
+        name: np.asarray(table[name]).tolist() for name in OF_KIND if name in table
+    }
     z0 = np.asarray(table["z0_m"], float)
     for name in LENGTHS:
         if name in table:
@@ -81,7 +124,11 @@ def kind_of(row: Mapping[str, Any]) -> str:
     Of single grains, and of strips of sand by the pivots at a fraction of their grains; there are
     none on slopes, and in a gas three, too few.
     """
-    if row["alpha_s"] != LIFT_COEFFICIENT or row["cohesion_n_m"] or row["alpha_deg"] > 1:
+    if (
+        row["alpha_s"] != LIFT_COEFFICIENT
+        or row["cohesion_n_m"]
+        or row["alpha_deg"] > 1
+    ):
         return ""
     if row["rho_f_kg_m3"] < GAS_BELOW or row.get("relative_size") not in (1.0, None):
         return ""
@@ -90,7 +137,10 @@ def kind_of(row: Mapping[str, Any]) -> str:
         words += ["grain", f"beta {row['beta_deg']:g}"]
     elif _is_strip(row):
         words += ["strip", f"phi {row['phi_deg']:g}", f"{row['poured_depth']:g} d deep"]
-        words += [f"{row['answered_width']:g} d wide", f"{row['answered_mobile_layers']:g} layers"]
+        words += [
+            f"{row['answered_width']:g} d wide",
+            f"{row['answered_mobile_layers']:g} layers",
+        ]
         words += [str(row["sizes"]), row["exposure"], row["sheltering"]]
         words += [f"n/N {row['fraction']:g}"]
     else:
@@ -121,7 +171,9 @@ def interval(kind: str, reynolds: float) -> list[float]:
 
     There are no rows (0) where fewer than ten are alike.
     """
-    at = (found for low, high, *found in _table().get(kind, ()) if low <= reynolds < high)
+    at = (
+        found for low, high, *found in _table().get(kind, ()) if low <= reynolds < high
+    )
     return next(at, [np.nan, np.nan, 0, np.nan])
 
 
@@ -150,15 +202,16 @@ def sentences(row: Mapping[Any, Any]) -> tuple[str, str]:
         by = f"the curve of Shao and Lu has θ {curve:.4f}, this is {over:.2g} times it"
         by = f"{by}, {over**0.5:.3g} times in u*"
         rows = "Re* 9 to 14 and densities 2170 to 2290 times the gas's"
-        said = (
-            f"{by}; no field rows are near it: they have {rows}, this has {number} and {ratio:.3g}"
-        )
+        said = f"{by}; no field rows are near it: they have {rows}, this has {number} and {ratio:.3g}"
         if count:
             rows = f"{low:.3f} to {high:.3f} at {count:g} sites (Martin and Kok 2018)"
             said = f"measured in air on level beds: {by}; in the field {rows}"
             said += f", this is {theta / median:.2g} times"
     low, high, count, held = (row[name] for name in TESTED)
     if not count:
-        return said, "no tested interval: no ten measured thresholds are of such beds at such Re*"
+        return (
+            said,
+            "no tested interval: no ten measured thresholds are of such beds at such Re*",
+        )
     rows = f"{held:.0%} of {count:g} flume rows"
     return said, f"θ {theta:.3f}; {rows} lie within {low:.3f} and {high:.3f}"

@@ -32,11 +32,20 @@ def water(t: float) -> tuple[float, float]:
 def sea_water(t: float) -> tuple[float, float]:
     """The same of sea water: Millero and Poisson (1981), UNESCO's; Sharqawy et al. (2010)."""
     density, viscosity = water(t)
-    salt = 0.824493 - 4.0899e-3 * t + 7.6438e-5 * t**2 - 8.2467e-7 * t**3 + 5.3875e-9 * t**4
+    salt = (
+        0.824493
+        - 4.0899e-3 * t
+        + 7.6438e-5 * t**2
+        - 8.2467e-7 * t**3
+        + 5.3875e-9 * t**4
+    )
     density += salt * SALINITY + 4.8314e-4 * SALINITY**2
     density += (-5.72466e-3 + 1.0227e-4 * t - 1.6546e-6 * t**2) * SALINITY**1.5
     s = SALINITY / 1000
-    first, second = 1.541 + 1.998e-2 * t - 9.52e-5 * t**2, 7.974 - 7.561e-2 * t + 4.724e-4 * t**2
+    first, second = (
+        1.541 + 1.998e-2 * t - 9.52e-5 * t**2,
+        7.974 - 7.561e-2 * t + 4.724e-4 * t**2,
+    )
     return density, viscosity * (1 + first * s + second * s**2)
 
 
@@ -46,7 +55,11 @@ def air(t: float) -> tuple[float, float]:
     return 101_325 / (287.053 * kelvin), 1.458e-6 * kelvin**1.5 / (kelvin + 110.4)
 
 
-FLUIDS = {"water": (water, 0.0, 100.0), "seawater": (sea_water, 0.0, 40.0), "air": (air, -80, 100)}
+FLUIDS = {
+    "water": (water, 0.0, 100.0),
+    "seawater": (sea_water, 0.0, 40.0),
+    "air": (air, -80, 100),
+}
 """By name the properties, and the temperatures between which the formulas hold, deg C."""
 
 
@@ -74,7 +87,9 @@ def numbers_of(table: Mapping[str, Any]) -> dict[str, Any]:
     >>> numbers_of({"kind": "water"})
     {'density': 999.1, 'viscosity': 1.1386e-06}
     """
-    rest = {key: value for key, value in table.items() if key not in ("kind", TEMPERATURE)}
+    rest = {
+        key: value for key, value in table.items() if key not in ("kind", TEMPERATURE)
+    }
     if len(rest) == len(table):
         return rest
     kind = table.get("kind")
@@ -89,7 +104,9 @@ def numbers_of(table: Mapping[str, Any]) -> dict[str, Any]:
     properties, low, high = FLUIDS[kind]
     temperature = table.get(TEMPERATURE, STANDARD_DEG_C)
     # to Python a truth is a number
-    is_number = isinstance(temperature, int | float) and not isinstance(temperature, bool)
+    is_number = isinstance(temperature, int | float) and not isinstance(
+        temperature, bool
+    )
     if not is_number or not low <= temperature <= high:
         what = f"{temperature!r} is no temperature at which the formulas of {kind} hold"
         remedy = f"{low:g} ... {high:g} deg C"
@@ -99,7 +116,9 @@ def numbers_of(table: Mapping[str, Any]) -> dict[str, Any]:
         raise InputError(what, f"fluid.{TEMPERATURE}", remedy)
     for name in ("density", "viscosity"):
         if name in rest:
-            raise InputError(f"{kind} has its own", f"fluid.{name}", "leave out one of the two")
+            raise InputError(
+                f"{kind} has its own", f"fluid.{name}", "leave out one of the two"
+            )
     density, viscosity = properties(float(temperature))
     numbers = {"density": density, "viscosity": viscosity / density}
     return rest | {name: float(f"{value:.5g}") for name, value in numbers.items()}

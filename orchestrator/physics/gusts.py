@@ -40,7 +40,9 @@ def peak_over_mean(intensity: float, events: float) -> float:
     return max(quantile, 1.0)
 
 
-def gust_stresses(intensity: float, events: int, load_steps: int, seed: int) -> FloatArray:
+def gust_stresses(
+    intensity: float, events: int, load_steps: int, seed: int
+) -> FloatArray:
     """Stress of each event over the mean, in random order for each load step, (steps, events).
 
     They are evenly spread over the log-normal distribution up to its quantile 1 - 1/n, which is
@@ -48,5 +50,9 @@ def gust_stresses(intensity: float, events: int, load_steps: int, seed: int) -> 
     """
     parts = np.linspace(1 / events, 1 - 1 / events, events).tolist()
     variance, normal = log1p(intensity**2), NormalDist()
-    stress = np.exp([sqrt(variance) * normal.inv_cdf(part) - variance / 2 for part in parts])
-    return np.random.default_rng(seed).permuted(np.tile(stress, (load_steps, 1)), axis=1)
+    stress = np.exp(
+        [sqrt(variance) * normal.inv_cdf(part) - variance / 2 for part in parts]
+    )
+    return np.random.default_rng(seed).permuted(
+        np.tile(stress, (load_steps, 1)), axis=1
+    )

@@ -113,9 +113,16 @@ def _thresholds(ax: Axes, rows: pd.DataFrame) -> Any:
     goes = np.isfinite(rows["ustar0_m_s"])
     flow = rows["ustar0_m_s"][goes]
     look: Look = {"s": 5, "cmap": "plasma", "vmin": 0, "vmax": 1, "gid": "thresholds"}
-    dots = ax.scatter(rows["x_m"][goes], flow, c=flow.rank(method="first") / len(rows), **look)
+    dots = ax.scatter(
+        rows["x_m"][goes], flow, c=flow.rank(method="first") / len(rows), **look
+    )
     # one collection: by the method local these may be hundreds
-    look = {"transform": ax.get_xaxis_transform(), "color": "0.75", "lw": 0.3, "zorder": 0}
+    look = {
+        "transform": ax.get_xaxis_transform(),
+        "color": "0.75",
+        "lw": 0.3,
+        "zorder": 0,
+    }
     ax.vlines(rows["x_m"][~goes], 0, 1, **look)
     ax.margins(y=0.15)
     ax.set(yscale="log", ylabel=r"threshold $u^\star_0$, m/s")
@@ -132,11 +139,23 @@ def _first(results: Results, scene_id: str, axes: tuple[Axes, ...]) -> None:
         return
     for ax in axes:
         ax.axvline(x, color=FIRST, lw=0.8, zorder=0.5)
-    text = f"x = {x:.4g} m\n{flow_at(row, ustar)}".replace(" (", "\n").replace(", ", "\n")
+    text = f"x = {x:.4g} m\n{flow_at(row, ustar)}".replace(" (", "\n").replace(
+        ", ", "\n"
+    )
     text = text.rstrip(")").replace("u*₀", r"$u^\star_0$")
     low, high = axes[1].get_xlim()
     has_room = x < low + 0.8 * (high - low)
-    look: Look = {"textcoords": "offset points", "va": "bottom", "color": FIRST, "fontsize": 7}
-    look |= {"ha": "left" if has_room else "right", "xytext": (8 if has_room else -8, 0)}
+    look: Look = {
+        "textcoords": "offset points",
+        "va": "bottom",
+        "color": FIRST,
+        "fontsize": 7,
+    }
+    look |= {
+        "ha": "left" if has_room else "right",
+        "xytext": (8 if has_room else -8, 0),
+    }
     axes[1].annotate(text, (x, ustar), gid="first", **look)
-    axes[1].plot([x], [ustar], "o", color=FIRST, mfc="none", label="motion starts", gid="start")
+    axes[1].plot(
+        [x], [ustar], "o", color=FIRST, mfc="none", label="motion starts", gid="start"
+    )

@@ -94,7 +94,9 @@ def _kinds(results: Results) -> list[list[Pile]]:
     """Piles with flows, of each slope, height and value of the fields that vary, by rising z0."""
 
     def kind(pile: Pile) -> tuple[float, float, str]:
-        varied = [str(fields.COLUMNS[name].used(pile.scene)) for name in results.flow_fields]
+        varied = [
+            str(fields.COLUMNS[name].used(pile.scene)) for name in results.flow_fields
+        ]
         return pile.bed.slope_deg, pile.bed.height, ", ".join(varied)
 
     def by_kind_and_roughness(pile: Pile) -> tuple[float, float, str, float]:
@@ -123,11 +125,15 @@ def stress(results: Results) -> Iterator[Figure]:
     names = tuple(pile.flow.name for pile in piles)
     mean, crest = eq10_over_wall(results, names)
     lengths = [
-        labels.value("averaging_length", pile.scene.forces.averaging_length) for pile in piles
+        labels.value("averaging_length", pile.scene.forces.averaging_length)
+        for pile in piles
     ]
     averaged = ", ".join(dict.fromkeys(lengths))
     text = caption(
-        "stress", mean=f"{mean:+.0%}", crest=f"{crest:+.0%}", averaged=f"max(d, {averaged})"
+        "stress",
+        mean=f"{mean:+.0%}",
+        crest=f"{crest:+.0%}",
+        averaged=f"max(d, {averaged})",
     )
     title = "Friction velocity over the pile"
     draw = partial(_stress, results, piles)
@@ -174,7 +180,9 @@ def _along(results: Results, pile: Pile, ax: Axes) -> None:
     ax.set(zorder=1, frame_on=False)  # the lines lie over the bed
 
 
-def eq10_over_wall(results: Results, flow_cases: tuple[str, ...]) -> tuple[float, float]:
+def eq10_over_wall(
+    results: Results, flow_cases: tuple[str, ...]
+) -> tuple[float, float]:
     """Relative difference of u* by Eq. 10: mean of the windward faces, largest at their crests."""
     table = results.tables["wall_stress"]
     means = []
@@ -189,7 +197,9 @@ def eq10_over_wall(results: Results, flow_cases: tuple[str, ...]) -> tuple[float
     return float(np.mean(means)), float(np.max(crests))
 
 
-def over_u_e(pile: Pile, cases: Path, window: Window, unit: float, width: int = 800) -> FloatArray:
+def over_u_e(
+    pile: Pile, cases: Path, window: Window, unit: float, width: int = 800
+) -> FloatArray:
     """Velocity over U_e on a grid.
 
     Parameters
@@ -230,7 +240,9 @@ def flow(results: Results) -> Iterator[Figure]:
     """Speed and streamlines: a panel for each slope and height, at its least z0."""
     for name, title, shown in style.pages(drawn(results)):
         settings = [pile.scene.flow for pile in shown]
-        models = [labels.value("turbulence_model", each.turbulence_model) for each in settings]
+        models = [
+            labels.value("turbulence_model", each.turbulence_model) for each in settings
+        ]
         speeds = [labels.value("solve_u_e_m_s", each.speed) for each in settings]
         text = caption(
             "flow",
@@ -308,7 +320,9 @@ def mesh(results: Results) -> Iterator[Figure]:
             lid=not pile.scene.flow.depth,
         )
         draw = partial(_mesh, results, pile)
-        yield Figure("mesh", "Mesh of the flow", text, (pile.flow.name,), draw, fold=True)
+        yield Figure(
+            "mesh", "Mesh of the flow", text, (pile.flow.name,), draw, fold=True
+        )
 
 
 def _mesh(results: Results, pile: Pile) -> Canvas:
@@ -317,7 +331,9 @@ def _mesh(results: Results, pile: Pile) -> Canvas:
     x, z = line.crest / h
     whole = (-2.0, line.x[-2] / h + 2.0, 0.0, 2.5)
     crest = (x - 0.7, x + 0.7, z - 0.25, z + 0.25)
-    shapes = [(top - bottom) / (right - left) for left, right, bottom, top in (whole, crest)]
+    shapes = [
+        (top - bottom) / (right - left) for left, right, bottom, top in (whole, crest)
+    ]
     figure = style.canvas(6.4 * sum(shapes) + 0.8)
     axes = list(figure.subplots(2, 1, height_ratios=shapes))
     edges = read_edges(results.cases / pile.flow.name) / h
@@ -366,7 +382,9 @@ def read_edges(case: Path) -> FloatArray:
     reader.skip_zero_time = True
     cells: Any = reader.read()["internalMesh"]
     edges = cells.extract_all_edges()
-    ends: FloatArray = np.asarray(edges.points, float)[edges.lines.reshape(-1, 3)[:, 1:]]
+    ends: FloatArray = np.asarray(edges.points, float)[
+        edges.lines.reshape(-1, 3)[:, 1:]
+    ]
     is_front = (ends[..., 1] < ends[..., 1].mean()).all(axis=1)
     return np.asarray(ends[is_front][..., [0, 2]])
 
@@ -379,7 +397,9 @@ def hills(results: Results) -> Iterator[Figure]:
     flows = pd.concat([rows for _, rows in listed])
     titles = []
     for half_length, rows in listed:
-        titles.append(f"half length {half_length:g} h, {rows['alpha_deg'].iloc[0]:.3g}°")
+        titles.append(
+            f"half length {half_length:g} h, {rows['alpha_deg'].iloc[0]:.3g}°"
+        )
     figure, axes = style.grid(titles, 2.1, "x/h from the top", USTAR, 1)
     label = "measured end of the reversed flow"
     if not flows["measured_verified"].all():

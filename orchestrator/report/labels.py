@@ -49,12 +49,17 @@ def value(column: str, value: Any) -> str:
 
 def cells(rows: pd.DataFrame, columns: Sequence[str]) -> dict[str, list[str]]:
     """Columns of a table with their values and heads as a reader sees them."""
-    return {words(name).label: [value(name, item) for item in rows[name]] for name in columns}
+    return {
+        words(name).label: [value(name, item) for item in rows[name]]
+        for name in columns
+    }
 
 
 def told(row: pd.Series, columns: Sequence[str]) -> list[str]:
     """The values of a row with their symbols, without those that the row does not have."""
-    shown = [name for name in columns if pd.notna(row[name]) or name == "obstacles"]  # a list
+    shown = [
+        name for name in columns if pd.notna(row[name]) or name == "obstacles"
+    ]  # a list
     return [plain(name, row[name]) for name in shown]
 
 
@@ -70,7 +75,9 @@ def amount(value: float, unit: str) -> str:
         return ratio_of(value, unit)
     if unit == "m" and abs(value) >= 1:
         return f"{value:.4g} m"
-    factor, written = {"m": (1e3, " mm"), "%": (100.0, " %"), "°": (1.0, "°")}.get(unit, (0.0, ""))
+    factor, written = {"m": (1e3, " mm"), "%": (100.0, " %"), "°": (1.0, "°")}.get(
+        unit, (0.0, "")
+    )
     return f"{factor * value:.4g}{written}" if factor else f"{value:g} {unit}".rstrip()
 
 
@@ -96,7 +103,9 @@ def ratio_of(ratio: float, length: str) -> str:
 def methods(rows: pd.DataFrame) -> str:
     """The methods that answered rows of a table."""
     names = fields.ANSWERS["answered_method"].info.choices
-    return ", ".join(name for key, name in names.items() if (rows["answered_method"] == key).any())
+    return ", ".join(
+        name for key, name in names.items() if (rows["answered_method"] == key).any()
+    )
 
 
 def varying(table: pd.DataFrame, *shown: str) -> list[str]:
@@ -107,7 +116,9 @@ def varying(table: pd.DataFrame, *shown: str) -> list[str]:
 
     def rank(column: str) -> int:
         info = fields.COLUMNS[column].info
-        of_answer = 3 if info.about != "question" else 2 if info.scope in OF_METHODS else 0
+        of_answer = (
+            3 if info.about != "question" else 2 if info.scope in OF_METHODS else 0
+        )
         return 1 if column == "method" else of_answer
 
     columns = [name for name in fields.others(table, *shown) if name in fields.COLUMNS]

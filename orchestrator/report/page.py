@@ -22,27 +22,47 @@ if TYPE_CHECKING:
     from orchestrator.report.style import Figure
 
 HERE = Path(__file__).parent
-PACKAGES = ("gmsh", "matplotlib", "meshio", "numpy", "pandas", "pyvista", "scipy", "vtk")
+PACKAGES = (
+    "gmsh",
+    "matplotlib",
+    "meshio",
+    "numpy",
+    "pandas",
+    "pyvista",
+    "scipy",
+    "vtk",
+)
 
 
 def fill(template: str, folder: Path = HERE, /, **values: Any) -> str:
     """The text of a template, by default of one beside this file."""
-    css, script = (Markup((HERE / name).read_text("utf-8")) for name in ("page.css", "page.js"))
+    css, script = (
+        Markup((HERE / name).read_text("utf-8")) for name in ("page.css", "page.js")
+    )
     digest = base64.b64encode(sha256(script.encode()).digest()).decode("ascii")
-    given = {"css": css, "script": script, "script_digest": f"sha256-{digest}", **values}
+    given = {
+        "css": css,
+        "script": script,
+        "script_digest": f"sha256-{digest}",
+        **values,
+    }
     return _templates(folder).get_template(template).render(**given)
 
 
 def caption(name: str, /, **values: Any) -> str:
     """A caption or a sentence from its macro in ``captions.j2``, as plain text on one line."""
-    macro = getattr(_templates(HERE, autoescape=False).get_template("captions.j2").module, name)
+    macro = getattr(
+        _templates(HERE, autoescape=False).get_template("captions.j2").module, name
+    )
     return " ".join(str(macro(**values)).split())
 
 
 @cache
 def _templates(folder: Path, autoescape: bool = True) -> Environment:
     strict: dict[str, Any] = {"undefined": StrictUndefined, "trim_blocks": True}
-    environment = Environment(loader=FileSystemLoader(folder), autoescape=autoescape, **strict)
+    environment = Environment(
+        loader=FileSystemLoader(folder), autoescape=autoescape, **strict
+    )
     filters = {"typeset": typeset, "n": format, "address": address, "inline": _inline}
     environment.filters.update({**filters, "cell": _cell})
     short = {"separators": (",", ":"), "ensure_ascii": False, "allow_nan": False}
@@ -67,7 +87,9 @@ def address(image: bytes) -> str:
 def _inline(figure: "Figure") -> Markup:
     """The SVG of a figure as a part of the page: without prolog and metadata, with a title."""
     svg = figure.image.decode("utf-8")
-    svg = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
+    svg = re.sub(
+        r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL
+    )
     label = f'<svg role="img" aria-label="{escape(figure.title)}"'
     return Markup(svg if 'role="img"' in svg[:400] else svg.replace("<svg", label, 1))
 
@@ -107,18 +129,31 @@ class Section:
 
 def versions(solvers: Mapping[str, str]) -> pd.DataFrame:
     """Solvers with their versions, this package, and the libraries that are not among them."""
-    rows = [*sorted(solvers.items()), ("orchestrator", __version__), ("Python", python_version())]
+    rows = [
+        *sorted(solvers.items()),
+        ("orchestrator", __version__),
+        ("Python", python_version()),
+    ]
     rows += [(name, metadata.version(name)) for name in PACKAGES if name not in solvers]
     return pd.DataFrame(rows, columns=["program", "version"])
 
 
 def write(
-    title: str, sections: Sequence[Section], folder: Folder, name: str, solvers: Mapping[str, str]
+    title: str,
+    sections: Sequence[Section],
+    folder: Folder,
+    name: str,
+    solvers: Mapping[str, str],
 ) -> None:
     """Put the page of an experiment, a file `name`, with its figures as PNG and SVG beside it."""
     from orchestrator.report import style  # it imports matplotlib
 
-    images = ([style.saved(item, folder, png=True) for item in part.figures] for part in sections)
-    shown = [replace(part, figures=each) for part, each in zip(sections, images, strict=True)]
+    images = (
+        [style.saved(item, folder, png=True) for item in part.figures]
+        for part in sections
+    )
+    shown = [
+        replace(part, figures=each) for part, each in zip(sections, images, strict=True)
+    ]
     values = {"sections": shown, "programs": versions(solvers), "links": {}}
     folder.put(name, fill("document.html.j2", title=title, **values))

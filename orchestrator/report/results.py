@@ -44,7 +44,9 @@ class Results:
         """The fields of the solved flow in which the piles differ."""
         count = self.beds("pile").nunique(dropna=False)
         solved = [
-            name for name, each in fields.COLUMNS.items() if each.info.scope == "solved flows"
+            name
+            for name, each in fields.COLUMNS.items()
+            if each.info.scope == "solved flows"
         ]
         return [name for name in solved if count[name] > 1]
 
@@ -74,7 +76,9 @@ class Results:
         rows = self.joined("pile_threshold")
         if rows.empty:
             return rows
-        nearest: float = min(set(rows["fraction"]), key=lambda n: abs(float(n) - FRACTION))
+        nearest: float = min(
+            set(rows["fraction"]), key=lambda n: abs(float(n) - FRACTION)
+        )
         return rows[rows["fraction"] == nearest]
 
     @cached_property
@@ -83,9 +87,13 @@ class Results:
         if self.at_fraction.empty:
             return self.at_fraction
         here = seeds_as_one(self.at_fraction[self.at_fraction["shields"].notna()])
-        order = here.assign(dem=here["answered_method"] == "dem", wears=here["update"] > 0)
+        order = here.assign(
+            dem=here["answered_method"] == "dem", wears=here["update"] > 0
+        )
         by = ["alpha_deg", "usable", "d_m", "dem", "wears", "z0_over_d"]
-        return order.sort_values(by, ascending=[True, *[False] * 4, True], kind="stable")
+        return order.sort_values(
+            by, ascending=[True, *[False] * 4, True], kind="stable"
+        )
 
     def shown(self, scene_id: str) -> list[Pile]:
         """The piles whose files show how a scene's grains move, a check by DEM first."""
@@ -115,13 +123,17 @@ def measured_hills(results: Results) -> Iterator[tuple[float, pd.DataFrame]]:
     flows = results.tables.get("flow", pd.DataFrame())
     if "measured_source" not in flows:
         return
-    for _, rows in reversed(list(flows.dropna(subset=["measured_source"]).groupby("alpha_deg"))):
+    for _, rows in reversed(
+        list(flows.dropna(subset=["measured_source"]).groupby("alpha_deg"))
+    ):
         hill = measured_hill(results.flows[str(rows["flow_case"].iloc[0])])
         assert hill
         yield hill.aspect, rows
 
 
-def split(table: pd.DataFrame, *by: str) -> Iterator[tuple[tuple[Hashable, ...], pd.DataFrame]]:
+def split(
+    table: pd.DataFrame, *by: str
+) -> Iterator[tuple[tuple[Hashable, ...], pd.DataFrame]]:
     """The parts of a table that agree in some columns, with what they agree in, in rising order."""
     if len(table):
         yield from table.groupby(list(by), sort=True, dropna=False)

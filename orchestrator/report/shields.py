@@ -282,9 +282,17 @@ def draw_points(
     shape = rows[SHAPE].to_numpy(str)
     drawn = []
     for marker, label in sorted(set(zip(rows[SHAPE], rows[LABEL], strict=True))):
-        look: Look = {"ls": "", "marker": marker, "ms": size, "color": colour, "mew": 0.8}
+        look: Look = {
+            "ls": "",
+            "marker": marker,
+            "ms": size,
+            "color": colour,
+            "mew": 0.8,
+        }
         solid = (shape == marker) & usable
-        (line,) = ax.plot(x[solid], y[solid], zorder=3, gid=RESULT[1], label=label, **look)
+        (line,) = ax.plot(
+            x[solid], y[solid], zorder=3, gid=RESULT[1], label=label, **look
+        )
         drawn.append((line, solid))
         hollow = (shape == marker) & ~usable
         if hollow.any():
@@ -295,7 +303,9 @@ def draw_points(
     return drawn
 
 
-def _draw_intervals(ax: Axes, x: Any, low: Any, high: Any, colour: str, size: float) -> None:
+def _draw_intervals(
+    ax: Axes, x: Any, low: Any, high: Any, colour: str, size: float
+) -> None:
     """Bars with caps, as one line with gaps: by themselves they take three times as long.
 
     A bar without an upper end leaves the frame.
@@ -443,7 +453,9 @@ def _draw_kind(
         for line, drawn in draw_points(ax, marked, shades[alpha], columns, size):
             group = f"{NAME}-{number + len(texts)}"
             line.set_gid(group)
-            texts[group] = [_texts(row, columns, telling) for _, row in marked[drawn].iterrows()]
+            texts[group] = [
+                _texts(row, columns, telling) for _, row in marked[drawn].iterrows()
+            ]
     return texts
 
 
@@ -467,7 +479,9 @@ def _lines(results: Results) -> list[Line]:
     beds = [line.bed for line in flat]
     lines = [line for line in flat if line.bed in (beds[0], beds[-1])]
     drawn = {line.law for line in lines}
-    others = [line for line in theory.best(theory.ranked(results)) if line.law not in drawn]
+    others = [
+        line for line in theory.best(theory.ranked(results)) if line.law not in drawn
+    ]
     bed_of_pair = next((line.bed for line in others if line.law in theory.PAIR), None)
     near = [line for line in others if line.decades > 0]
     chosen = near if near and len(others) > LINES else others
@@ -507,7 +521,9 @@ def singles(results: Results) -> Iterator[Figure]:
         for (ratio,), group in split(flat, "z0_over_d"):
             written = labels.ratio_of(float(str(ratio)), "d")
             title = f"Force laws on a horizontal bed, z₀ = {written}"
-            yield from _diagrams(group, "force_law", colours, f"shields-{written}", title)
+            yield from _diagrams(
+                group, "force_law", colours, f"shields-{written}", title
+            )
     elif len(flat):
         colours = style.palette("beta_deg", results.values("beta_deg"))
         title = f"One grain on a horizontal bed: {ending}"
@@ -649,7 +665,9 @@ def accuracy(results: Results) -> Iterator[Figure]:
     keys = ["load_increment", *choices]
     axes = labels.RE_AXIS, "u* of DEM over closed form"
     for sheet in sheets(rows, keys, 2.1, *axes, columns=1, sharey=False):
-        text = caption("accuracy", about=about(sheet.rows), deviations=_deviations(sheet.rows))
+        text = caption(
+            "accuracy", about=about(sheet.rows), deviations=_deviations(sheet.rows)
+        )
         yield Figure(
             f"accuracy{sheet.name}",
             f"DEM over closed form{sheet.title}",
@@ -672,7 +690,9 @@ def _deviations(rows: pd.DataFrame) -> str:
     return ", ".join(found)
 
 
-def _draw_accuracy(sheet: Sheet, rows: pd.DataFrame, colours: Mapping[Any, str]) -> Canvas:
+def _draw_accuracy(
+    sheet: Sheet, rows: pd.DataFrame, colours: Mapping[Any, str]
+) -> Canvas:
     """The panels of u* of DEM over that of the closed form."""
     _, axes = sheet.panels()
     for ax, part in zip(axes, sheet.parts, strict=True):

@@ -35,7 +35,9 @@ RC: dict[Any, Any] = {
     # numbers at minor ticks stand in line with those at major ones
     "xtick.minor.pad": 5,
     "ytick.minor.pad": 5,
-    "font.sans-serif": ["DejaVu Sans"],  # which matplotlib brings: no font of the machine is used
+    "font.sans-serif": [
+        "DejaVu Sans"
+    ],  # which matplotlib brings: no font of the machine is used
     "axes.linewidth": 0.6,
     "axes.titley": 1.0,  # else matplotlib looks for ticks above each panel
     "lines.linewidth": 1.2,
@@ -178,7 +180,9 @@ def grid(
         hspace=above / height,
     )
     extend(figure, above + right, UNDER)
-    grid_of_axes = figure.subplots(lines, columns, sharex=True, sharey=sharey, squeeze=False)
+    grid_of_axes = figure.subplots(
+        lines, columns, sharex=True, sharey=sharey, squeeze=False
+    )
     every = grid_of_axes.ravel()
     axes: list[Axes] = list(every[: len(titles)])
     for unused in every[len(titles) :]:

@@ -73,14 +73,20 @@ GRAIN = [
 BED = ["alpha_deg", "beta_deg", "z0_over_d", "alpha_s"]
 """Columns of all that a line depends on beside its law, in the order of `Bed`."""
 BAGNOLD_FROM = 3.5  # Bagnold's A is 0.1 above this Re* only; it rises below
-GAS_RATIO = 100.0  # least rho_sol/rho_f of a fluid that curves for air may be compared with
+GAS_RATIO = (
+    100.0  # least rho_sol/rho_f of a fluid that curves for air may be compared with
+)
 
 BINS = BUFFINGTON_MONTGOMERY
 MIDDLES = np.array([item.middle for item in BINS])
 MEDIANS = np.array([item.median for item in BINS])
-FACTORS_FROM = 0.3  # Re* from which factors are taken: below it are a dozen measurements
+FACTORS_FROM = (
+    0.3  # Re* from which factors are taken: below it are a dozen measurements
+)
 EDGES = np.geomspace(BINS[0].low, BINS[-1].high, 2001)
-GRID = np.sqrt(EDGES[1:] * EDGES[:-1])  # Re* at which lines are compared with the measured ranges
+GRID = np.sqrt(
+    EDGES[1:] * EDGES[:-1]
+)  # Re* at which lines are compared with the measured ranges
 _AT = np.searchsorted([item.high for item in BINS], GRID, side="right")
 TENTHS = np.array([item.tenth for item in BINS])[_AT]
 NINETIETHS = np.array([item.ninetieth for item in BINS])[_AT]
@@ -165,7 +171,9 @@ class Line:
 
     def holds(self, reynolds: FloatArray) -> BoolArray:
         """Whether the law holds at some Re*; in units of d, nu and rho_f they are u*."""
-        unit = Exposure(1.0, self.bed.roughness_ratio, 1.0, 1.0, self.bed.lift_coefficient)
+        unit = Exposure(
+            1.0, self.bed.roughness_ratio, 1.0, 1.0, self.bed.lift_coefficient
+        )
         return LAWS[self.law].valid(reynolds, unit)
 
     def near(self, reynolds: FloatArray) -> BoolArray:
@@ -240,7 +248,9 @@ def in_gas(scenes: pd.DataFrame) -> "pd.Series[bool]":
     return scenes["rho_sol_kg_m3"] >= GAS_RATIO * scenes["rho_f_kg_m3"]
 
 
-def air_lines(scenes: pd.DataFrame, slope: float = 0.0) -> dict[str, tuple[FloatArray, FloatArray]]:
+def air_lines(
+    scenes: pd.DataFrame, slope: float = 0.0
+) -> dict[str, tuple[FloatArray, FloatArray]]:
     """Re* and theta_c of the curves for air, by name, for the grains and the gas of some scenes.
 
     The factor of the slope (degrees) is on u*. Of several gases the one of the least viscosity is
@@ -250,7 +260,9 @@ def air_lines(scenes: pd.DataFrame, slope: float = 0.0) -> dict[str, tuple[Float
     if scenes.empty:
         return {}
     item = scenes.iloc[int(scenes["nu_m2_s"].argmin())]
-    air = Air(item["rho_sol_kg_m3"], item["rho_f_kg_m3"], item["nu_m2_s"], item["g_m_s2"])
+    air = Air(
+        item["rho_sol_kg_m3"], item["rho_f_kg_m3"], item["nu_m2_s"], item["g_m_s2"]
+    )
     first = min(SWEEP_M[0], scenes["d_m"].min())
     last = max(SWEEP_M[1], scenes["d_m"].max())
     d = np.geomspace(first, last, POINTS)
@@ -281,7 +293,9 @@ def ranked(results: Results) -> list[Line]:
     grains = results.beds("grain")
     every = lines(grains[grains["alpha_deg"] == 0])
     listed = [line for line in every if line.last]
-    return sorted(listed, key=lambda line: (-round(line.decades, 2), line.median_factor))
+    return sorted(
+        listed, key=lambda line: (-round(line.decades, 2), line.median_factor)
+    )
 
 
 def best(listed: Sequence[Line]) -> list[Line]:

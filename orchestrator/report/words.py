@@ -51,12 +51,19 @@ def text(results: Results, guests: Sequence[Guest] = ()) -> str:
     except KeyError as error:
         what = f"its tables lack {error}: another version of this program wrote them"
         remedy = "`orchestrator study` of the same file runs it again"
-        raise OrchestratorError(what, where=str(results.cases.parent), remedy=remedy) from None
-    lines = [*(guest.said for guest in guests), *said] or ["No case has given a result yet."]
+        raise OrchestratorError(
+            what, where=str(results.cases.parent), remedy=remedy
+        ) from None
+    lines = [*(guest.said for guest in guests), *said] or [
+        "No case has given a result yet."
+    ]
     if table is not None:
         rows = [[str(name) for name in table], *table.to_numpy(str).tolist()]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        lines += ["", *("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)]
+        lines += [
+            "",
+            *("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows),
+        ]
     return "\n".join([*lines, *[""] * bool(warned), *warned])
 
 
@@ -70,7 +77,9 @@ def answer(results: Results) -> Answer:
     if len(best) > theory.MANY:
         return Answer(theory.nearest(results), theory.sheet(best))
     table = short(results) if (mixed := sizes(results)) is None else mixed
-    return Answer(_grains(results) if results.at_fraction.empty else _piles(results), table)
+    return Answer(
+        _grains(results) if results.at_fraction.empty else _piles(results), table
+    )
 
 
 def _piles(results: Results) -> list[str]:
@@ -78,7 +87,9 @@ def _piles(results: Results) -> list[str]:
     hills, rows = list(_hills(results)), results.exemplars
     if hills and not results.joined("pile_threshold")["usable"].any():
         return hills
-    telling = labels.varying(results.joined("pile_threshold"), "alpha_deg", "d_m", "fraction")
+    telling = labels.varying(
+        results.joined("pile_threshold"), "alpha_deg", "d_m", "fraction"
+    )
     firsts = rows.drop_duplicates("rho_f_kg_m3")
     return [*hills, *(_pile(row, results, telling[:3]) for _, row in firsts.iterrows())]
 
@@ -89,8 +100,13 @@ def _pile(row: pd.Series, results: Results, telling: Sequence[str]) -> str:
     x, z = line.crest
     told = labels.told(row, ["alpha_deg", "d_m", *telling])
     facts = {"name": ", ".join(told if z > 0 else ["Level bed", *told[1:]])}
-    if row["first_ustar0_m_s"] > 0 and z > 0:  # a level bed has no place that goes first
-        facts |= {"x": labels.amount(row["first_x_m"], "m"), "crest": labels.amount(float(x), "m")}
+    if (
+        row["first_ustar0_m_s"] > 0 and z > 0
+    ):  # a level bed has no place that goes first
+        facts |= {
+            "x": labels.amount(row["first_x_m"], "m"),
+            "crest": labels.amount(float(x), "m"),
+        }
         facts["top"] = "obstacle" if any(a <= x <= b for a, b in line.bare) else "bed"
         facts |= {"first": flow_at(row, row["first_ustar0_m_s"])}
     flow = flow_at(row, row["ustar0_m_s"])
@@ -102,12 +118,21 @@ def _grains(results: Results) -> list[str]:
     if (grains := _single(results)).empty:
         return []
     here = grains[grains["alpha_deg"] == grains["alpha_deg"].min()]
-    here = (here[valid(here)] if valid(here).any() else here).sort_values("d_m", kind="stable")
+    here = (here[valid(here)] if valid(here).any() else here).sort_values(
+        "d_m", kind="stable"
+    )
     rows = [here.iloc[at] for at in sorted({0, len(here) - 1})]
     said = []
     for row in rows:
-        size, slope = (labels.value(column, row[column]) for column in ("d_m", "alpha_deg"))
-        facts = {"row": row, "size": size, "slope": slope, "flow": flow_at(row, row["ustar0_m_s"])}
+        size, slope = (
+            labels.value(column, row[column]) for column in ("d_m", "alpha_deg")
+        )
+        facts = {
+            "row": row,
+            "size": size,
+            "slope": slope,
+            "flow": flow_at(row, row["ustar0_m_s"]),
+        }
         said.append(f"{caption('one_grain', **facts)} {_measured(row)}")
     return said
 
@@ -135,7 +160,9 @@ def flow_at(row: pd.Series, ustar: float) -> str:
         depth=depth,
         closed=row["flow_top"] == "closed channel",
     )
-    told = [f"{label} {speeds[c]:#.3g} m/s" for c, label in SPEEDS.items() if speeds[c] > 0]
+    told = [
+        f"{label} {speeds[c]:#.3g} m/s" for c, label in SPEEDS.items() if speeds[c] > 0
+    ]
     told += [f"depth {depth:g} m"] * (depth > 0)
     return f"u*₀ = {ustar:#.3g} m/s" + f" ({', '.join(told)})" * bool(told)
 
@@ -159,8 +186,12 @@ def doubts(results: Results) -> list[str]:
     said = [f"Usable: {usable} of {count} thresholds."] if usable < count else []
     for question in results.study.questions:
         said.append(question if question.endswith("?") else f"{question}.")
-    if PAPER in zip(results.scenes["rho_f_kg_m3"], results.scenes["nu_m2_s"], strict=True):
-        said.append("The fluid is the paper's, 1 kg/m³, 1e-5 m²/s; real air: fluid.kind = 'air'.")
+    if PAPER in zip(
+        results.scenes["rho_f_kg_m3"], results.scenes["nu_m2_s"], strict=True
+    ):
+        said.append(
+            "The fluid is the paper's, 1 kg/m³, 1e-5 m²/s; real air: fluid.kind = 'air'."
+        )
     if piles.empty:
         return said
     beyond = piles[piles["frozen_bed"] > FROZEN_BED]
@@ -168,17 +199,28 @@ def doubts(results: Results) -> list[str]:
         said.append(caption("frozen", beyond=beyond, count=count, limit=FROZEN_BED))
     chosen = [each for each in results.plan.decisions.values() if each.is_chosen]
     if chosen and results.study.tolerance is None:
-        names = ", ".join(dict.fromkeys(item.levels.text for item in chosen if item.levels))
-        error, floor = max(item.known.total for item in chosen), min(fidelity.floors().values())
+        names = ", ".join(
+            dict.fromkeys(item.levels.text for item in chosen if item.levels)
+        )
+        error, floor = (
+            max(item.known.total for item in chosen),
+            min(fidelity.floors().values()),
+        )
         said.append(caption("defaults", names=names, error=error, floor=floor))
     if "check" in results.tables:
         said.append(caption("checked", checks=results.tables["check"]))
-    rows, tolerance = piles.dropna(subset=["shields", "shields_model_low"]), results.study.tolerance
+    rows, tolerance = (
+        piles.dropna(subset=["shields", "shields_model_low"]),
+        results.study.tolerance,
+    )
     if tolerance and len(rows):
         low = 1 - rows["shields_model_low"] / rows["shields"]
         high = rows["shields_model_high"] / rows["shields"] - 1
         if tolerance < float(((low + high) / 2).min()):
-            facts = {"ends": (low.max(), high.max()), "share": rows["model_share"].mode().iloc[0]}
+            facts = {
+                "ends": (low.max(), high.max()),
+                "share": rows["model_share"].mode().iloc[0],
+            }
             said.append(caption("tolerance", tolerance=tolerance, **facts))
     return said
 
@@ -196,7 +238,9 @@ def short(results: Results) -> pd.DataFrame | None:
     keys = [*EACH, *labels.varying(here, *EACH), *by]
     choices = [(here, keys, at), (here, [*RANGES, *by], at)]
     choices = choices if by else [(every, [*keys, "fraction"], tau), *choices]
-    fit = (each for each in choices if len(each[0][[*each[1]]].drop_duplicates()) <= FEW)
+    fit = (
+        each for each in choices if len(each[0][[*each[1]]].drop_duplicates()) <= FEW
+    )
     return _thresholds(*next(fit, choices[-1]))
 
 
@@ -212,7 +256,9 @@ def sizes(results: Results) -> pd.DataFrame | None:
     stress = rows[["hiding", "hiding_wilcock_crowe"]].mul(size, axis=0)
     rows = rows.assign(size=1e3 * size * rows["d_m"], **stress)
     rows = _open_ended(rows, "shields_own_low", "shields_own_high")
-    groups = rows.groupby([*(rows[key] for key in keys), number], dropna=False, sort=False)
+    groups = rows.groupby(
+        [*(rows[key] for key in keys), number], dropna=False, sort=False
+    )
     low, high = groups.min(numeric_only=True), groups.max(numeric_only=True)
     spans = {
         f"u*₀ at n/N = {fraction:.0%}, m/s": ["ustar0_m_s"],
@@ -224,7 +270,9 @@ def sizes(results: Results) -> pd.DataFrame | None:
     told = pd.DataFrame(labels.cells(groups.first()[[]].reset_index(), keys))
     moved = [
         labels.interval(100 * least, 100 * most, ".0f")
-        for least, most in zip(low["class_moved_low"], high["class_moved_high"], strict=True)
+        for least, most in zip(
+            low["class_moved_low"], high["class_moved_high"], strict=True
+        )
     ]
     table = {
         **told.mask(told.eq(told.shift()).all(axis=1), ""),  # a bed is named once
@@ -232,7 +280,9 @@ def sizes(results: Results) -> pd.DataFrame | None:
         **_spans(low, high, spans),
         "part that had moved, %": moved,
     }
-    counts = zip(_ranges(low["count"], high["count"], "g"), groups["few"].any(), strict=True)
+    counts = zip(
+        _ranges(low["count"], high["count"], "g"), groups["few"].any(), strict=True
+    )
     grains = [f"{n}: under ten" if few else n for n, few in counts]
     return pd.DataFrame({**table, "exposed grains of a bed": grains})
 
@@ -253,7 +303,10 @@ def piles(results: Results) -> pd.DataFrame | None:
     rows = results.joined("pile_threshold")
     if rows.empty:
         return None
-    keys, seeds = [*EACH, "z0_over_d", "nu_m2_s"], ["seed"] * (rows["seed"].nunique() > 1)
+    keys, seeds = (
+        [*EACH, "z0_over_d", "nu_m2_s"],
+        ["seed"] * (rows["seed"].nunique() > 1),
+    )
     keys += [*labels.varying(rows, *keys, "fraction"), *seeds, "fraction"]
     return _thresholds(rows, keys, more=("case", "count"))
 
@@ -265,9 +318,13 @@ def _single(results: Results) -> pd.DataFrame:
         return rows
     dem, ends = rows["answered_method"] == "dem", ("", "_low", "_high")
     exact = rows["shields_closed_form"]
-    values = {f"shields{end}": rows[f"shields_dem{end}"].where(dem, exact) for end in ends}
+    values = {
+        f"shields{end}": rows[f"shields_dem{end}"].where(dem, exact) for end in ends
+    }
     ustar = rows["ustar_m_s"].where(dem, rows["ustar_closed_form_m_s"])
-    rows = rows.assign(reynolds=rows["reynolds"].where(dem, rows["reynolds_closed_form"]))
+    rows = rows.assign(
+        reynolds=rows["reynolds"].where(dem, rows["reynolds_closed_form"])
+    )
     values |= {"ustar0_m_s": ustar, "by": dem.map({True: "DEM", False: "closed form"})}
     return pd.concat([rows, pd.DataFrame(values)], axis=1)
 
@@ -278,7 +335,10 @@ def _thresholds(
     """A row for all thresholds that agree in some columns, with the range of the usable ones."""
     ranges = "d_m" not in keys
     if ranges:  # fluids are never merged
-        keys = [*(name for name in ("rho_f_kg_m3", "nu_m2_s") if rows[name].nunique() > 1), *keys]
+        keys = [
+            *(name for name in ("rho_f_kg_m3", "nu_m2_s") if rows[name].nunique() > 1),
+            *keys,
+        ]
     rows = rows.sort_values(keys if ranges else ["alpha_deg", "d_m"], kind="stable")
     rows = _open_ended(rows, "shields_low", "shields_high")
     number = rows.groupby(list(keys), dropna=False, sort=False).ngroup()
@@ -296,7 +356,12 @@ def _thresholds(
     spans |= {"interval": ["shields_low", "shields_high"]}
     if "shields_model_low" in known and not ranges:
         share = ", ".join(first["model_share"].dropna().unique())
-        spans |= {f"model's interval, most by {share}": ["shields_model_low", "shields_model_high"]}
+        spans |= {
+            f"model's interval, most by {share}": [
+                "shields_model_low",
+                "shields_model_high",
+            ]
+        }
     if "measured_low" in known:
         spans |= {"measured": ["measured_low", "measured_high"]}
     table |= _spans(low, high, spans)
@@ -306,7 +371,9 @@ def _thresholds(
         else "yes"
         if n
         else f"no: {why}"
-        for n, of, why in zip(usable.sum(), usable.size(), first["why_not"], strict=True)
+        for n, of, why in zip(
+            usable.sum(), usable.size(), first["why_not"], strict=True
+        )
     ]
     return pd.DataFrame(table)
 
@@ -330,14 +397,19 @@ def _spans(
 
 def _ranges(low: pd.Series, high: pd.Series, form: str = "#.3g") -> list[str]:
     """The range between each two values as a text, one number where they are written alike."""
-    pairs = ([format(float(end), form) for end in pair] for pair in zip(low, high, strict=True))
+    pairs = (
+        [format(float(end), form) for end in pair]
+        for pair in zip(low, high, strict=True)
+    )
     return ["—" if "nan" in pair else " … ".join(dict.fromkeys(pair)) for pair in pairs]
 
 
 def force_laws(results: Results) -> pd.DataFrame:
     """The force laws of the scenes: where each holds, and where it was taken from."""
     rows = []
-    for law in (LAWS[name] for name in LAWS if (results.scenes["force_law"] == name).any()):
+    for law in (
+        LAWS[name] for name in LAWS if (results.scenes["force_law"] == name).any()
+    ):
         low, high = law.reynolds
         holds = f"{low:g} ≤ Re* < {high:g}".replace("inf", "∞")
         if np.isfinite(law.drag_end):
@@ -355,14 +427,24 @@ def parameters(results: Results) -> pd.DataFrame:
         if asked or answered:
             words = filter(None, (item.info.label, item.info.symbol.replace("_0", "₀")))
             name, other = ", ".join(words), "" if answered == asked else answered
-            rows.append((name, item.info.unit, item.name or column, asked or "default", other))
-    head = ["parameter", "unit", "in a study file", "asked for", "answered with, if otherwise"]
+            rows.append(
+                (name, item.info.unit, item.name or column, asked or "default", other)
+            )
+    head = [
+        "parameter",
+        "unit",
+        "in a study file",
+        "asked for",
+        "answered with, if otherwise",
+    ]
     return pd.DataFrame(rows, columns=head)
 
 
 def _values(column: pd.Series) -> str:
     """The different values of a column, of many the ends."""
-    values = sorted(column.dropna().unique(), key=lambda value: (isinstance(value, str), value))
+    values = sorted(
+        column.dropna().unique(), key=lambda value: (isinstance(value, str), value)
+    )
     texts = list(dict.fromkeys(v if isinstance(v, str) else f"{v:.6g}" for v in values))
     return ", ".join(texts if len(texts) <= FEW else [*texts[:2], "…", texts[-1]])
 
@@ -370,12 +452,30 @@ def _values(column: pd.Series) -> str:
 def levels(results: Results) -> pd.DataFrame | None:
     """On which fidelity levels the piles were answered, why, and what is known of them."""
     rows, table = [], results.joined("pile_threshold")
-    about = {each.name: each.meaning for part in fidelity.LEVELS.values() for each in part}
+    about = {
+        each.name: each.meaning for part in fidelity.LEVELS.values() for each in part
+    }
     for (flow, grain, why), group in split(table, "flow_level", "grain_level", "why"):
-        meaning = "; ".join(about[name] for name in (str(flow), str(grain)) if name in about)
+        meaning = "; ".join(
+            about[name] for name in (str(flow), str(grain)) if name in about
+        )
         error = group["error_estimate"].max()
-        rows.append((f"{flow} | {grain}", meaning, why, group["scene_id"].nunique(), 100 * error))
-    head = ["flow | grains", "description", "reason", "beds", "known error of τ_c, at most, %"]
+        rows.append(
+            (
+                f"{flow} | {grain}",
+                meaning,
+                why,
+                group["scene_id"].nunique(),
+                100 * error,
+            )
+        )
+    head = [
+        "flow | grains",
+        "description",
+        "reason",
+        "beds",
+        "known error of τ_c, at most, %",
+    ]
     return pd.DataFrame(rows, columns=head) if rows else None
 
 
@@ -388,7 +488,11 @@ def remarks(results: Results) -> dict[str, Any]:
     curve = results.tables.get("pile_curve", pd.DataFrame()).reindex(columns=names)
     lost = curve.groupby("scene_id").max()
     return {
-        **{"outside": len(outside), "transition": both.sum(), "thresholds": len(thresholds)},
+        **{
+            "outside": len(outside),
+            "transition": both.sum(),
+            "thresholds": len(thresholds),
+        },
         "unreached": thresholds["shields"].isna().sum() if len(thresholds) else 0,
         **{name: ((lost[name] > 0).sum(), lost[name].max()) for name in names[1:]},
     }
@@ -410,8 +514,11 @@ def contents(results: Results, failures: Mapping[str, str]) -> dict[str, Any]:
         "failures": failures,
         "links": {n: quote(f"{root.name}/{n}/") for n in cases if (root / n).is_dir()},
         "paper_pair": results.scenes["force_law"].isin(theory.PAIR).any(),
-        "eq10": flows.eq10_over_wall(results, tuple(results.flows)) if results.flows else None,
+        "eq10": flows.eq10_over_wall(results, tuple(results.flows))
+        if results.flows
+        else None,
         "methods": set(results.scenes["answered_method"]),
         "mixed": any(scene.grain.sizes is not None for scene in scenes),
-        "strips": "answered_width" in results.scenes and results.scenes["answered_width"].any(),
+        "strips": "answered_width" in results.scenes
+        and results.scenes["answered_width"].any(),
     }

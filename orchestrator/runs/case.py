@@ -47,14 +47,18 @@ def template_files(name: str) -> tuple[tuple[str, int, bytes], ...]:
         ("/".join(parts), stat.S_IMODE(path.stat().st_mode), path.read_bytes())
         for path in sorted(path for path in root.rglob("*") if path.is_file())
         if (parts := path.relative_to(root).parts)
-        if not any(fnmatchcase(part, pattern) for part in parts for pattern in GENERATED)
+        if not any(
+            fnmatchcase(part, pattern) for part in parts for pattern in GENERATED
+        )
     )
 
 
 @cache
 def _template_digest(name: str) -> str:
     """One digest of every file of a template, names included."""
-    digests = {path: sha256(content).hexdigest() for path, _, content in template_files(name)}
+    digests = {
+        path: sha256(content).hexdigest() for path, _, content in template_files(name)
+    }
     return digest_text(canonical_json(digests))
 
 
@@ -166,7 +170,12 @@ def prepare(case: Case, cases: Path) -> Path:
     case.write(directory, cases)
     written = [path for path in directory.rglob("*") if path.is_file()]
     identity = {
-        **{"id": case.id, "kind": case.kind, "recipe": case.recipe, "template": case.template},
+        **{
+            "id": case.id,
+            "kind": case.kind,
+            "recipe": case.recipe,
+            "template": case.template,
+        },
         "template_sha256": _template_digest(case.template),
         "parameters": case.parameters,
         "needs": [need.name for need in case.needs],
@@ -229,7 +238,10 @@ def marker_of(directory: Path, identity: str) -> dict[str, Any] | None:
     about, state = read_json(directory / IDENTITY), read_json(directory / DONE)
     if not about.get("id") == state.get("id") == identity:
         return None
-    made, stamps = {**state["results_sha256"], **state["derived_sha256"]}, state["stamps"]
+    made, stamps = (
+        {**state["results_sha256"], **state["derived_sha256"]},
+        state["stamps"],
+    )
     digests = {**made, **state.get("others_sha256", {})}
     try:
         marked = (directory / DONE).stat().st_mtime_ns
@@ -275,8 +287,12 @@ def names_in(cases: Path) -> list[str]:
 
 def programs(cases: Path, names: Iterable[str]) -> dict[str, str]:
     """The programs, with versions, that some of the cases were made with."""
-    given = (read_json(cases / name / IDENTITY).get("programs", {}) for name in sorted(names))
-    return {program: version for versions in given for program, version in versions.items()}
+    given = (
+        read_json(cases / name / IDENTITY).get("programs", {}) for name in sorted(names)
+    )
+    return {
+        program: version for versions in given for program, version in versions.items()
+    }
 
 
 def _digests(directory: Path, names: Iterable[str]) -> dict[str, str]:
@@ -292,8 +308,14 @@ def _stamp(path: Path) -> tuple[int, int]:
 
 def _matching(directory: Path, patterns: Iterable[str]) -> list[str]:
     """Names of the files in a directory that fit a pattern; no link is followed."""
-    walked = (os.path.join(path, name) for path, _, names in os.walk(directory) for name in names)
-    paths = (path for path in walked if os.path.isfile(path) and not os.path.islink(path))
+    walked = (
+        os.path.join(path, name)
+        for path, _, names in os.walk(directory)
+        for name in names
+    )
+    paths = (
+        path for path in walked if os.path.isfile(path) and not os.path.islink(path)
+    )
     names = sorted(os.path.relpath(path, directory) for path in paths)
     return [name for name in names if _fits(name, patterns)]
 
@@ -302,4 +324,6 @@ def _fits(name: str, patterns: Iterable[str]) -> bool:
     """Whether each part of a path fits that of a pattern."""
     parts = name.split("/")
     split = (pattern.split("/") for pattern in patterns)
-    return any(len(each) == len(parts) and all(map(fnmatchcase, parts, each)) for each in split)
+    return any(
+        len(each) == len(parts) and all(map(fnmatchcase, parts, each)) for each in split
+    )

@@ -18,7 +18,13 @@ from orchestrator.errors import InputError, OrchestratorError, printable
 from orchestrator.runs import case as case_states
 from orchestrator.runs import files, process
 from orchestrator.runs.case import DONE, Case, failure, names_in
-from orchestrator.runs.files import RECORD, Folder, canonical_json, digest_text, read_json
+from orchestrator.runs.files import (
+    RECORD,
+    Folder,
+    canonical_json,
+    digest_text,
+    read_json,
+)
 
 LOCK = ".lock"
 
@@ -59,13 +65,21 @@ def claimed(root: Path, kind: Kind, name: str, *, new: bool = True) -> Iterator[
     except Timeout:
         holder = (root / LOCK).read_text(errors="replace").strip() or "another process"
         remedy = "wait for its end, or choose another directory with --out"
-        raise OrchestratorError(f"it is in use by {holder}", str(root), remedy) from None
+        raise OrchestratorError(
+            f"it is in use by {holder}", str(root), remedy
+        ) from None
     except OSError as error:
         what = f"the output directory cannot be used: {error.strerror or error}"
-        raise InputError(what, str(error.filename or root), "choose another one: --out") from None
+        raise InputError(
+            what, str(error.filename or root), "choose another one: --out"
+        ) from None
     try:
-        with contextlib.suppress(OSError):  # a full disk holds no note, but gives the lock
-            (root / LOCK).write_text(f"process {os.getpid()} on {socket.gethostname()}\n")
+        with contextlib.suppress(
+            OSError
+        ):  # a full disk holds no note, but gives the lock
+            (root / LOCK).write_text(
+                f"process {os.getpid()} on {socket.gethostname()}\n"
+            )
         _check(folder, kind, name)  # another process may have been first
         if new and not read_marker(root, kind):
             folder.note(kind.marker, files.text_of({"kind": kind.word, "name": name}))
@@ -107,7 +121,11 @@ class Workspace(Folder):
 
     def __init__(self, root: Path) -> None:
         super().__init__(root)
-        self.cases, self.page, self.drawn = root / "cases", root / "report.html", root / STATE
+        self.cases, self.page, self.drawn = (
+            root / "cases",
+            root / "report.html",
+            root / STATE,
+        )
 
     def is_held(self) -> bool:
         """Whether a running process holds the study; nothing is written."""
@@ -120,7 +138,12 @@ class Workspace(Folder):
 
     def describe(self, kind: Kind, name: str, cases: list[str], **about: Any) -> None:
         """Write which study this is, of which cases, and more about it; only the holder may."""
-        whose = {"orchestrator": __version__, "kind": kind.word, "name": name, "cases": cases}
+        whose = {
+            "orchestrator": __version__,
+            "kind": kind.word,
+            "name": name,
+            "cases": cases,
+        }
         if read_marker(self.root, kind) != (value := whose | about):
             self.note(kind.marker, files.text_of(value))
 
@@ -137,7 +160,9 @@ class Workspace(Folder):
     def drawn_of(self, ids: Mapping[str, str]) -> dict[str, Any]:
         """All that a page is made of: the question, the ids of the cases by name, code, files."""
         about = self.description()
-        question = digest_text(canonical_json([about.get("study"), about.get("tolerance")]))
+        question = digest_text(
+            canonical_json([about.get("study"), about.get("tolerance")])
+        )
         made_of = {"question": question, "cases": dict(ids), "code": _code_digest()}
         return {**made_of, "sha256": self.written()}
 
@@ -154,7 +179,11 @@ class Workspace(Folder):
     def check_cases_of_tables(self, done: Container[str]) -> None:
         """Refuse (OrchestratorError) to replace tables whose cases are not all done."""
         table = self.root / "timings" / "timings.csv"
-        text = table.read_text(encoding="utf-8", errors="replace") if table.is_file() else ""
+        text = (
+            table.read_text(encoding="utf-8", errors="replace")
+            if table.is_file()
+            else ""
+        )
         names = [row.get("case", "") for row in csv.DictReader(text.splitlines())]
         if lost := [name for name in names if name not in done]:
             share = f"{len(lost)} of the {len(names)} cases that they were made of"
@@ -169,8 +198,12 @@ def _code_digest() -> str:
     digests = {}
     for root in (case_states.PACKAGE, case_states.templates()):
         for folder, _, names in os.walk(root):
-            for path in (Path(folder, name) for name in names if not name.endswith(".pyc")):
-                digests[f"{root.name}/{path.relative_to(root)}"] = files.digest_file(path)
+            for path in (
+                Path(folder, name) for name in names if not name.endswith(".pyc")
+            ):
+                digests[f"{root.name}/{path.relative_to(root)}"] = files.digest_file(
+                    path
+                )
     return digest_text(canonical_json(digests))
 
 
@@ -181,7 +214,9 @@ def files_of(root: Path) -> list[str]:
     return [*digests] if isinstance(digests, dict) else []
 
 
-def finished(root: Path, name: str, source: Mapping[str, object]) -> tuple[str, Path] | None:
+def finished(
+    root: Path, name: str, source: Mapping[str, object]
+) -> tuple[str, Path] | None:
     """The answer and the page of a study that is finished and has not changed.
 
     The study file is not read as a study, so no library of numbers is imported: it is told
@@ -225,7 +260,9 @@ def status(directory: Path) -> tuple[str, bool]:
     about, is_running = space.description(), space.is_held()
     begun = [name for name in about["cases"] if (space.cases / name).is_dir()]
     undone = [name for name in begun if not read_json(space.cases / name / DONE)]
-    causes = {name: cause for name in undone if (cause := failure(space.cases / name)[1])}
+    causes = {
+        name: cause for name in undone if (cause := failure(space.cases / name)[1])
+    }
     word, (sizes, *left) = "running" if is_running else "unfinished", _sizes(space)
     lines = [
         f"study {about['name']}: {len(begun) - len(undone)} done, "
@@ -273,7 +310,9 @@ def _sizes(space: Workspace) -> list[str]:
         kinds[f"{name.partition('-')[0]} cases"] += count
     beside = (path for path in space.root.iterdir() if path != space.cases)
     kinds["tables, figures and page"] = sum(map(files.size_of, beside))
-    named = ", ".join(f"{decimal(count)} {kind}" for kind, count in kinds.most_common() if count)
+    named = ", ".join(
+        f"{decimal(count)} {kind}" for kind, count in kinds.most_common() if count
+    )
     lines = [f"{decimal(kinds.total())} ({named})"]
     if left := space.left(space.description()["cases"]):
         total, names = decimal(sum(cases[name] for name in left)), ", ".join(left[:5])

@@ -26,7 +26,12 @@ from orchestrator.study.scene import CELLS_OVER_Z0, Scene
 def single_grain(scene: Scene) -> SingleGrain:
     """The grain of a scene; its entrainment angle is that of the pocket that it lies in."""
     grain, bed, fluid = scene.grain, scene.bed, scene.fluid
-    flow = (bed.roughness, fluid.density, fluid.viscosity, scene.forces.lift_coefficient)
+    flow = (
+        bed.roughness,
+        fluid.density,
+        fluid.viscosity,
+        scene.forces.lift_coefficient,
+    )
     pivot = (grain.density, bed.slope_deg, scene.pocket_angle_deg, fluid.gravity)
     # at a contact of two sizes the pull is that of their harmonic mean
     cohesion = grain.cohesion * 2 / (1 + bed.relative_size)
@@ -43,7 +48,10 @@ def closed_form(scene: Scene, name: str | None = None) -> Threshold:
     if scene.gust == 1:
         return at
     root = scene.gust**0.5
-    mean = {"friction_velocity": at.friction_velocity / root, "reynolds": at.reynolds / root}
+    mean = {
+        "friction_velocity": at.friction_velocity / root,
+        "reynolds": at.reynolds / root,
+    }
     return replace(at, **mean, shields=at.shields / scene.gust)
 
 
@@ -57,12 +65,16 @@ def outer_roughness(scene: Scene) -> float | None:
     z0, ustar = scene.bed.roughness, closed_form(scene).friction_velocity
     outer = float(velocity.outer_roughness(z0, ustar, scene.fluid.viscosity))
     outer = min(float(f"{outer:.3g}"), scene.first_cell_height / CELLS_OVER_Z0)
-    return outer if outer > z0 and scene.forces.law not in LAWS_OF["transition"] else None
+    return (
+        outer if outer > z0 and scene.forces.law not in LAWS_OF["transition"] else None
+    )
 
 
 def regime_of(scene: Scene) -> Regime:
     """Which of Eqs. 2 and 4 holds at the single-grain threshold of a scene."""
-    return cast(Regime, str(regime(closed_form(scene, "low"), closed_form(scene, "high"))))
+    return cast(
+        Regime, str(regime(closed_form(scene, "low"), closed_form(scene, "high")))
+    )
 
 
 def law_holds(scene: Scene) -> bool:

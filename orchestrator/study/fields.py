@@ -54,13 +54,18 @@ def plain(value: Any) -> Any:
     """A value as a cell of a table: words and numbers stay, all else becomes a text."""
     if isinstance(value, tuple):
         # a class of a sieve table: diameter and part of the mass
-        classes = (f"{1e3 * e[0]:g} mm {100 * e[1]:g} %" if type(e) is tuple else e for e in value)
+        classes = (
+            f"{1e3 * e[0]:g} mm {100 * e[1]:g} %" if type(e) is tuple else e
+            for e in value
+        )
         return "; ".join(map(str, classes)) or None
     return str(value) if isinstance(value, Profile | LogNormal | Gusts) else value
 
 
 def _of_piles(condition: Callable[[Scene, PileBed], Any]) -> Callable[[Scene], bool]:
-    return lambda scene: isinstance(scene.bed, PileBed) and bool(condition(scene, scene.bed))
+    return lambda scene: (
+        isinstance(scene.bed, PileBed) and bool(condition(scene, scene.bed))
+    )
 
 
 RANDOM = ("disordered", "poured")
@@ -74,12 +79,16 @@ APPLIES: Mapping[str, Callable[[Scene], bool]] = {
     "profiles": _of_piles(lambda scene, bed: bed.profile),
     "disordered piles": _of_piles(lambda scene, bed: bed.packing == "disordered"),
     "poured beds": lambda scene: scene.is_poured,
-    "random beds and replicas": _of_piles(lambda _, bed: bed.packing in RANDOM or bed.is_replica),
+    "random beds and replicas": _of_piles(
+        lambda _, bed: bed.packing in RANDOM or bed.is_replica
+    ),
     "solved flows": _of_piles(lambda scene, bed: scene.flow.model == "solve"),
     "DEM": lambda scene: scene.protocol.method in MAYBE_DEM,
     "DEM of piles": _of_piles(lambda scene, bed: scene.protocol.method in MAYBE_DEM),
     "DEM and peeling": lambda scene: scene.protocol.method not in CLOSED,
-    "DEM and peeling of piles": _of_piles(lambda scene, bed: scene.protocol.method not in CLOSED),
+    "DEM and peeling of piles": _of_piles(
+        lambda scene, bed: scene.protocol.method not in CLOSED
+    ),
 }
 """The scenes on which a field has an effect, by the `scope` of its `Info`."""
 
@@ -89,8 +98,13 @@ def _quantity(part: str, name: str, declared: FieldInfo) -> Quantity:
     text, *words = (declared.description or "").split("\n- ")
     choices = info.choices or dict(word.split(": ", 1) for word in words)
     label = info.label or name.removesuffix("_deg").replace("_", " ")
-    info, read = replace(info, label=label, choices=choices), attrgetter(f"{part}.{name}")
-    return Quantity(f"{part}.{name}", info.column or name, info, " ".join(text.split()), read)
+    info, read = (
+        replace(info, label=label, choices=choices),
+        attrgetter(f"{part}.{name}"),
+    )
+    return Quantity(
+        f"{part}.{name}", info.column or name, info, " ".join(text.split()), read
+    )
 
 
 FIELDS: tuple[Quantity, ...] = tuple(
@@ -103,7 +117,13 @@ _REGIME = "forces that are valid at the threshold of a single grain of the scene
 _RATIO, _Z0 = "roughness length over diameter", Info("roughness length", "z_0", "d")
 DERIVED = (
     # rounded: d/30 over d is not 1/30 to the last digit, and figures group by it
-    Quantity("", "z0_over_d", _Z0, _RATIO, lambda s: round(s.bed.roughness / s.grain.diameter, 9)),
+    Quantity(
+        "",
+        "z0_over_d",
+        _Z0,
+        _RATIO,
+        lambda s: round(s.bed.roughness / s.grain.diameter, 9),
+    ),
     Quantity("", "regime", Info("regime"), _REGIME, regime_of),
 )
 COLUMNS: Mapping[str, Quantity] = {
@@ -111,10 +131,16 @@ COLUMNS: Mapping[str, Quantity] = {
 }
 """By the columns of a table: what a scene asks for."""
 ANSWERS: Mapping[str, Quantity] = {
-    f"{ANSWERED}{column}": each for column, each in COLUMNS.items() if each.info.about == "answer"
+    f"{ANSWERED}{column}": each
+    for column, each in COLUMNS.items()
+    if each.info.about == "answer"
 }
 """By the columns of a table: how a scene was answered."""
-FOLLOW = ("z0_m", "regime", *(column for column, each in ANSWERS.items() if each.info.read))
+FOLLOW = (
+    "z0_m",
+    "regime",
+    *(column for column, each in ANSWERS.items() if each.info.read),
+)
 """Columns that follow from others: of the two roughness lengths, the ratio to the diameter tells
 beds apart that are alike but for the size of their grains."""
 

@@ -16,7 +16,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 import numpy as np
 import pydantic
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict, Field, InstanceOf, PlainSerializer, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    InstanceOf,
+    PlainSerializer,
+    model_validator,
+)
 from pydantic.fields import FieldInfo
 
 from orchestrator.digits import rounded
@@ -42,11 +49,21 @@ else:
 List = Field(strict=False)  # beside a type of tuples: a list of TOML is taken as one
 Range = Annotated[tuple[float, float], List]
 Fraction = Annotated[float, Field(ge=1e-6, le=1)]
-File = Annotated[InstanceOf[Profile], PlainSerializer(lambda profile: profile and profile.digest)]
-Roughness = Annotated[float, Field(ge=1e-12, le=10)]  # from smooth walls to the largest boulder
-Height = Annotated[float, Field(ge=1e-6, le=1e4)]  # from five of the smallest grains to mountains
-Length = Annotated[float, Field(ge=1e-12, le=1e4)]  # the least that the fields above allow
-Viscosity = Annotated[float, Field(ge=1e-8, le=1e3)]  # liquid helium, 2e-8, to thin gases and lava
+File = Annotated[
+    InstanceOf[Profile], PlainSerializer(lambda profile: profile and profile.digest)
+]
+Roughness = Annotated[
+    float, Field(ge=1e-12, le=10)
+]  # from smooth walls to the largest boulder
+Height = Annotated[
+    float, Field(ge=1e-6, le=1e4)
+]  # from five of the smallest grains to mountains
+Length = Annotated[
+    float, Field(ge=1e-12, le=1e4)
+]  # the least that the fields above allow
+Viscosity = Annotated[
+    float, Field(ge=1e-8, le=1e3)
+]  # liquid helium, 2e-8, to thin gases and lava
 
 
 class UnfitError(ValueError):
@@ -64,11 +81,17 @@ class Info:
     label: str = ""
     symbol: str = ""  # as formulas write it, an index after an underscore
     unit: str = ""
-    column: str = ""  # of tables, with the unit, where that is not its name; "-" for none
-    scope: str = "every scene"  # the scenes on which it has an effect, a key of `fields.APPLIES`
+    column: str = (
+        ""  # of tables, with the unit, where that is not its name; "-" for none
+    )
+    scope: str = (
+        "every scene"  # the scenes on which it has an effect, a key of `fields.APPLIES`
+    )
     about: Literal["question", "answer", "replica"] = "question"
     """A question to nature, a way to answer it (levels change these), or one of many alike."""
-    choices: Mapping[str, str] = dataclasses.field(default_factory=dict)  # meanings of words
+    choices: Mapping[str, str] = dataclasses.field(
+        default_factory=dict
+    )  # meanings of words
     read: str = ""  # property of a scene with the value in use, where the field may be left open
 
 
@@ -78,8 +101,12 @@ def field(default: Any = ..., *words: str, since: bool = False, **settings: Any)
     `settings` are further words of `Info`, and rules of `pydantic.Field` such as ``ge``. A field
     that came after the first studies is `since`: scenes that have its default keep their id.
     """
-    about = {name: settings.pop(name) for name in Info.__annotations__ if name in settings}
-    about |= dict(zip(("symbol", "unit", "column", "label", "read"), words, strict=False))
+    about = {
+        name: settings.pop(name) for name in Info.__annotations__ if name in settings
+    }
+    about |= dict(
+        zip(("symbol", "unit", "column", "label", "read"), words, strict=False)
+    )
     if since:
         settings["exclude_if"] = lambda value: value == default
     declared: FieldInfo = Field(default, **settings)
@@ -91,13 +118,19 @@ class Part(BaseModel):
     """Base of a scene's parts: immutable, exact types, no unknown keys, no NaN."""
 
     model_config = ConfigDict(
-        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True
+        frozen=True,
+        extra="forbid",
+        strict=True,
+        allow_inf_nan=False,
+        use_attribute_docstrings=True,
     )
 
     @model_validator(mode="after")
     def _without_minus_zero(self) -> Self:
         """Make one number of 0.0 and -0.0, which are equal: else they are two scenes."""
-        vars(self).update({n: 0.0 for n, v in vars(self).items() if type(v) is float and not v})
+        vars(self).update(
+            {n: 0.0 for n, v in vars(self).items() if type(v) is float and not v}
+        )
         return self
 
 
@@ -135,7 +168,9 @@ _Number = Annotated[float, Field(gt=0, lt=100)]
 _Rows = tuple[Annotated[tuple[_Number, _Number], List], ...]
 Sieve = Annotated[_Rows, Field(min_length=1), List, pydantic.Tag("rows")]
 """Classes of a sieve table: diameter, m, rising, and fraction of the mass."""
-_kind = pydantic.Discriminator(lambda value: "rows" if isinstance(value, list | tuple) else "")
+_kind = pydantic.Discriminator(
+    lambda value: "rows" if isinstance(value, list | tuple) else ""
+)
 Sizes = Annotated[Annotated[LogNormal, pydantic.Tag("")] | Sieve, _kind]
 """In a study file ``[[5e-4, 0.4], [1e-3, 0.6]]``, or ``{ sigma_g = 1.3 }``."""
 _pile = partial(field, scope="piles")
@@ -153,7 +188,9 @@ class Fluid(Part):
     """
 
     # from the vapour that ripples a comet to mercury, 13,500, and melts of metals
-    density: float = field(1.0, "ρ_f", "kg/m³", "rho_f_kg_m3", "fluid density", ge=1e-7, le=2e4)
+    density: float = field(
+        1.0, "ρ_f", "kg/m³", "rho_f_kg_m3", "fluid density", ge=1e-7, le=2e4
+    )
     """density of the fluid"""
     viscosity: Viscosity = field(1e-5, "ν", "m²/s", "nu_m2_s")
     """kinematic viscosity that the grains feel"""
@@ -192,9 +229,13 @@ class Grain(Part):
 class Forces(Part):
     """How the grains feel the flow."""
 
-    law: LawName = field("auto", label="force law", column="force_law", choices=LAW_LABELS)
+    law: LawName = field(
+        "auto", label="force law", column="force_law", choices=LAW_LABELS
+    )
     """drag and lift on an exposed grain"""
-    lift_coefficient: float = field(LIFT_COEFFICIENT, "α_s", "", "alpha_s", ge=0, le=100)
+    lift_coefficient: float = field(
+        LIFT_COEFFICIENT, "α_s", "", "alpha_s", ge=0, le=100
+    )
     """lift coefficient"""
     stress: Literal["wall", "eq10"] = _pile("wall")
     """stress on the bed: at the wall, or at the first cell
@@ -236,7 +277,9 @@ class Protocol(Part):
     """relative rise of u* from one load step to the next"""
     waiting_time: float = _dem(10.0, unit="√(d/g′)", ge=1, le=1e4)
     """time without a passage of the displacement criterion that ends a load step without rest"""
-    displacement_criterion: float = _dem(0.3, "", "d", scope="DEM and peeling", ge=1e-3, le=0.5)
+    displacement_criterion: float = _dem(
+        0.3, "", "d", scope="DEM and peeling", ge=1e-3, le=0.5
+    )
     """displacement along the bed from which a grain counts as moved"""
     final_fraction: Fraction = _dem(
         0.9, label="last fraction", scope="DEM of piles", read="last_fraction"
@@ -250,7 +293,13 @@ class Protocol(Part):
     time_step: float = _dem(0.2, unit="√(m/K)", ge=1e-3, le=2)
     """time step of the grains' integration"""
     update: Annotated[float, Field(ge=0, le=0.5)] = field(
-        0.0, "", "of N", "", "update of the bed", scope="DEM and peeling of piles", since=True
+        0.0,
+        "",
+        "of N",
+        "",
+        "update of the bed",
+        scope="DEM and peeling of piles",
+        since=True,
     )
     """part of the counted grains after which the flow is solved over the bed line of the remaining
     ones, up to the last fraction; 0 keeps the first flow, as in the paper"""
@@ -263,7 +312,9 @@ class Gusts(Part):
     """standard deviation of the stress over its mean"""
     events: Annotated[int, Field(ge=2, le=10**9)]
     """how many independent events there are while the bed is watched"""
-    duration: Annotated[float, Field(ge=0.05, le=1e4, exclude_if=lambda value: value == 1.0)] = 1.0
+    duration: Annotated[
+        float, Field(ge=0.05, le=1e4, exclude_if=lambda value: value == 1.0)
+    ] = 1.0
     """how long each lasts, √(d/g′); by default as an eddy of 3 d takes to pass in water"""
 
     def __str__(self) -> str:
@@ -273,7 +324,9 @@ class Gusts(Part):
 class Flow(Part):
     """The flow over the bed, and how a grain feels it."""
 
-    model: Literal["solve", "waves", "flat"] = _answer("solve", "", "", "flow_model", "flow model")
+    model: Literal["solve", "waves", "flat"] = _answer(
+        "solve", "", "", "flow_model", "flow model"
+    )
     """where the stress on a pile comes from
     - solve: OpenFOAM
     - waves: linear theory with A and B of each wavelength (Fourrière et al. 2010)
@@ -298,7 +351,12 @@ class Flow(Part):
     """ratio of neighbouring cells up from the bed and away from the pile, for 40 cells along a
     face"""
     roughness: Roughness | None = _answer(
-        None, "z_0", "m", "solve_z0_m", "roughness length of the solve", "solve_roughness"
+        None,
+        "z_0",
+        "m",
+        "solve_z0_m",
+        "roughness length of the solve",
+        "solve_roughness",
     )
     """roughness length at which the flow is solved, which similar beds can share; by default the
     bed's"""
@@ -308,7 +366,9 @@ class Flow(Part):
     - RNGkEpsilon: RNG k-ε
     - realizableKE: realizable k-ε
     - kOmegaSST: k-ω SST"""
-    convection_scheme: Literal["linearUpwind", "upwind", "limitedLinear"] = _solved("linearUpwind")
+    convection_scheme: Literal["linearUpwind", "upwind", "limitedLinear"] = _solved(
+        "linearUpwind"
+    )
     """OpenFOAM's scheme for the convection of U"""
     gusts: Gusts | None = field(None, since=True)
     """peaks of the turbulent stress, { intensity = 0.4, events = 100, duration = 1 }: independent,
@@ -326,13 +386,17 @@ class Flow(Part):
     and obstacles, over a level bed three of the largest grains"""
     lid: float = _solved(100.0, unit="h", since=True, ge=3, le=1000)
     """height of a boundary layer's lid above the flat bed, in undisturbed flow"""
-    upstream: float = _solved(80.0, "", "h", "", "flat bed upstream", since=True, ge=3, le=1000)
+    upstream: float = _solved(
+        80.0, "", "h", "", "flat bed upstream", since=True, ge=3, le=1000
+    )
     """flat bed from the inlet to the forms"""
     downstream: float = _solved(
         100.0, "", "h", "", "flat bed downstream", since=True, ge=3, le=1000
     )
     """flat bed from the forms to the outlet"""
-    non_orthogonal_correctors: int = _solved(1, label="non-orthogonal correctors", ge=0, le=5)
+    non_orthogonal_correctors: int = _solved(
+        1, label="non-orthogonal correctors", ge=0, le=5
+    )
     """repeated solves of the pressure in each iteration"""
 
 
@@ -351,8 +415,12 @@ class Obstacle(Part):
     @property
     def reach(self) -> float:
         """From its middle to the foot of its sides on level bed, at most, m."""
-        sides = {"fence": 0.4, "block": 0.3, "half-cylinder": 1.1}[self.kind] * self.height
-        return sides + ((self.length or self.height) / 2 if self.kind == "block" else 0.0)
+        sides = {"fence": 0.4, "block": 0.3, "half-cylinder": 1.1}[
+            self.kind
+        ] * self.height
+        return sides + (
+            (self.length or self.height) / 2 if self.kind == "block" else 0.0
+        )
 
     def __str__(self) -> str:
         length = f", {self.length:g} m long" if self.length else ""
@@ -370,7 +438,9 @@ class Bed(Part):
     roughness: Roughness = field(..., "z_0", "m", "z0_m", "roughness length")
     """roughness length of the bed, or a part of the diameter of its grains, "d/30" """
     # a smaller grain falls through the pores of a bed, a larger one lies on many grains
-    relative_size: float = field(1.0, "D/d", scope="single grains", since=True, ge=0.1, le=10)
+    relative_size: float = field(
+        1.0, "D/d", scope="single grains", since=True, ge=0.1, le=10
+    )
     """diameter of a single grain over that of its two neighbours"""
 
 
@@ -390,7 +460,9 @@ class PileBed(Bed):
     height: Height = _pile(0.02, "h", "m", "h_m")
     """height of the forms; that of a profile follows. A flat bed has none: with obstacles lengths
     in h are heights of the tallest, without any they are of 20 diameters, whatever is given"""
-    shape: ShapeName = _pile("triangle", column="bed_shape", since=True, choices=SHAPE_MEANINGS)
+    shape: ShapeName = _pile(
+        "triangle", column="bed_shape", since=True, choices=SHAPE_MEANINGS
+    )
     """shape of a form, which `kind` may name too; `slope_deg` is that of its windward side, of a
     curve where it is steepest"""
     windward: Literal["straight", "curved"] = _dune("straight", label="windward side")
@@ -402,7 +474,9 @@ class PileBed(Bed):
     a step down"""
     brink_radius: float = _dune(0.0, "", "m", ge=0, le=1e3)
     """radius with which a dune's brink is rounded; 0 leaves it sharp"""
-    length: Length | None = field(None, "", "m", scope="beds with level parts", since=True)
+    length: Length | None = field(
+        None, "", "m", scope="beds with level parts", since=True
+    )
     """length of level bed with grains: a trapezoid's top, a flat bed, before or behind a step; by
     default 4 h, of a flat bed 80 diameters"""
     forms: int = _pile(1, since=True, ge=1, le=100)
@@ -435,10 +509,14 @@ class PileBed(Bed):
     """largest gap between two grains of the row under the four uppermost"""
     poured_depth: float = _poured(6.0, "", "d", "", "depth of the mould", ge=3, le=100)
     """vertical depth of a poured bed under the bed line, to a row of fixed grains"""
-    width: float = _poured(0.0, "", "d", "", "width of the strip", about="answer", ge=0, le=50)
+    width: float = _poured(
+        0.0, "", "d", "", "width of the strip", about="answer", ge=0, le=50
+    )
     """width of a strip of poured grains with periodic sides, at least 3 of the largest; 0 is one
     layer in the plane of the flow"""
-    seed: int = field(0, scope="random beds and replicas", about="replica", ge=0, le=10**9)
+    seed: int = field(
+        0, scope="random beds and replicas", about="replica", ge=0, le=10**9
+    )
     """which of the many random packings; of a lattice 0 is itself, any other a replica with grains
     up to 1e-6 d aside"""
     mobile_layers: int = _answer(2, ge=1, le=1000)
@@ -470,7 +548,9 @@ class PileBed(Bed):
         """Which exposed grains are counted."""
         if self.counted or not self.profile:
             return self.counted or self.form.counted
-        falls = -np.degrees(np.arctan(np.diff(self.profile.z) / np.diff(self.profile.x)).min())
+        falls = -np.degrees(
+            np.arctan(np.diff(self.profile.z) / np.diff(self.profile.x)).min()
+        )
         return "windward" if falls > 90 - self.entrainment_angle_deg + 1e-6 else "all"
 
     @property
@@ -491,8 +571,13 @@ class PileBed(Bed):
         faces = self.shape in ("triangle", "dune") and straight
         if not faces or self.forms > 1 or self.profile or self.counts != "windward":
             return False
-        base = sum(self.height / tan(radians(slope)) for slope in (self.slope_deg, self.lee_slope))
-        return not any(o.x + o.reach > 0 and o.x - o.reach < base for o in self.obstacles)
+        base = sum(
+            self.height / tan(radians(slope))
+            for slope in (self.slope_deg, self.lee_slope)
+        )
+        return not any(
+            o.x + o.reach > 0 and o.x - o.reach < base for o in self.obstacles
+        )
 
     @property
     def is_replica(self) -> bool:

@@ -21,7 +21,9 @@ from orchestrator.study.units import number
 from orchestrator.types import FloatArray
 
 LARGEST, LARGEST_NUMBER = 20 * 2**20, 1e5  # bytes of a file, and largest coordinate, m
-MOST_CORNERS = 3000  # most corners of a bed line, each of which is a grid line of the flow's mesh
+MOST_CORNERS = (
+    3000  # most corners of a bed line, each of which is a grid line of the flow's mesh
+)
 GAP, DENSE = 20.0, 20
 """A step along x this many times the middle one is a gap, in a profile of so many points."""
 STEEPEST_DEG = 60.0  # slope beyond which no mesh of vertical grid lines follows the bed
@@ -241,7 +243,9 @@ def _cell(row: Mapping[str | None, Any], name: str) -> float:
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
     if not abs(value) <= LARGEST_NUMBER:
-        raise ValueError(f"{name}: {text.strip()} is not a number up to {LARGEST_NUMBER:g}")
+        raise ValueError(
+            f"{name}: {text.strip()} is not a number up to {LARGEST_NUMBER:g}"
+        )
     return value
 
 
@@ -263,7 +267,11 @@ def read_profile(text: str, name: str, where: str, smoothing: float) -> Profile:
     if len(x) < 3:
         refuse(f"{len(x)} points make no bed", "write 3 at least")
     steps, length = np.diff(x), float(np.ptp(x))
-    back, widest, middle = int(np.argmin(steps > 0)), int(np.argmax(steps)), float(np.median(steps))
+    back, widest, middle = (
+        int(np.argmin(steps > 0)),
+        int(np.argmax(steps)),
+        float(np.median(steps)),
+    )
     if steps[back] <= 0:
         what = f"x does not rise to {x[back + 1]:g} m: unsorted, twice the same, or an overhang"
         refuse(what, "sort the lines by x, with one height for each place", back + 1)
@@ -273,22 +281,30 @@ def read_profile(text: str, name: str, where: str, smoothing: float) -> Profile:
     more = "raise bed.smoothing" if smoothing else "give bed.smoothing, a length in m"
     if smoothing > length / 4:
         refuse(
-            f"smoothing over {smoothing:g} m leaves nothing of {length:g} m", "lower bed.smoothing"
+            f"smoothing over {smoothing:g} m leaves nothing of {length:g} m",
+            "lower bed.smoothing",
         )
     count = length / smoothing * RESOLVED if smoothing else len(x)
     if count > MOST_CORNERS:
-        refuse(f"{count:.0f} points, more than the {MOST_CORNERS} that a mesh has", more)
+        refuse(
+            f"{count:.0f} points, more than the {MOST_CORNERS} that a mesh has", more
+        )
     if smoothing:
         x, z = _smoothed(x, z, smoothing, max(int(np.ceil(count)), DENSE))
     if np.ptp(z) == 0:
-        refuse("level: it has no height to measure by", 'ask for shape = "flat" with a height')
+        refuse(
+            "level: it has no height to measure by",
+            'ask for shape = "flat" with a height',
+        )
     slopes = np.degrees(np.arctan2(np.diff(z), np.diff(x)))
     steep = int(np.argmax(np.abs(slopes)))
     if abs(slopes[steep]) > STEEPEST_DEG:
         what = f"{slopes[steep]:.0f} deg at x = {x[steep]:g} m, above {STEEPEST_DEG:g}"
         refuse(what, f"{more}; check that x and z are both in m", steep + 1)
     # to nine digits of the length: means are known no better, and the name of a bed is its corners
-    xs, zs = (tuple(on_grid(values - values[0], np.ptp(x)).tolist()) for values in (x, z))
+    xs, zs = (
+        tuple(on_grid(values - values[0], np.ptp(x)).tolist()) for values in (x, z)
+    )
     corners = "\n".join(f"{a!r},{b!r}" for a, b in zip(xs, zs, strict=True))
     return Profile(name, xs, zs, text, digest_text(corners))
 
@@ -301,12 +317,16 @@ def _smoothed(
     around, heights = (
         np.concatenate([2 * v[0] - v[:0:-1], v, 2 * v[-1] - v[-2::-1]]) for v in (x, z)
     )
-    share = np.gradient(around)  # each point stands for the bed half-way to its neighbours
+    share = np.gradient(
+        around
+    )  # each point stands for the bed half-way to its neighbours
     places = np.linspace(x[0], x[-1], count + 1)
     first, last = np.searchsorted(around, [places - 2 * length, places + 2 * length])
     means = np.interp(places, x, z)
     for i, (low, high) in enumerate(zip(first, last, strict=True)):
-        weight = share[low:high] * np.exp(-2 * ((around[low:high] - places[i]) / length) ** 2)
+        weight = share[low:high] * np.exp(
+            -2 * ((around[low:high] - places[i]) / length) ** 2
+        )
         if high > low:
             means[i] = weight @ heights[low:high] / weight.sum()
     return places, means

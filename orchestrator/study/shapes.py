@@ -30,7 +30,9 @@ class Shape:
     name: str
     meaning: str
     corners: Callable[["PileBed"], FloatArray]  # of one form of a bed
-    fields: tuple[str, ...] = ()  # of the bed that not all shapes have, and this one has
+    fields: tuple[
+        str, ...
+    ] = ()  # of the bed that not all shapes have, and this one has
     label: str = ""  # in figures, where that is not the name
     rises: bool = True  # whether it has a windward side, whose slope is the bed's
     lee_slope_deg: float | None = None  # by default; None: that of the windward side
@@ -39,7 +41,9 @@ class Shape:
 
 def _faces(bed: "PileBed") -> FloatArray:
     """Two straight faces."""
-    up, down = (bed.height / tan(radians(slope)) for slope in (bed.slope_deg, bed.lee_slope))
+    up, down = (
+        bed.height / tan(radians(slope)) for slope in (bed.slope_deg, bed.lee_slope)
+    )
     return np.array([[0, 0], [up, bed.height], [up + down, 0]])
 
 
@@ -53,7 +57,9 @@ def _dune(bed: "PileBed") -> FloatArray:
     if bed.windward == "curved":
         t = np.linspace(0, 1, CHORDS + 1)
         face = bed.height / tan(radians(bed.slope_deg))
-        windward = np.column_stack([pi / 2 * face * t, bed.height / 2 * (1 - np.cos(pi * t))])
+        windward = np.column_stack(
+            [pi / 2 * face * t, bed.height / 2 * (1 - np.cos(pi * t))]
+        )
     else:
         windward = _faces(bed)[:2]
     slip = windward[-1] + [bed.height / tan(radians(bed.lee_slope)), -bed.height]
@@ -70,7 +76,9 @@ def _rounded(corners: FloatArray, radius: float) -> FloatArray:
     # the arc begins on the chord from which it can reach the slip face
     for first in range(brink - 1, -1, -1):
         start, direction = corners[first], rise[first]
-        ways = np.array([[cos(direction), -cos(behind)], [sin(direction), -sin(behind)]])
+        ways = np.array(
+            [[cos(direction), -cos(behind)], [sin(direction), -sin(behind)]]
+        )
         meet = start + np.linalg.solve(ways, corners[brink] - start)[0] * ways[:, 0]
         cut = radius * tan((direction - behind) / 2)
         if cut <= np.hypot(*(meet - start)):
@@ -82,7 +90,9 @@ def _rounded(corners: FloatArray, radius: float) -> FloatArray:
     arc = centre + radius * np.column_stack([-np.sin(angles), np.cos(angles)])
     # no sliver between a corner and the arc
     near = np.hypot(*(arc[0] - corners[first])) < np.hypot(*(arc[1] - arc[0])) / 2
-    return np.vstack([corners[: first + (not near or not first)], arc, corners[brink + 1 :]])
+    return np.vstack(
+        [corners[: first + (not near or not first)], arc, corners[brink + 1 :]]
+    )
 
 
 def _cosine(bed: "PileBed") -> FloatArray:
@@ -121,13 +131,41 @@ SLIP_FACE_DEG = 30.0  # lee slope of a dune and of a step down
 DOWN: tuple[bool, float, Literal["all"]] = (False, SLIP_FACE_DEG, "all")
 _LISTED = (
     Shape("triangle", "two straight faces", _faces, TRAIN + LEE),
-    Shape("dune", "a windward side and a slip face", _dune, DUNE, lee_slope_deg=SLIP_FACE_DEG),
-    Shape("cosine", "one wave of a cosine, trough to trough", _cosine, TRAIN, "wave of a cosine"),
+    Shape(
+        "dune",
+        "a windward side and a slip face",
+        _dune,
+        DUNE,
+        lee_slope_deg=SLIP_FACE_DEG,
+    ),
+    Shape(
+        "cosine",
+        "one wave of a cosine, trough to trough",
+        _cosine,
+        TRAIN,
+        "wave of a cosine",
+    ),
     Shape("gaussian", "a Gaussian hill", _gaussian, TRAIN, "Gaussian hill"),
-    Shape("rushil", "a hill of the wind tunnel RUSHIL", _rushil, TRAIN, "hill of RUSHIL"),
-    Shape("trapezoid", "two straight faces and a level top", _trapezoid, LEVEL + TRAIN + LEE),
+    Shape(
+        "rushil", "a hill of the wind tunnel RUSHIL", _rushil, TRAIN, "hill of RUSHIL"
+    ),
+    Shape(
+        "trapezoid",
+        "two straight faces and a level top",
+        _trapezoid,
+        LEVEL + TRAIN + LEE,
+    ),
     Shape("step up", "a straight face up to higher ground", _level, LEVEL),
-    Shape("step down", "a straight face down to lower ground", _level, LEVEL + LEE, "", *DOWN),
+    Shape(
+        "step down",
+        "a straight face down to lower ground",
+        _level,
+        LEVEL + LEE,
+        "",
+        *DOWN,
+    ),
     Shape("flat", "level bed", _level, LEVEL, rises=False, counted="all"),
 )
-SHAPES = {shape.name: shape for shape in _LISTED}  # all shapes, by what a study file calls them
+SHAPES = {
+    shape.name: shape for shape in _LISTED
+}  # all shapes, by what a study file calls them

@@ -34,7 +34,10 @@ from orchestrator.study.shapes import SHAPES
 from orchestrator.study.source import Source, find, presets
 
 TIME_LIMIT_S = 3600.0
-BED = {"kind": "grain", "roughness": "d/30"}  # fields of a bed that a file may leave out
+BED = {
+    "kind": "grain",
+    "roughness": "d/30",
+}  # fields of a bed that a file may leave out
 LEVEL_HEIGHT = 20.0
 """Diameters that stand for the height of a level bed. Its length is four heights by default: level
 beds of all grains are alike."""
@@ -63,7 +66,9 @@ MIXTURE: TypeAdapter[Sizes | None] = TypeAdapter(Sizes | None)
 def _not_zero(tolerance: float | None) -> float | None:
     """Refuse a tolerance that no levels are within."""
     if tolerance is not None and tolerance <= 0:
-        what = f"{tolerance:g} is not above 0: no levels are known to be without an error"
+        what = (
+            f"{tolerance:g} is not above 0: no levels are known to be without an error"
+        )
         raise UnfitError("tolerance", what, NO_TOLERANCE)
     return tolerance
 
@@ -96,7 +101,9 @@ class _Group(_Tables):
 
 class _File(_Tables):
     title: str = ""
-    time_limit: float = Field(default=TIME_LIMIT_S, gt=0, le=1e8)  # s, at most three years
+    time_limit: float = Field(
+        default=TIME_LIMIT_S, gt=0, le=1e8
+    )  # s, at most three years
     tolerance: Annotated[float | None, AfterValidator(_not_zero), Field(lt=1)] = None
     cluster: Table = Field(default={})
     profiles: dict[str, str] = Field(default={})
@@ -136,7 +143,11 @@ class Study:
     @cached_property
     def scenes(self) -> tuple[Scene, ...]:
         """Every scene once, in the file's order."""
-        return tuple({scene.id: scene for group in self.groups for scene in group.scenes}.values())
+        return tuple(
+            {
+                scene.id: scene for group in self.groups for scene in group.scenes
+            }.values()
+        )
 
     @cached_property
     def questions(self) -> tuple[str, ...]:
@@ -175,7 +186,9 @@ def _values_of(scenes: Sequence[Scene]) -> dict[str, list[float]]:
     """The values of the fields `ASKED` in some scenes."""
     values = {name: [*map(attrgetter(name), scenes)] for name in ASKED}
     # the diameter of a sieve table follows from its rows, the slope of a profile from its points
-    single = [scene.grain for scene in scenes if not isinstance(scene.grain.sizes, tuple)]
+    single = [
+        scene.grain for scene in scenes if not isinstance(scene.grain.sizes, tuple)
+    ]
     values["grain.diameter"] = [grain.diameter for grain in single]
     beds = [scene.bed for scene in scenes]
     given = [bed for bed in beds if not (isinstance(bed, PileBed) and bed.profile)]
@@ -226,7 +239,9 @@ def load(source: str | Path, tolerance: float | None = None) -> Study:
     path = find(source)
     if tolerance is not None and not 0 < tolerance < 1:
         what = f"{tolerance!r} is not a relative error above 0 and below 1"
-        raise InputError(what, "tolerance", f"0.05 allows tau_c to be 5 % off; or {NO_TOLERANCE}")
+        raise InputError(
+            what, "tolerance", f"0.05 allows tau_c to be 5 % off; or {NO_TOLERANCE}"
+        )
     content = read_bytes(path, MOST_BYTES, str(source))
     text = decoded(content, str(source))
     files = Files(path.parent)
@@ -323,7 +338,10 @@ def _scenes(
     keys = [key.partition(".") for key in axes]
     for part, _, name in keys:
         if part not in PARTS or not name:
-            what, remedy = "not a table and a field of it", 'write "grain.diameter" = [1e-4, 1e-3]'
+            what, remedy = (
+                "not a table and a field of it",
+                'write "grain.diameter" = [1e-4, 1e-3]',
+            )
             raise InputError(what, f"{where}: axes.{part}", remedy)
     points: dict[str, tuple[Any, ...]] = {}
     for point in itertools.product(*axes.values()):
@@ -346,25 +364,33 @@ def _scenes(
         yield scene
 
 
-def make_scene(parts: Mapping[str, Table], where: str, files: Files | None = None) -> Scene:
+def make_scene(
+    parts: Mapping[str, Table], where: str, files: Files | None = None
+) -> Scene:
     """Validate the tables of one scene, by their names; `where` names the file in messages.
 
     A part of the diameter such as d/30 is worked out, and so are the d50 of a sieve table and the
     numbers of a fluid's kind. `files` are those that the tables may name. The first thing wrong
     raises an `InputError`.
     """
-    bed, grain, flow, fluid = (dict(parts.get(n, {})) for n in ("bed", "grain", "flow", "fluid"))
+    bed, grain, flow, fluid = (
+        dict(parts.get(n, {})) for n in ("bed", "grain", "flow", "fluid")
+    )
     bed, kind = {**BED, **bed}, bed.get("kind", BED["kind"])
     if kind in [*SHAPES] and bed.get("shape", kind) == kind:
         bed |= {"kind": "pile", "shape": kind}
     elif kind not in ("grain", "pile"):
         remedy = f"write grain, pile, or a shape: {', '.join(SHAPES)}"
         raise InputError(f"{kind!r} is no bed", f"{where}: bed.kind", remedy)
-    is_level = bed.get("shape") == "flat" and not (bed.get("profile") or bed.get("obstacles"))
+    is_level = bed.get("shape") == "flat" and not (
+        bed.get("profile") or bed.get("obstacles")
+    )
     if is_level:
         flow.setdefault("model", "flat")  # over a level bed there is nothing to solve
     if bed.get("packing") == "poured":
-        bed.setdefault("mobile_layers", 4)  # the cheapest near the reference: docs/poured.md
+        bed.setdefault(
+            "mobile_layers", 4
+        )  # the cheapest near the reference: docs/poured.md
     try:
         fluid = fluids.numbers_of(fluid)
     except InputError as error:
@@ -410,13 +436,18 @@ def _explained(error: ValidationError, where: str) -> InputError:
     """The refusal of a file's tables, for the first thing that is wrong in them."""
     # a misspelt key says more than the field that is missing because of it
     first = min(
-        error.errors(), key=lambda e: e["type"] != "extra_forbidden" and "sizes" not in e["loc"]
+        error.errors(),
+        key=lambda e: e["type"] != "extra_forbidden" and "sizes" not in e["loc"],
     )
     if isinstance(cause := first.get("ctx", {}).get("error"), UnfitError):
         return InputError(cause.what, f"{where}: {cause.field}", cause.remedy)
     path, keys = [*first["loc"]], [*_File.model_fields]
     if path[0] == "group" and len(path) > 2:
-        where, path, keys = f"{where}: group {int(path[1]) + 1}", path[2:], [*_Group.model_fields]
+        where, path, keys = (
+            f"{where}: group {int(path[1]) + 1}",
+            path[2:],
+            [*_Group.model_fields],
+        )
     branch = path.pop(1) if path[0] == "bed" and path[1:] else ""
     path = [step for step in path if step not in ("", "rows")]
     name, key = ".".join(map(str, path)), str(path[-1])
@@ -430,17 +461,29 @@ def _explained(error: ValidationError, where: str) -> InputError:
     if first["type"] == "missing":
         return InputError(MISSING, place, "add it to the file")
     if first["type"] != "extra_forbidden":
-        remedy = first["msg"].lower().replace("dictionary", "table").replace("tuple", "list")
+        remedy = (
+            first["msg"].lower().replace("dictionary", "table").replace("tuple", "list")
+        )
         if isinstance(value, str):
             remedy = units.meant(value) or remedy
         return InputError(f"{value!r} is not accepted", place, remedy)
     if branch == "grain" and key in PileBed.model_fields:
-        return InputError("a bed of one grain has none", place, 'a pile has it: kind = "pile"')
+        return InputError(
+            "a bed of one grain has none", place, 'a pile has it: kind = "pile"'
+        )
     here = str(path[0]) if path[1:] else ""
     tables: dict[str, type[Part]] = {**PARTS, "erosion": Erosion}
-    written = {name: f"{name}, above the first table" for name in keys if name not in tables}
-    written |= {n: f"{part}.{n}" for part in reversed([*tables]) for n in tables[part].model_fields}
+    written = {
+        name: f"{name}, above the first table" for name in keys if name not in tables
+    }
+    written |= {
+        n: f"{part}.{n}"
+        for part in reversed([*tables])
+        for n in tables[part].model_fields
+    }
     written |= {name: name for name in (tables[here].model_fields if here else keys)}
     close = difflib.get_close_matches(key, written, n=1)
     listed = "known keys: docs/study-file.md"
-    return InputError(UNKNOWN, place, f"did you mean {written[close[0]]}?" if close else listed)
+    return InputError(
+        UNKNOWN, place, f"did you mean {written[close[0]]}?" if close else listed
+    )

@@ -53,7 +53,9 @@ UNITS = (
     Unit("grain.diameter", 0.05, 20.0, "{0:g} m: did you mean {0:g} mm", 1e-3),
     Unit("grain.diameter", 20.0, math.inf, "{0:g} m: did you mean {0:g} um", 1e-6),
     Unit("grain.density", 1e-300, 30.0, "{0:g} kg/m3: did you mean {0:g} g/cm3", 1e3),
-    Unit("bed.slope_deg", 0.05, 0.55, "{0:g} deg: did you mean {0:g} rad", TO_SI["rad"]),
+    Unit(
+        "bed.slope_deg", 0.05, 0.55, "{0:g} deg: did you mean {0:g} rad", TO_SI["rad"]
+    ),
     Unit(
         "bed.entrainment_angle_deg",
         1e-300,
@@ -183,7 +185,9 @@ def _of_cohesion(values: Mapping[str, Sequence[float]]) -> list[str]:
     return [f"{min(held):g} m: {what}; they need a stronger flow"]
 
 
-def _of_fluid(values: Mapping[str, Sequence[float]], names: Mapping[str, str]) -> list[str]:
+def _of_fluid(
+    values: Mapping[str, Sequence[float]], names: Mapping[str, str]
+) -> list[str]:
     """A question on the first fluid with a viscosity that none of its density has."""
     densities = values.get("fluid.density", ())
     pairs = zip(densities, values.get("fluid.viscosity", ()), strict=False)

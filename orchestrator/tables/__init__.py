@@ -30,9 +30,13 @@ from orchestrator.types import Row
 Tables = dict[str, pd.DataFrame]
 
 COLUMNS: dict[str, str] = {
-    **pd.read_csv(Path(__file__).with_name("columns.csv"), index_col="column")["meaning"],
+    **pd.read_csv(Path(__file__).with_name("columns.csv"), index_col="column")[
+        "meaning"
+    ],
     **{column: one.phrase for column, one in fields.COLUMNS.items()},
-    **{column: f"{one.phrase}: as it was run" for column, one in fields.ANSWERS.items()},
+    **{
+        column: f"{one.phrase}: as it was run" for column, one in fields.ANSWERS.items()
+    },
 }
 """Every column of every table, with its meaning; units are in the names."""
 FORMULA = r"(?='*(?:[=@\t\n]|[+-](?![\d.]+(?:e[+-]?\d+)?$|inf$)))"
@@ -44,7 +48,11 @@ NAMES = ("scene_id", "group", "profile", "case", "flow_case", "why_not")
 
 def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
     """The tables of a study that have rows, from the cases that are done; in the study's order."""
-    flows = {name: solve for pile in plan.piles.values() for name, solve in pile.solves.items()}
+    flows = {
+        name: solve
+        for pile in plan.piles.values()
+        for name, solve in pile.solves.items()
+    }
     flows = {name: solve for name, solve in flows.items() if name in done}
     answers = [
         rows.Answer(plan.decisions[scene_id], pile, cases)
@@ -54,18 +62,26 @@ def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
     asked = pd.DataFrame(rows.scenes(study, plan))
     cells = [cell for cell in plan.cells if cell.name in done]
     grains = pd.DataFrame(rows.single_grain(plan, cells, cases))
-    thresholds = pd.DataFrame(row for answer in answers for row in rows.pile_threshold(answer))
+    thresholds = pd.DataFrame(
+        row for answer in answers for row in rows.pile_threshold(answer)
+    )
     thresholds = with_scatter(thresholds, asked)
     checks = with_agreement(pd.DataFrame(rows.check(plan, cases, done)), thresholds)
     made = {
         "scenes": asked,
         "single_grain": with_usable(grains, asked, study.tolerance),
-        "wall_stress": _stacked(rows.wall_stress(pile, cases) for pile in flows.values()),
+        "wall_stress": _stacked(
+            rows.wall_stress(pile, cases) for pile in flows.values()
+        ),
         "flow": pd.DataFrame(rows.flow(pile, cases) for pile in flows.values()),
         "pile_grain": _stacked(map(rows.pile_grain, answers)),
         "pile_curve": _stacked(map(rows.pile_curve, answers)),
-        "pile_threshold": with_usable(thresholds, asked, study.tolerance, contradictions(checks)),
-        "size_class": pd.DataFrame(row for one in answers for row in rows.size_class(one)),
+        "pile_threshold": with_usable(
+            thresholds, asked, study.tolerance, contradictions(checks)
+        ),
+        "size_class": pd.DataFrame(
+            row for one in answers for row in rows.size_class(one)
+        ),
         "bed_change": _stacked(rows.bed_changes(answers)),
         "form": pd.DataFrame(row for one in answers for row in rows.forms(one)),
         "check": checks,
@@ -78,7 +94,10 @@ def _stacked(parts: Iterable[Row]) -> pd.DataFrame:
 
     Numbers and texts are repeated along the arrays of their part. `concat` takes ten times as long.
     """
-    arrays = [dict(zip(part, np.broadcast_arrays(*part.values()), strict=True)) for part in parts]
+    arrays = [
+        dict(zip(part, np.broadcast_arrays(*part.values()), strict=True))
+        for part in parts
+    ]
     empty = [np.full(next(iter(part.values())).shape, np.nan) for part in arrays]
     columns = {}
     for name in dict.fromkeys(name for part in arrays for name in part):
@@ -90,10 +109,18 @@ def _stacked(parts: Iterable[Row]) -> pd.DataFrame:
 def timings(plan: Plan, states: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
     """Wall times of the finished cases, from their states by name."""
     rows = [
-        (name, plan.cases[name].kind, it["solver_s"], it["cpu_s"], it["wall_s"] - it["solver_s"])
+        (
+            name,
+            plan.cases[name].kind,
+            it["solver_s"],
+            it["cpu_s"],
+            it["wall_s"] - it["solver_s"],
+        )
         for name, it in states.items()
     ]
-    return pd.DataFrame(rows, columns=["case", "kind", "solver_s", "cpu_s", "outside_s"])
+    return pd.DataFrame(
+        rows, columns=["case", "kind", "solver_s", "cpu_s", "outside_s"]
+    )
 
 
 def csv(table: pd.DataFrame, form: str = "") -> str:
@@ -156,7 +183,9 @@ def write(tables: Mapping[str, pd.DataFrame], folder: Folder, place: str) -> Non
     for name, table in tables.items():
         folder.put(f"{place}/{name}.csv", csv(table))
     used = sorted({str(column) for table in tables.values() for column in table})
-    meanings = pd.DataFrame({"column": used, "meaning": [COLUMNS[column] for column in used]})
+    meanings = pd.DataFrame(
+        {"column": used, "meaning": [COLUMNS[column] for column in used]}
+    )
     folder.put(f"{place}/columns.csv", csv(meanings))
 
 
@@ -182,7 +211,9 @@ def read(folder: Folder, place: str) -> Tables:
 def _table(content: bytes) -> pd.DataFrame:
     """A table from its file."""
     texts: dict[Any, Any] = dict.fromkeys(NAMES, "str")
-    table = pd.read_csv(BytesIO(content), dtype=texts, keep_default_na=False, na_values=[""])
+    table = pd.read_csv(
+        BytesIO(content), dtype=texts, keep_default_na=False, na_values=[""]
+    )
     for column in table.select_dtypes(["object", "string"]):
         if table[column].str.startswith("'").any():
             table[column] = table[column].map(_as_it_was)

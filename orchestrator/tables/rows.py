@@ -36,7 +36,13 @@ under solved flows, z0/h from 2.5e-4 to 8e-3, at 10 to 70 % of the grains; 0.03 
 ENDS = ("", "_low", "_high")  # endings of a threshold's columns
 FEW = 10  # grains of a size class: the interval of its threshold is wide
 # u*/u*_0 at equal parts of the way along the bed from the foot to the top
-WAY_UP = ("ustar_foot", "ustar_quarter", "ustar_half", "ustar_three_quarters", "ustar_top")
+WAY_UP = (
+    "ustar_foot",
+    "ustar_quarter",
+    "ustar_half",
+    "ustar_three_quarters",
+    "ustar_top",
+)
 
 
 def point(scene: Scene) -> Row:
@@ -51,7 +57,9 @@ def scenes(study: Study, plan: Plan) -> Iterator[Row]:
         for asked in group.scenes:
             decision, pile = plan.decisions[asked.id], plan.piles.get(asked.id)
             scene = decision.scene
-            runs = [case.name for case in pile.runs] if pile else [cell_of.get(scene.id)]
+            runs = (
+                [case.name for case in pile.runs] if pile else [cell_of.get(scene.id)]
+            )
             yield {
                 "scene_id": asked.id,
                 "group": group.name,
@@ -64,19 +72,29 @@ def scenes(study: Study, plan: Plan) -> Iterator[Row]:
             }
 
 
-def single_grain(plan: Plan, cells: Iterable[SingleGrainCase], cases: Path) -> Iterator[Row]:
+def single_grain(
+    plan: Plan, cells: Iterable[SingleGrainCase], cases: Path
+) -> Iterator[Row]:
     """A row for each single grain that a finished case or the closed form answers."""
     # by DEM: u* over that of the closed form, with its interval; a fall upstream; the case
     by_dem: dict[str, tuple[Any, ...]] = {}
     for cell in cells:
         motion = Motion.from_csv(cases / cell.name)
         steps = threshold.of_grains(motion)
-        ratios = zip(steps.value, steps.low, steps.high, (motion.fallen > 0).tolist(), strict=True)
+        ratios = zip(
+            steps.value,
+            steps.low,
+            steps.high,
+            (motion.fallen > 0).tolist(),
+            strict=True,
+        )
         for scene, numbers in zip(cell.scenes, ratios, strict=True):
             by_dem[scene.id] = (*numbers, {"case": cell.name})
     for asked, answer in plan.decisions.items():
         scene = answer.scene
-        if asked in plan.piles or (scene.id not in by_dem and scene.protocol.method == "dem"):
+        if asked in plan.piles or (
+            scene.id not in by_dem and scene.protocol.method == "dem"
+        ):
             continue
         value, low, high, fell, case = by_dem.get(scene.id, (*[np.nan] * 3, False, {}))
         exact = closed_form(scene)
@@ -113,7 +131,9 @@ def _speeds(scene: Scene, ustar: float) -> Row:
         depth=flow.depth or np.nan,
         closed=flow.top == "closed channel",
     )
-    row = {column: float(speed) for column, speed in speeds.items() if np.isfinite(speed)}
+    row = {
+        column: float(speed) for column, speed in speeds.items() if np.isfinite(speed)
+    }
     if mean := row.get("mean_velocity_m_s"):
         row["discharge_m2_s"] = mean * (flow.depth or 0.0)
     return row
@@ -130,7 +150,10 @@ def wall_stress(pile: Pile, cases: Path) -> Row:
         "z0_m": pile.flow.roughness_m,
         "s_m": stress.s_m,
         "s_over_h": stress.s_m / pile.bed.height,
-        **{name: getattr(stress, name) for name in (*names, "ustar_over_ustar0_eq10_printed")},
+        **{
+            name: getattr(stress, name)
+            for name in (*names, "ustar_over_ustar0_eq10_printed")
+        },
     }
 
 
@@ -138,7 +161,10 @@ def flow(pile: Pile, cases: Path) -> Row:
     """The solved flow of a pile: its settings, its separation and its speed-up."""
     case, stress, line = pile.flow, pile.stress(cases), pile.model.line
     separation, reattachment = bubble(stress, line.h) or (np.nan, np.nan)
-    ustar, way = stress.ustar_over_ustar0_wall, np.linspace(0, line.crest_s, len(WAY_UP))
+    ustar, way = (
+        stress.ustar_over_ustar0_wall,
+        np.linspace(0, line.crest_s, len(WAY_UP)),
+    )
     windward = (stress.s_m > 0) & (stress.s_m < line.crest_s)
     length, hill = stress.length_m[windward], measured_hill(pile)
     row = {
@@ -155,7 +181,9 @@ def flow(pile: Pile, cases: Path) -> Row:
         "separation_over_h": separation,
         "reattachment_over_h": reattachment,
         **dict(zip(WAY_UP, np.interp(way, stress.s_m, ustar).tolist(), strict=True)),
-        "ustar_mean": float(np.average(ustar[windward], weights=length)) if length.size else np.nan,
+        "ustar_mean": float(np.average(ustar[windward], weights=length))
+        if length.size
+        else np.nan,
         "ustar_largest": float(ustar.max()),
     }
     if hill is not None:
@@ -181,7 +209,9 @@ class Answer:
         self.row_hold = pile.row_hold(cases)
         self.first, self.checked = pile.first(self.motion), (np.nan, np.nan)
         if decision.is_along:
-            with suppress(InputError, UnfitError):  # where no grains can lie there is no check
+            with suppress(
+                InputError, UnfitError
+            ):  # where no grains can lie there is no check
                 around = pile.around(self.first[0])
                 self.checked = around.first(around.motion(cases))
 
@@ -194,7 +224,9 @@ class Answer:
         if chosen is None:
             return threshold.of_pile(motion, speed, fraction, density)
         ends = threshold.sampled(fraction, int(chosen.sum()))
-        return threshold.of_pile(motion.of(chosen), speed[chosen], fraction, density, ends)
+        return threshold.of_pile(
+            motion.of(chosen), speed[chosen], fraction, density, ends
+        )
 
 
 def shields(scene: Scene, tau: Any) -> Any:
@@ -203,7 +235,11 @@ def shields(scene: Scene, tau: Any) -> Any:
 
 
 def _reynolds(scene: Scene, tau: Any) -> Any:
-    return np.sqrt(tau / scene.fluid.density) * scene.grain.diameter / scene.fluid.viscosity
+    return (
+        np.sqrt(tau / scene.fluid.density)
+        * scene.grain.diameter
+        / scene.fluid.viscosity
+    )
 
 
 def pile_grain(answer: Answer) -> Row:
@@ -327,7 +363,10 @@ def _smooth_bed(scene: Scene, ustar0: float) -> float:
 
 def _levels(answer: Decision) -> Row:
     assert answer.levels
-    return {"flow_level": answer.levels.flow.name, "grain_level": answer.levels.grains.name}
+    return {
+        "flow_level": answer.levels.flow.name,
+        "grain_level": answer.levels.grains.name,
+    }
 
 
 def size_class(answer: Answer) -> Iterator[Row]:
@@ -359,11 +398,22 @@ def size_class(answer: Answer) -> Iterator[Row]:
                 "size_over_d": each.size,
                 "count": count,
                 "few": count < FEW,
-                **{f"class_moved{end}": part for end, part in zip(ENDS, moved, strict=True)},
+                **{
+                    f"class_moved{end}": part
+                    for end, part in zip(ENDS, moved, strict=True)
+                },
                 "ustar0_m_s": at.ustar0,
-                **{f"shields_own{end}": value for end, value in zip(ENDS, own, strict=True)},
-                **{f"hiding{end}": value for end, value in zip(ENDS, hiding, strict=True)},
-                "hiding_wilcock_crowe": float(measured.wilcock_crowe_hiding(each.size) / each.size),
+                **{
+                    f"shields_own{end}": value
+                    for end, value in zip(ENDS, own, strict=True)
+                },
+                **{
+                    f"hiding{end}": value
+                    for end, value in zip(ENDS, hiding, strict=True)
+                },
+                "hiding_wilcock_crowe": float(
+                    measured.wilcock_crowe_hiding(each.size) / each.size
+                ),
                 "hiding_egiazaroff": float(measured.egiazaroff_hiding(each.size)),
             }
 
@@ -381,7 +431,10 @@ def forms(answer: Answer) -> Iterator[Row]:
         first = np.nan
         for number in range(bed.forms):
             # a grain that has not moved is not a number, which sorts last
-            grains, speed = np.sort(ustar0[form == number]), answer.speed[form == number]
+            grains, speed = (
+                np.sort(ustar0[form == number]),
+                answer.speed[form == number],
+            )
             needed = max(ceil(fraction * len(grains) - 1e-9), 1)
             reached = float(grains[needed - 1]) if len(grains) else np.nan
             first = reached if number == 0 else first

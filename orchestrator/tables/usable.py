@@ -11,7 +11,11 @@ from orchestrator.grains.threshold import within
 from orchestrator.physics.beside import beside
 from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import standing_out, why_not
-from orchestrator.physics.velocity import LAMINAR_BELOW, depth_mean_speed, outer_roughness
+from orchestrator.physics.velocity import (
+    LAMINAR_BELOW,
+    depth_mean_speed,
+    outer_roughness,
+)
 from orchestrator.study import fields
 from orchestrator.tables.check import Contradictions
 
@@ -50,7 +54,9 @@ def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame
     spread = (groups.max() - groups.min()) / 2 / groups.mean()
     # one seed has no range
     largest = spread[groups.count() > 1].rename("scatter").groupby(level=SIMILAR).max()
-    table = table.merge(largest.reset_index(), on=SIMILAR, how="left", validate="many_to_one")
+    table = table.merge(
+        largest.reset_index(), on=SIMILAR, how="left", validate="many_to_one"
+    )
     wider = table["scatter"].fillna(0.0).to_numpy()
     low, _ = within(table["shields_low"].to_numpy(), wider)
     _, high = within(table["shields_high"].to_numpy(), wider)
@@ -82,7 +88,9 @@ def with_usable(
     if table.empty:
         return table
     columns = [name for name in scenes if name not in table or name == "scene_id"]
-    rows = table.merge(scenes.drop_duplicates("scene_id")[columns], on="scene_id", how="left")
+    rows = table.merge(
+        scenes.drop_duplicates("scene_id")[columns], on="scene_id", how="left"
+    )
     if "reynolds_closed_form" in rows:
         by_dem = rows["answered_method"] == "dem"
         rows["reynolds"] = rows["reynolds"].where(by_dem, rows["reynolds_closed_form"])
@@ -126,12 +134,17 @@ def _flow_reynolds(rows: pd.DataFrame) -> "pd.Series[float]":
 
 def _beyond_law(name: str, rows: pd.DataFrame, ustar: "pd.Series[float]") -> list[str]:
     """Reasons against a force law in some rows at their u*, m/s; empty if none."""
-    law, number = LAWS[name], {str(c): rows[c].to_numpy() for c in rows.select_dtypes("number")}
+    law, number = (
+        LAWS[name],
+        {str(c): rows[c].to_numpy() for c in rows.select_dtypes("number")},
+    )
     d, fluid = number["d_m"], (number[c] for c in ("rho_f_kg_m3", "nu_m2_s", "alpha_s"))
     exposure = Exposure(d, number["z0_over_d"] * d, *fluid)
     grain = {"density": "rho_sol_kg_m3", "slope_deg": "alpha_deg", "gravity": "g_m_s2"}
     # a pile has the share of grains that lift carried off
-    weights = {} if "share_carried_off" in rows else {k: number[c] for k, c in grain.items()}
+    weights = (
+        {} if "share_carried_off" in rows else {k: number[c] for k, c in grain.items()}
+    )
     speeds = np.asarray(ustar, float)
     texts = why_not(law, speeds, exposure, **weights)
     if law.goes_on:
@@ -160,11 +173,17 @@ def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
     error = row["error_estimate"]
     if row["share_carried_off"] > CARRIED_OFF:
         yield f"lift carried off {row['share_carried_off']:.0%} of the moved grains"
-    is_plane = row.get("packing") == "poured" and not (row.get("answered_width") or 0) > 0
+    is_plane = (
+        row.get("packing") == "poured" and not (row.get("answered_width") or 0) > 0
+    )
     if is_plane and pd.isna(row.get("sizes")):
         yield "equal spheres in one plane settle into a crystal: give sizes = { sigma_g = 1.2 }"
     is_renewed = row.get("answered_method") == "peeling" or (row.get("update") or 0) > 0
-    if row.get("sheltering") == "balanced" and not is_renewed and row["fraction"] > KEPT_TO + 1e-9:
+    if (
+        row.get("sheltering") == "balanced"
+        and not is_renewed
+        and row["fraction"] > KEPT_TO + 1e-9
+    ):
         yield f"kept balance: beyond n/N = {KEPT_TO} grains that have gone still bear a part of it"
     if pd.isna(error):
         yield "the error of its levels on such a bed is not known"

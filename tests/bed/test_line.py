@@ -27,7 +27,9 @@ BEDS: dict[str, dict[str, Any]] = {
     "apart": {"forms": 3, "spacing": 0.3},
     "fence": {"obstacles": (Obstacle(kind="fence", x=-0.1, height=0.01),)},
     "cylinder": {"obstacles": (Obstacle(kind="half-cylinder", x=0.3, height=0.005),)},
-    "block on it": {"obstacles": (Obstacle(kind="block", x=0.04, height=0.005, length=0.01),)},
+    "block on it": {
+        "obstacles": (Obstacle(kind="block", x=0.04, height=0.005, length=0.01),)
+    },
 }
 
 
@@ -61,8 +63,12 @@ def test_forms_of_a_train_are_alike_and_do_not_overlap() -> None:
     line, alone = of_bed(bed(**BEDS["apart"])), of_bed(bed())
     x = np.linspace(0, alone.x[-2], 50)
     for place in range(3):
-        np.testing.assert_allclose(line.height(x + 0.3 * place), alone.height(x), atol=1e-12)
-    with pytest.raises(UnfitError, match=r"bed.spacing: forms 0.149\d* m long overlap at 0.1 m"):
+        np.testing.assert_allclose(
+            line.height(x + 0.3 * place), alone.height(x), atol=1e-12
+        )
+    with pytest.raises(
+        UnfitError, match=r"bed.spacing: forms 0.149\d* m long overlap at 0.1 m"
+    ):
         of_bed(bed(forms=2, spacing=0.1))
 
 
@@ -71,17 +77,26 @@ def test_an_obstacle_stands_on_the_bed_and_is_bare(name: str) -> None:
     line, (obstacle,) = of_bed(bed(**BEDS[name])), BEDS[name]["obstacles"]
     assert float(line.height(np.array(obstacle.x))) == pytest.approx(obstacle.height)
     ((start, end),) = line.bare
-    assert obstacle.x - obstacle.reach <= start < obstacle.x < end <= obstacle.x + obstacle.reach
+    assert (
+        obstacle.x - obstacle.reach
+        <= start
+        < obstacle.x
+        < end
+        <= obstacle.x + obstacle.reach
+    )
     assert np.abs(line.slopes_deg).max() < 75.1
     np.testing.assert_allclose(line.height(np.array([start, end])), 0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize(
-    ("name", "slope"), [("triangle", 15.0), ("dune", 15.0), ("step up", 0.0), ("train", 0.0)]
+    ("name", "slope"),
+    [("triangle", 15.0), ("dune", 15.0), ("step up", 0.0), ("train", 0.0)],
 )
 def test_the_roof_is_clear_of_the_forms(name: str, slope: float) -> None:
     line = of_bed(bed(**BEDS[name]))
     found, ridge = line.roof(0.001)
     assert found == pytest.approx(slope, abs=1e-9)
     inner = line.corners[1:-1] - ridge
-    assert (inner[:, 1] + np.abs(inner[:, 0]) * np.tan(np.radians(found)) < -0.00099).all()
+    assert (
+        inner[:, 1] + np.abs(inner[:, 0]) * np.tan(np.radians(found)) < -0.00099
+    ).all()

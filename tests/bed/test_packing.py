@@ -24,10 +24,14 @@ patterns = st.sampled_from(PATTERNS)
 
 def _lattice(pattern: Pattern = "aligned", **changes: Any) -> Lattice:
     disorder = 0.05 if pattern == "disordered" else 0.0
-    return replace(Lattice(60.0, GAP, pattern, mobile_layers=2, disorder=disorder), **changes)
+    return replace(
+        Lattice(60.0, GAP, pattern, mobile_layers=2, disorder=disorder), **changes
+    )
 
 
-def _pile(slope: float, height: float, pattern: Pattern = "aligned", **changes: Any) -> Packing:
+def _pile(
+    slope: float, height: float, pattern: Pattern = "aligned", **changes: Any
+) -> Packing:
     return pile(triangle(slope, height), _lattice(pattern, **changes))
 
 
@@ -53,7 +57,9 @@ def _check(bed: Packing) -> None:
 
 
 @pytest.mark.parametrize("beta", [60.0, 59.5, 50.0])
-def test_through_the_gaps_of_a_row_the_next_is_exposed_and_no_other(beta: float) -> None:
+def test_through_the_gaps_of_a_row_the_next_is_exposed_and_no_other(
+    beta: float,
+) -> None:
     line = triangle(15.0, 10.0)
     bed = pile(line, _lattice(entrainment_angle_deg=beta, mobile_layers=3))
     shown = line.over(bed.centres[bed.windward], line.top - 1)
@@ -63,7 +69,9 @@ def test_through_the_gaps_of_a_row_the_next_is_exposed_and_no_other(beta: float)
 
 @pytest.mark.parametrize("pattern", PATTERNS)
 @pytest.mark.parametrize("name", BEDS)
-def test_grains_of_any_bed_do_not_overlap_and_mobile_ones_rest(name: str, pattern: Pattern) -> None:
+def test_grains_of_any_bed_do_not_overlap_and_mobile_ones_rest(
+    name: str, pattern: Pattern
+) -> None:
     _check(_covered(name, pattern))
 
 
@@ -75,14 +83,20 @@ def test_grains_of_a_pile_do_not_overlap_and_mobile_ones_rest(
     packed = _pile(slope, height, pattern, seed=seed if pattern == "disordered" else 0)
     if pattern != "disordered":
         _check(packed)
-    overlapping, touching = (packed.places.contacts(packed.sizes, t)[0] for t in (-1e-9, 1e-6))
+    overlapping, touching = (
+        packed.places.contacts(packed.sizes, t)[0] for t in (-1e-9, 1e-6)
+    )
     assert not packed.mobile[overlapping].any()
-    assert (np.bincount(touching, minlength=len(packed.sizes))[packed.mobile] >= 2).all()
+    assert (
+        np.bincount(touching, minlength=len(packed.sizes))[packed.mobile] >= 2
+    ).all()
 
 
 @settings(max_examples=30, deadline=None)
 @given(slope=slopes, height=heights)
-def test_aligned_grains_cover_the_windward_face_one_by_one(slope: float, height: float) -> None:
+def test_aligned_grains_cover_the_windward_face_one_by_one(
+    slope: float, height: float
+) -> None:
     bed, line = _pile(slope, height), triangle(slope, height)
     s = np.sort(bed.arc_length[bed.windward])
     # the crest grain sits over the crest itself, a little downstream of its own normal's foot
@@ -98,7 +112,9 @@ def test_aligned_grains_cover_the_windward_face_one_by_one(slope: float, height:
 
 
 @pytest.mark.parametrize("pattern", PATTERNS)
-def test_the_grains_on_the_face_do_not_depend_on_how_many_layers_may_move(pattern: Pattern) -> None:
+def test_the_grains_on_the_face_do_not_depend_on_how_many_layers_may_move(
+    pattern: Pattern,
+) -> None:
     faces = []
     for layers in (1, 2, 4):
         packed = _pile(20.0, 15.0, pattern, mobile_layers=layers)
@@ -110,7 +126,10 @@ def test_the_grains_on_the_face_do_not_depend_on_how_many_layers_may_move(patter
 def test_which_part_is_counted() -> None:
     windward, everything = _covered("triangle"), _covered("triangle", counted="all")
     part = _covered("triangle", counted=(0.02, 0.04))
-    assert windward.centres[windward.windward, 0].max() < H / np.tan(np.radians(15)) / D + 1
+    assert (
+        windward.centres[windward.windward, 0].max()
+        < H / np.tan(np.radians(15)) / D + 1
+    )
     assert everything.count > 1.8 * windward.count
     assert part.count == pytest.approx(20 / np.cos(np.radians(15)), abs=1)
     x = part.centres[part.windward, 0] * D
@@ -127,12 +146,16 @@ def test_which_part_is_counted() -> None:
 def test_beds_that_no_row_of_grains_fits_are_refused() -> None:
     with pytest.raises(UnfitError, match=r"bed.counted: no grain is counted"):
         _covered("step down", counted="windward")
-    trough = of_bed(bed(forms=40, shape="cosine", height=2e-3, slope_deg=50.0)).scaled(1 / D)
+    trough = of_bed(bed(forms=40, shape="cosine", height=2e-3, slope_deg=50.0)).scaled(
+        1 / D
+    )
     with pytest.raises(UnfitError, match="more sharply than a grain at"):
         packing.offset(trough, 3.0)
 
 
-def _unshadowed(x: FloatArray, z: FloatArray, r: FloatArray, y: Any = 0.0, w: Any = 0) -> BoolArray:
+def _unshadowed(
+    x: FloatArray, z: FloatArray, r: FloatArray, y: Any = 0.0, w: Any = 0
+) -> BoolArray:
     places = Places.of(np.column_stack([x, np.zeros_like(x)]), y, w)
     return packing.unshadowed(places, z, r)
 

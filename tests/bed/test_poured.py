@@ -70,7 +70,9 @@ def test_the_same_seed_gives_the_same_bytes_by_hand(
         (copy / DUMP).unlink(missing_ok=True)
         ended = subprocess.run(["./Allrun"], cwd=copy, capture_output=True, text=True)
         assert ended.returncode == 0, ended.stderr
-        assert ((copy / DUMP).read_bytes() == (case / DUMP).read_bytes()) == (folder == case)
+        assert ((copy / DUMP).read_bytes() == (case / DUMP).read_bytes()) == (
+            folder == case
+        )
     assert _plane(seed=2).id != _plane().id
 
 
@@ -87,7 +89,9 @@ def test_grains_rest_on_one_another_under_the_line(mixed: Path) -> None:
     assert 3.0 < number[inner].mean() < 4.0
 
 
-def test_packing_and_contacts_of_a_strip_are_those_of_spheres_in_space(strip: Path) -> None:
+def test_packing_and_contacts_of_a_strip_are_those_of_spheres_in_space(
+    strip: Path,
+) -> None:
     places, sizes, number = _grains(strip, WIDTH)
     x, _, z = places.xyz.T
     low, high, half = -2.5, -1.0, 6.0
@@ -104,7 +108,9 @@ def test_packing_and_contacts_of_a_strip_are_those_of_spheres_in_space(strip: Pa
 @pytest.mark.parametrize("sizes", [None, MIXED, LogNormal(sigma_g=1.6)])
 def test_grains_in_the_air_touch_nothing(sizes: Sizes | None, width: float) -> None:
     # a step that is nearly upright, and a slope: their fixed grains stand beside those in the air
-    line = BedLine((-10.0, 0.0, 0.5, 8.0, 16.0, 34.0), (0.0, 0.0, 5.0, 5.0, 1.0, 1.0), 1.0)
+    line = BedLine(
+        (-10.0, 0.0, 0.5, 8.0, 16.0, 34.0), (0.0, 0.0, 5.0, 5.0, 1.0, 1.0), 1.0
+    )
     bed = PouredBed(line, 6.0, SURFACE, sizes, 1.0, 35.0, 3, width)
     centres, diameters = bed.grains
     fixed, (start, end) = len(bed.floor), bed.ends
@@ -118,9 +124,14 @@ def test_grains_in_the_air_touch_nothing(sizes: Sizes | None, width: float) -> N
 
 @pytest.mark.parametrize(
     ("last", "word"),
-    [("0,0.0", "no grain of the poured bed is left"), ("3,1.0", "does not come to rest")],
+    [
+        ("0,0.0", "no grain of the poured bed is left"),
+        ("3,1.0", "does not come to rest"),
+    ],
 )
-def test_a_bed_that_is_none_or_moves_is_noticed(tmp_path: Path, last: str, word: str) -> None:
+def test_a_bed_that_is_none_or_moves_is_noticed(
+    tmp_path: Path, last: str, word: str
+) -> None:
     table = f"stage,step,grains,ke\n1,5,3,0.0\n2,9,3,0.0\n3,12,{last}\n"
     (tmp_path / "settling.csv").write_text(table)
     (tmp_path / "log.liggghts").write_text("the protocol has ended")

@@ -59,7 +59,9 @@ class Bed:
             ratio = float(row["ustar_over_ustar0"] or 0)
             place = float(row["x_m"]), float(row["z_m"]), float(row["d_m"])
             self.grains[int(row["id"])] = Grain(*place, row["kind"], slope, ratio)
-        self.load_steps = [float(row["ustar0_m_s"]) for row in table(folder / "load_steps.csv")]
+        self.load_steps = [
+            float(row["ustar0_m_s"]) for row in table(folder / "load_steps.csv")
+        ]
         self.given = None
         if (folder / "forces.csv").exists():
             self.given = table(folder / "forces.csv")
@@ -67,7 +69,9 @@ class Bed:
     @property
     def counted(self) -> list[int]:
         """The ids of the counted grains."""
-        return [number for number, grain in self.grains.items() if grain.kind == "counted"]
+        return [
+            number for number, grain in self.grains.items() if grain.kind == "counted"
+        ]
 
     @property
     def roof(self) -> tuple[float, float, float]:
@@ -162,11 +166,14 @@ class Count:
         for number in bed.counted:
             if number in frame:
                 is_passing = (
-                    self.displacement(number, frame[number]) >= scene["displacement_criterion"]
+                    self.displacement(number, frame[number])
+                    >= scene["displacement_criterion"]
                 )
                 if is_passing:
                     self.passed.add(number)
-            if number not in self.moved_in and (number not in frame or number in self.passed):
+            if number not in self.moved_in and (
+                number not in frame or number in self.passed
+            ):
                 newly += 1
                 self.moved_in[number] = self.load_step
                 if number not in frame:
@@ -240,7 +247,9 @@ def answers(bed: Bed, moved_in: Mapping[int, int], carried: Iterable[int]) -> An
             return ustar0
         scene = bed.scene
         ratios = [bed.grains[number].ratio for number in moved(step)]
-        tau = sum(scene["rho_f_kg_m3"] * (ustar0 * ratio) ** 2 for ratio in ratios) / len(ratios)
+        tau = sum(
+            scene["rho_f_kg_m3"] * (ustar0 * ratio) ** 2 for ratio in ratios
+        ) / len(ratios)
         excess = (scene["rho_sol_kg_m3"] - scene["rho_f_kg_m3"]) * scene["g_m_s2"]
         return float(tau / (excess * scene["d_m"]))
 
@@ -289,7 +298,10 @@ def packed(scene: Mapping[str, Any]) -> Packed:
     layers = (scene["mobile_layers"] - 0.5) * math.sin(beta)
     for x, z in centres:
         is_windward = x < crest + 1e-6
-        tangent = (math.cos(alpha), math.sin(alpha) if is_windward else -math.sin(alpha))
+        tangent = (
+            math.cos(alpha),
+            math.sin(alpha) if is_windward else -math.sin(alpha),
+        )
         is_exposed = True
         for other_x, other_z in centres:
             dx, dz = other_x - x, other_z - z

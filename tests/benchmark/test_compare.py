@@ -13,7 +13,16 @@ from orchestrator.benchmark import compare, pack
 from orchestrator.benchmark.compare import Options, split
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.runs import workspace
-from tests.benchmark.conftest import AFTER, RIGHT, SCENE, TAIL, program, run, seal, verdicts_in
+from tests.benchmark.conftest import (
+    AFTER,
+    RIGHT,
+    SCENE,
+    TAIL,
+    program,
+    run,
+    seal,
+    verdicts_in,
+)
 from tests.conftest import Command
 from tests.report.test_page import Page
 
@@ -60,19 +69,27 @@ def test_faults_are_caught_and_named(
     folder = tmp_path / "tmp"
     folder.mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(folder))
-    names = [name for name in pack.read(formulas).scenes if name[0] == "1"][: len(FAULTS) + 1]
+    names = [name for name in pack.read(formulas).scenes if name[0] == "1"][
+        : len(FAULTS) + 1
+    ]
     bodies = dict(zip(names, FAULTS, strict=False))
     body = f"body = {bodies!r}.get(solver.json.loads((case / 'scene.json').read_text())['scene'])"
     body += "\nif body:\n    exec(body)\nelse:\n    solver.main(case, out)\n"
-    outcome = run(formulas, tmp_path, body, SCENE._replace(patterns=names, seconds=15.0))
+    outcome = run(
+        formulas, tmp_path, body, SCENE._replace(patterns=names, seconds=15.0)
+    )
     verdicts = verdicts_in(tmp_path)
     for name, text in bodies.items():
         assert re.search(FAULTS[text], str(verdicts.loc[name, "message"])), text
     assert verdicts["passed"].tolist() == [False] * len(FAULTS) + [True]
     assert verdicts["answered"].tolist() == [False] * (len(FAULTS) - 1) + [True] * 2
-    assert f"{names[5]} and 1 more of kind closed-form: it ended with 3" in str(outcome.failures)
+    assert f"{names[5]} and 1 more of kind closed-form: it ended with 3" in str(
+        outcome.failures
+    )
     assert outcome.failures[-1] == "and 6 more: see verdicts.csv"
-    assert re.search("FAILED my solver: of .* 1 passed, .* failed, 1 declined", outcome.summary)
+    assert re.search(
+        "FAILED my solver: of .* 1 passed, .* failed, 1 declined", outcome.summary
+    )
     assert "\x1b" not in "".join(outcome.failures) + outcome.page.read_text()
     assert not list(folder.iterdir())  # the private directories are removed
 
@@ -101,11 +118,17 @@ def test_a_solver_gets_its_scene_alone_and_its_use_is_measured(
     log = (tmp_path / "results" / "2-incline-5" / "log.txt").read_text()
     words, cwd, files, beside, variables = json.loads(log.splitlines()[0])
     assert words == [f"{cwd}/case", f"{cwd}/answer.csv"]
-    assert (files, beside, variables) == (["ask.csv", "scene.json"], ["log.txt", "work"], [])
+    assert (files, beside, variables) == (
+        ["ask.csv", "scene.json"],
+        ["log.txt", "work"],
+        [],
+    )
     used = verdicts_in(tmp_path).loc["2-incline-5"]
     assert 100 < used["peak_mib"] < 160
     assert min(used["seconds"], used["cpu_s"]) > 0.5
-    assert used["ratio"] == pytest.approx(used["seconds"] / used["ours_seconds"], rel=1e-4)
+    assert used["ratio"] == pytest.approx(
+        used["seconds"] / used["ours_seconds"], rel=1e-4
+    )
 
 
 @pytest.mark.parametrize(
@@ -128,10 +151,14 @@ def test_ours_answers_as_exported(
 ) -> None:
     """A solver that knows no kind, and so has failed: only our own runs answer."""
     choice = Options(levels=(3, 4, 5))
-    assert run(request.getfixturevalue(packed), tmp_path, "sys.exit(2)", choice).failures
+    assert run(
+        request.getfixturevalue(packed), tmp_path, "sys.exit(2)", choice
+    ).failures
     numbers = pd.read_csv(tmp_path / "results" / "comparison.csv")
     assert set(numbers["scene"].str[0]) == set("345" if packed == "all_levels" else "4")
-    pd.testing.assert_series_equal(numbers["ours"], numbers["value"], check_names=False, rtol=1e-6)
+    pd.testing.assert_series_equal(
+        numbers["ours"], numbers["value"], check_names=False, rtol=1e-6
+    )
 
 
 @pytest.fixture(scope="module")
@@ -140,7 +167,9 @@ def right(all_levels: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("results") / "right"
     outcome = compare.run(all_levels, RIGHT, out, CHOICE._replace(name="right"))
     assert outcome.failures == []
-    assert "PASSED right: of 17 scenes 17 passed, 0 failed, 0 declined" in outcome.summary
+    assert (
+        "PASSED right: of 17 scenes 17 passed, 0 failed, 0 declined" in outcome.summary
+    )
     return out
 
 
@@ -149,7 +178,9 @@ def wrong(right: Path, tmp_path: Path) -> Path:
     """The same with thresholds of the pile that are too high, and stated time steps."""
     out = tmp_path / "wrong_one"
     shutil.copytree(right, out)
-    (out / "benchmark.json").write_text('{"kind": "benchmark of the solver", "name": "b"}')
+    (out / "benchmark.json").write_text(
+        '{"kind": "benchmark of the solver", "name": "b"}'
+    )
     (path,) = out.glob("4-*/answer.csv")
     table = pd.read_csv(path, dtype={"at": str})
     table.loc[table["quantity"] == "shields", "value"] *= HIGH
@@ -168,23 +199,35 @@ def test_two_solvers_on_one_page(
     assert ended.stdout.splitlines()[-1] == str(both / "comparison.html")
     parsed = Page((both / "comparison.html").read_text(encoding="utf-8"))
     assert parsed.texts["title"] == "Against the pack “pack”: right, wrong_one"
-    assert "FAILED wrong_one: of 17 scenes 16 passed, 1 failed, 0 declined" in parsed.text
+    assert (
+        "FAILED wrong_one: of 17 scenes 16 passed, 1 failed, 0 declined" in parsed.text
+    )
     assert "wrong_one" in parsed.texts["th"]
     assert " ** " in parsed.text  # a threshold beyond its tolerance
-    assert {*os.listdir(both / "figures")} >= {"moved.png", "shields.png", "speed-accuracy.png"}
+    assert {*os.listdir(both / "figures")} >= {
+        "moved.png",
+        "shields.png",
+        "speed-accuracy.png",
+    }
     # the page of one solver lies with its answers
     outcome = compare.compare(all_levels, [wrong], None, CHOICE)
     assert outcome.page == wrong / "comparison.html"
 
 
-def _refused(pack_of: Path, out: Path, words: str, command: str = "true {case} {out}") -> None:
+def _refused(
+    pack_of: Path, out: Path, words: str, command: str = "true {case} {out}"
+) -> None:
     before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
     with pytest.raises(OrchestratorError, match=words):
         compare.run(pack_of, command, out, SCENE)
-    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+    assert {
+        path: path.read_bytes() for path in out.rglob("*") if path.is_file()
+    } == before
 
 
-def test_results_go_nowhere_else(all_levels: Path, formulas: Path, tmp_path: Path) -> None:
+def test_results_go_nowhere_else(
+    all_levels: Path, formulas: Path, tmp_path: Path
+) -> None:
     mine, same, copy = (tmp_path / name for name in ("mine", "again/mine", "copy"))
     for folder in (mine, same):
         (folder / "2-incline-5").mkdir(parents=True)
@@ -234,7 +277,9 @@ def test_answers_to_another_pack_are_not_compared(
     run(all_levels, tmp_path, TAIL)
     results = tmp_path / "results"
     before = sorted(results.rglob("*"))
-    with pytest.raises(InputError, match=r"answers to another pack.*formulas.*with the pack that"):
+    with pytest.raises(
+        InputError, match=r"answers to another pack.*formulas.*with the pack that"
+    ):
         compare.compare(formulas, [results], tmp_path / "page", SCENE)
     assert not (tmp_path / "page").exists()
     assert sorted(results.rglob("*")) == before
@@ -299,7 +344,9 @@ def test_forms_of_answers_and_names_of_solvers(
     for folder in (results / "2-incline-5", results / "ours" / "2-incline-5"):
         folder.mkdir(parents=True)
         (folder / "answer.csv").write_bytes(text.encode())
-        (folder / "used.json").write_text('{"seconds": 0, "cpu_s": -1, "peak_mib": "1"}')
+        (folder / "used.json").write_text(
+            '{"seconds": 0, "cpu_s": -1, "peak_mib": "1"}'
+        )
     before = sorted(results.rglob("*"))
     outcome = compare.compare(root, [results], tmp_path / "page", SCENE)
     assert not outcome.failures

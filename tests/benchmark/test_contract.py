@@ -23,7 +23,16 @@ from orchestrator.grains.loads import Geometry
 from orchestrator.runs.case import templates
 from orchestrator.study import study
 from tests.benchmark.conftest import NATIVE, ROOT
-from tests.benchmark.rules import Bed, Count, Frame, Sample, State, answers, packed, settled_after
+from tests.benchmark.rules import (
+    Bed,
+    Count,
+    Frame,
+    Sample,
+    State,
+    answers,
+    packed,
+    settled_after,
+)
 
 sys.path[:0] = [str(NATIVE), str(NATIVE.parent)]
 import door  # type: ignore[import-not-found]  # noqa: E402
@@ -67,7 +76,9 @@ def _sets(path: Path) -> list[dict[int, float]]:
 
 
 @pytest.mark.parametrize("name", ["all_levels", "lift_off", "level_rows", "poured"])
-def test_a_scene_says_all_that_its_deck_has(name: str, request: pytest.FixtureRequest) -> None:
+def test_a_scene_says_all_that_its_deck_has(
+    name: str, request: pytest.FixtureRequest
+) -> None:
     """Roof, ends of the box, forces, directions, times: from the scene by the page alone."""
     bed, case = _case_of(request.getfixturevalue(name))
     scene, values = bed.scene, _parameters(case)
@@ -86,8 +97,16 @@ def test_a_scene_says_all_that_its_deck_has(name: str, request: pytest.FixtureRe
     assert values["friction"] == pytest.approx(math.tan(math.radians(scene["phi_deg"])))
     unit = math.sqrt(d / scene["reduced_gravity_m_s2"])
     assert scene["time_unit_s"] == pytest.approx(unit)
-    assert scene["spring_n_m"] == pytest.approx(values["stiffness"] * scene["weight_n"] / d)
-    for entry in ("stiffness", "damping", "time_step", "waiting_time", "displacement_criterion"):
+    assert scene["spring_n_m"] == pytest.approx(
+        values["stiffness"] * scene["weight_n"] / d
+    )
+    for entry in (
+        "stiffness",
+        "damping",
+        "time_step",
+        "waiting_time",
+        "displacement_criterion",
+    ):
         assert values[entry] == pytest.approx(scene[entry])
     settle_drag = values["settle_drag"] * scene["mass_kg"] / unit
     assert scene.get("settle_drag_kg_s", 0.0) == pytest.approx(settle_drag)
@@ -108,7 +127,9 @@ def test_a_scene_says_all_that_its_deck_has(name: str, request: pytest.FixtureRe
         for load_step in (0, 1, len(bed.load_steps) - 1):
             for number, value in forces[load_step].items():
                 force = bed.force(number, load_step, solver.forces)[place]
-                assert value == pytest.approx(force, rel=1e-6, abs=1e-7 * scene["weight_n"])
+                assert value == pytest.approx(
+                    force, rel=1e-6, abs=1e-7 * scene["weight_n"]
+                )
 
 
 def _rerun(case: Path, folder: Path) -> Iterator[Frame]:
@@ -119,7 +140,9 @@ def _rerun(case: Path, folder: Path) -> Iterator[Frame]:
     command = ". ./liggghts.sh && solve in.bed >log.liggghts 2>&1"
     subprocess.run(["sh", "-c", command], cwd=folder, check=True)
     if case != folder:
-        again, before = ((place / motion.SAMPLES).read_bytes() for place in (folder, case))
+        again, before = (
+            (place / motion.SAMPLES).read_bytes() for place in (folder, case)
+        )
         assert again == before
     steps, rows = deck.read_dump(folder / "every.dump", COLUMNS)
     frames = dict(iter(rows.groupby("step")))
@@ -167,7 +190,11 @@ def test_the_rules_count_what_the_deck_counts(
     # of a poured bed grains may rock to the end of the waiting time in every load step
     assert ends & ({"rest", "waited"} if name == "poured" else {"rest"})
     table = pd.read_csv(case / motion.MOTION)
-    moved_in = {one: step for one, step in zip(table["id"], table["moved_in"], strict=True) if step}
+    moved_in = {
+        one: step
+        for one, step in zip(table["id"], table["moved_in"], strict=True)
+        if step
+    }
     assert count.moved_in == moved_in
     assert count.carried == set(table.loc[table["carried_off"] == 1, "id"])
     answer = answers(bed, count.moved_in, count.carried)
@@ -228,7 +255,9 @@ def _cases(folder: Path) -> Bed:
     table.to_csv(folder / "grains.csv", index=False)
     columns = ["load_step", "id", "fx_n", "fz_n"]
     pd.DataFrame(forces, columns=columns).to_csv(folder / "forces.csv", index=False)
-    steps = pd.DataFrame({"load_step": range(5), "ustar0_m_s": [0.07, 0.1, 0.2, 0.3, 0.4]})
+    steps = pd.DataFrame(
+        {"load_step": range(5), "ustar0_m_s": [0.07, 0.1, 0.2, 0.3, 0.4]}
+    )
     steps.to_csv(folder / "load_steps.csv", index=False)
     scene = {"d_m": D, "mass_kg": mass, "weight_n": weight, "rho_sol_kg_m3": density}
     scene |= {"reduced_gravity_m_s2": gravity, "time_unit_s": math.sqrt(D / gravity)}
@@ -267,7 +296,13 @@ def _deck(bed: Bed, folder: Path) -> None:
         "ceiling_z": z,
         "behind": bed.behind,
     }
-    for entry in ("stiffness", "damping", "time_step", "waiting_time", "displacement_criterion"):
+    for entry in (
+        "stiffness",
+        "damping",
+        "time_step",
+        "waiting_time",
+        "displacement_criterion",
+    ):
         values[entry] = scene[entry]
     position = np.array([(grain.x, 0.0, grain.z) for grain in listed])
     table = GrainTable(
@@ -280,7 +315,9 @@ def _deck(bed: Bed, folder: Path) -> None:
     )
     steps = range(len(bed.load_steps))
     force = [[bed.force(number, step, None) for number in bed.grains] for step in steps]
-    deck.write(folder, table, values, np.array(bed.load_steps), np.array(force), margin=3 * D)
+    deck.write(
+        folder, table, values, np.array(bed.load_steps), np.array(force), margin=3 * D
+    )
 
 
 def test_one_grain_of_each_case(tmp_path: Path) -> None:
@@ -329,7 +366,9 @@ def test_our_own_reading_of_the_run_agrees(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["all_levels", "level_rows", "poured"])
-def test_the_examples_have_the_roof_of_the_page(name: str, request: pytest.FixtureRequest) -> None:
+def test_the_examples_have_the_roof_of_the_page(
+    name: str, request: pytest.FixtureRequest
+) -> None:
     """What the decks of LAMMPS and the script of YADE take, whether they are installed or not."""
     root = request.getfixturevalue(name)
     bed, _ = _case_of(root)
@@ -346,7 +385,12 @@ def test_a_pack_brings_the_contract(formulas: Path) -> None:
     contract = page[page.index("## Write a solver") :]
     assert contract in text
     assert not re.search(r"\]\((?!http)", text)
-    for heading in ("## Scenes", "### Level 5, `line`", "## Verdicts", "**The contact.**"):
+    for heading in (
+        "## Scenes",
+        "### Level 5, `line`",
+        "## Verdicts",
+        "**The contact.**",
+    ):
         assert heading in contract
 
 
@@ -375,8 +419,14 @@ mobile_layers = {layers}
     ours = Geometry(scene).packing
     found = packed({**scenes.parameters(scene, "line"), "mobile_layers": layers})
     centres = [(float(x), float(z)) for x, z in ours.centres]
-    kinds = (ours.windward, ours.mobile & ours.lee, ours.mobile & ~ours.windward & ~ours.lee)
-    for kind, by_the_page in zip(kinds, (found.counted, found.pushed, found.mobile), strict=True):
+    kinds = (
+        ours.windward,
+        ours.mobile & ours.lee,
+        ours.mobile & ~ours.windward & ~ours.lee,
+    )
+    for kind, by_the_page in zip(
+        kinds, (found.counted, found.pushed, found.mobile), strict=True
+    ):
         _near({centres[number] for number in np.flatnonzero(kind)}, by_the_page)
     mobile = [centres[number] for number in np.flatnonzero(ours.mobile)]
     fixed = [centres[number] for number in np.flatnonzero(~ours.mobile)]
@@ -411,7 +461,9 @@ def test_the_mean_on_the_face_is_that_of_the_page(all_levels: Path) -> None:
     assert along == pytest.approx(ratio.to_numpy(), rel=1e-7)
     asked = pd.read_csv(folder / "ask.csv")
     at = asked.loc[asked["quantity"] == "ustar_over_ustar0", "at"]
-    assert at.to_numpy() == pytest.approx((stress["s_m"] / scene["h_m"]).to_numpy(), rel=1e-7)
+    assert at.to_numpy() == pytest.approx(
+        (stress["s_m"] / scene["h_m"]).to_numpy(), rel=1e-7
+    )
     height, z0 = scene["u_e_height_m"], scene["z0_m"]
     ustar0 = 0.41 * scene["u_e_m_s"] / math.log((height + z0) / z0)
     assert scene["ustar0_m_s"] == pytest.approx(ustar0)

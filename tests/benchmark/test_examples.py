@@ -21,7 +21,13 @@ ENGINES = {
     "lmp": f"{shlex.join([sys.executable, f'{EXAMPLES}/lammps/solve.py'])} {{case}} {{out}}",
     "yade": f"yade -n -x -j1 {shlex.quote(f'{EXAMPLES}/yade/solve.py')} {{case}} {{out}}",
 }
-CHECKS = ("2-collision-0.1", "2-incline-20", "2-incline-70", "2-sliding-2", "2-passing-2")
+CHECKS = (
+    "2-collision-0.1",
+    "2-incline-20",
+    "2-incline-70",
+    "2-sliding-2",
+    "2-passing-2",
+)
 
 
 def _run(pack: Path, folder: Path, command: str, *scenes: str) -> Outcome:
@@ -37,7 +43,9 @@ def native(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     if compiler is None:
         pytest.skip("there is no g++")
     program, source = tmp_path / "solver", NATIVE / "solver.cpp"
-    subprocess.run([compiler, "-std=c++17", "-Wall", "-Werror", "-o", program, source], check=True)
+    subprocess.run(
+        [compiler, "-std=c++17", "-Wall", "-Werror", "-o", program, source], check=True
+    )
     return f"{program} {{case}} {{out}}"
 
 
@@ -50,7 +58,9 @@ def engine(request: pytest.FixtureRequest) -> str:
     return ENGINES[program]
 
 
-def test_the_native_starts_know_the_formulas(formulas: Path, tmp_path: Path, native: str) -> None:
+def test_the_native_starts_know_the_formulas(
+    formulas: Path, tmp_path: Path, native: str
+) -> None:
     assert _run(formulas, tmp_path, native, "1-*-d0.2mm-z0.1d-*").failures == []
     verdicts = pd.read_csv(tmp_path / "results" / "verdicts.csv")
     assert len(verdicts) > 3
@@ -66,7 +76,9 @@ def test_the_native_starts_know_the_pivots_of_a_poured_bed(
     assert pile.cases is not None
     grains = pd.read_csv(next(poured.glob("scenes/4-*/grains.csv")))
     assert grains["d_m"].nunique() > 10
-    flows = pd.read_csv(next(poured.glob("scenes/4-*/load_steps.csv")))["ustar0_m_s"].to_numpy()
+    flows = pd.read_csv(next(poured.glob("scenes/4-*/load_steps.csv")))[
+        "ustar0_m_s"
+    ].to_numpy()
     alone = pile.loads(pile.cases).alone()
     numbers = pd.read_csv(tmp_path / "results" / "comparison.csv")
     moved = numbers[numbers["quantity"] == "moved"]
@@ -80,7 +92,14 @@ def test_an_engine_agrees(
 ) -> None:
     assert _run(all_levels, tmp_path, engine, *CHECKS, "2-grain*", "4-*").failures == []
     verdicts = pd.read_csv(tmp_path / "results" / "verdicts.csv")
-    assert set(verdicts["kind"]) == {"collision", "incline", "sliding", "passing", "pivot", "pile"}
+    assert set(verdicts["kind"]) == {
+        "collision",
+        "incline",
+        "sliding",
+        "passing",
+        "pivot",
+        "pile",
+    }
     assert (verdicts.loc[verdicts["kind"] == "incline", "worst"] < 1e-3).all()
     for other in (lift_off, poured):
         assert _run(other, tmp_path / other.parent.name, engine, "4-*").failures == []
@@ -91,12 +110,20 @@ def test_the_bed_of_lammps_runs_by_hand(tmp_path: Path) -> None:
         pytest.skip("lmp is not installed")
     folder = tmp_path / "lammps"
     shutil.copytree(EXAMPLES / "lammps", folder)
-    subprocess.run(["lmp", "-in", "in.bed"], cwd=folder, check=True, capture_output=True)
+    subprocess.run(
+        ["lmp", "-in", "in.bed"], cwd=folder, check=True, capture_output=True
+    )
     frames = (folder / "track.dump").read_text().split("ITEM: TIMESTEP\n")[1:]
     x = [float(frame.split()[-2]) for frame in frames]
-    load_steps = [int(line) for line in (folder / "samples.csv").read_text().split()[1:]]
+    load_steps = [
+        int(line) for line in (folder / "samples.csv").read_text().split()[1:]
+    ]
     # W/tan(60 degrees) lies between the forces of load steps 2 and 3
-    moved = [step for step, now in zip(load_steps, x[1:], strict=True) if now - x[0] >= 0.3e-3]
+    moved = [
+        step
+        for step, now in zip(load_steps, x[1:], strict=True)
+        if now - x[0] >= 0.3e-3
+    ]
     assert min(moved) == 3
 
 
@@ -115,7 +142,9 @@ def test_the_flow_keeps_the_stress_on_a_flat_bed(
     assert flow.own == pytest.approx(1.0, abs=0.015)
 
 
-def test_the_flow_on_a_pile_is_that_of_openfoam(all_levels: Path, tmp_path: Path) -> None:
+def test_the_flow_on_a_pile_is_that_of_openfoam(
+    all_levels: Path, tmp_path: Path
+) -> None:
     command = f"{shlex.join([sys.executable, f'{EXAMPLES}/flow/answer.py'])} {{case}} {{out}} 0.5"
     assert _run(all_levels, tmp_path, command, "[35]-*").failures == []
     numbers = pd.read_csv(tmp_path / "results" / "comparison.csv").set_index("quantity")

@@ -21,7 +21,9 @@ LARGEST = float(np.finfo(float).max)
 EXTREMES = (1e308, -1e308, LARGEST, -LARGEST, 5e-324, -5e-324, 0.0, -0.0)
 
 
-def _results(chosen: Pack, place: Path, answers: Mapping[str, str], used: Any = None) -> Path:
+def _results(
+    chosen: Pack, place: Path, answers: Mapping[str, str], used: Any = None
+) -> Path:
     """A directory of answers, as another program leaves them."""
     for name, text in answers.items():
         folder = place / name
@@ -85,12 +87,16 @@ def _check(chosen: Pack, numbers: pd.DataFrame, verdicts: pd.DataFrame) -> None:
 
 
 @pytest.mark.parametrize("value", [1e308, LARGEST, 5e-324, 0.0])
-def test_any_double_is_judged_and_drawn(all_levels: Path, tmp_path: Path, value: float) -> None:
+def test_any_double_is_judged_and_drawn(
+    all_levels: Path, tmp_path: Path, value: float
+) -> None:
     """Answers far beyond the numbers of the model fail; tables, charts and page are written."""
     chosen = pack.read(all_levels)
     texts = {}
     for name in NAMES:
-        quantities = chosen.expected.loc[chosen.expected["scene"] == name, "quantity"].tolist()
+        quantities = chosen.expected.loc[
+            chosen.expected["scene"] == name, "quantity"
+        ].tolist()
         changed = {}
         sign = 1.0
         for number, quantity in enumerate(quantities):
@@ -103,17 +109,25 @@ def test_any_double_is_judged_and_drawn(all_levels: Path, tmp_path: Path, value:
         texts[name] = _text(chosen, name, changed)
     used = {"seconds": abs(value), "cpu_s": abs(value), "peak_mib": value}
     results = _results(chosen, tmp_path / "extreme", texts, used)
-    outcome = compare.compare(all_levels, [results], tmp_path / "page", Options((), NAMES))
-    assert "FAILED extreme: of 6 scenes 0 passed, 6 failed, 0 declined" in outcome.summary
+    outcome = compare.compare(
+        all_levels, [results], tmp_path / "page", Options((), NAMES)
+    )
+    assert (
+        "FAILED extreme: of 6 scenes 0 passed, 6 failed, 0 declined" in outcome.summary
+    )
     numbers = pd.read_csv(tmp_path / "page" / "comparison.csv", dtype={"at": str})
     assert len(numbers) == chosen.expected["scene"].isin(NAMES).sum()
-    assert numbers["answer"].abs().eq(float(f"{abs(value):.9g}")).sum() > 0.8 * len(numbers)
+    assert numbers["answer"].abs().eq(float(f"{abs(value):.9g}")).sum() > 0.8 * len(
+        numbers
+    )
     assert np.isfinite(numbers["error"]).all()
     assert {path.name for path in (tmp_path / "page" / "figures").glob("*.png")} >= {
         *("moved.png", "moved-line.png", "shields.png", "stress.png"),
     }
     # what was written is read again: the same page from the same results
-    again = compare.compare(all_levels, [results], tmp_path / "page", Options((), NAMES))
+    again = compare.compare(
+        all_levels, [results], tmp_path / "page", Options((), NAMES)
+    )
     assert again.failures == outcome.failures
 
 
@@ -126,12 +140,16 @@ VALUES = st.one_of(
 """Texts of finite numbers."""
 TEXTS = st.one_of(
     st.text(max_size=60),
-    st.sampled_from(["nan", "1_0", "\u0661", "1e999", "-inf", "0x10", "1,2", "", " 1 "]),
+    st.sampled_from(
+        ["nan", "1_0", "\u0661", "1e999", "-inf", "0x10", "1,2", "", " 1 "]
+    ),
 )
 """Texts of any kind in the place of a number."""
 JSON = st.recursive(
     st.none() | st.booleans() | st.floats() | st.text(max_size=8) | st.integers(),
-    lambda inner: st.lists(inner, max_size=2) | st.dictionaries(st.text(max_size=3), inner),
+    lambda inner: (
+        st.lists(inner, max_size=2) | st.dictionaries(st.text(max_size=3), inner)
+    ),
     max_leaves=4,
 )
 USED = st.fixed_dictionaries(
@@ -173,7 +191,9 @@ def test_any_file_has_a_verdict(
     """Files of any text fail by a message on one line."""
     chosen = pack.read(all_levels)
     rows = [",".join(line) for line in lines]
-    text = "\n".join(["quantity,at,value", *rows, ""]).encode("utf-8", "replace").decode()
+    text = (
+        "\n".join(["quantity,at,value", *rows, ""]).encode("utf-8", "replace").decode()
+    )
     place = tmp_path_factory.mktemp("answers") / "any"
     results = _results(chosen, place, {"2-incline-20": text}, used)
     numbers, verdicts = judge.judge(chosen, ["2-incline-20"], [results])
@@ -186,11 +206,15 @@ def test_any_file_has_a_verdict(
 @pytest.mark.parametrize(
     "number", ["1_0", "\u0661", "nan", "inf", "1e999", "0x10", "1d5", "", "1 2", "--1"]
 )
-def test_what_is_no_number_is_said(all_levels: Path, tmp_path: Path, number: str) -> None:
+def test_what_is_no_number_is_said(
+    all_levels: Path, tmp_path: Path, number: str
+) -> None:
     """Texts that Python reads as numbers, though no table of a program has them, count no more."""
     chosen = pack.read(all_levels)
     text = f"quantity,at,value\nacceleration_over_g,,{number}\n"
     results = _results(chosen, tmp_path / "any", {"2-incline-20": text})
     _, verdicts = judge.judge(chosen, ["2-incline-20"], [results])
     assert "line 2, " in verdicts["message"].iloc[0]
-    assert "is not a quantity, its at and a finite number" in verdicts["message"].iloc[0]
+    assert (
+        "is not a quantity, its at and a finite number" in verdicts["message"].iloc[0]
+    )

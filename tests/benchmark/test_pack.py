@@ -32,7 +32,9 @@ def _documented() -> set[tuple[str, str]]:
         words, _, names = item.partition(":")
         kinds = {kind for kind in pack.KINDS if re.search(rf"\b{kind}\b", words)}
         kinds = set(pack.KINDS) - kinds if words.startswith("all") else kinds
-        entries |= {(name, kind) for name in re.findall(r"`(\w+)`", names) for kind in kinds}
+        entries |= {
+            (name, kind) for name in re.findall(r"`(\w+)`", names) for kind in kinds
+        }
     return entries
 
 
@@ -83,12 +85,19 @@ def test_levels_times_and_our_answers(all_levels: Path) -> None:
     margin = (judged["tolerance"] + 1e-8) * judged["value"].abs()
     assert judged["ours"].between(judged["low"] - margin, judged["high"] + margin).all()
     times = pd.read_csv(all_levels / "times.csv").set_index("scene")["seconds"]
-    assert set(times.index[times > 0]) == {name for name in chosen.scenes if name[0] != "1"}
+    assert set(times.index[times > 0]) == {
+        name for name in chosen.scenes if name[0] != "1"
+    }
 
 
-def _scene_and_case(root: Path, scene: str, case: str) -> tuple[Any, pd.DataFrame, Path, Any]:
+def _scene_and_case(
+    root: Path, scene: str, case: str
+) -> tuple[Any, pd.DataFrame, Path, Any]:
     """The entries and grains of a scene, and the case of its answer with the grains of its deck."""
-    (folder,), (run,) = root.glob(f"scenes/{scene}"), root.parent.glob(f"study/cases/{case}-*")
+    (folder,), (run,) = (
+        root.glob(f"scenes/{scene}"),
+        root.parent.glob(f"study/cases/{case}-*"),
+    )
     rows = (run / "grains.data").read_text().partition("Atoms\n\n")[2].split("\n")
     deck = pd.DataFrame([row.split() for row in rows if row]).astype(float)
     given = json.loads((folder / "scene.json").read_text())
@@ -111,7 +120,10 @@ def test_a_pivot_is_the_cell_of_its_case(all_levels: Path) -> None:
     given, grains, case, deck = _scene_and_case(all_levels, "2-grain*", "cells")
     load_steps = pd.read_csv(min(all_levels.glob("scenes/2-grain*/load_steps.csv")))
     for axis, place in (("x", 4), ("z", 6)):
-        centres, of_deck = grains[f"{axis}_m"] / given["d_m"], deck[place] / cells.DIAMETER
+        centres, of_deck = (
+            grains[f"{axis}_m"] / given["d_m"],
+            deck[place] / cells.DIAMETER,
+        )
         assert (centres - centres[2]).to_numpy() == pytest.approx(of_deck - of_deck[2])
         rows = (case / f"force.{axis}.txt").read_text().split("\n")[1::2]
         force = np.array([row.split()[1] for row in rows if row], float)
@@ -133,7 +145,9 @@ def test_a_pivot_is_the_cell_of_its_case(all_levels: Path) -> None:
         ("law = 'bridged'\nlift_coefficient = 50.0", False),
     ],
 )
-def test_pivots_are_of_every_law_that_holds_and_rolls_its_grain(forces: str, has_one: bool) -> None:
+def test_pivots_are_of_every_law_that_holds_and_rolls_its_grain(
+    forces: str, has_one: bool
+) -> None:
     group = "[[group]]\nname = 'a'\nbed.slope_deg = 25.0"
     scene = _scene(f"[grain]\ndiameter = 3e-4\n[forces]\n{forces}\n{group}")
     assert scenes.has_pivot(scene) is has_one
@@ -149,7 +163,12 @@ def test_where_details_decide_only_what_they_do_not_is_judged(
     assert tolerances[["0.5", "0.7"]].isna().all()
     moved = rows.loc["moved"]
     judged = moved["tolerance"].notna()
-    assert 0 < moved.loc[judged, "value"].max() <= 0.35 * count < moved.loc[~judged, "high"].min()
+    assert (
+        0
+        < moved.loc[judged, "value"].max()
+        <= 0.35 * count
+        < moved.loc[~judged, "high"].min()
+    )
     # where lift carries grains off, which collide, thresholds are known less well
     chosen = pack.read(lift_off)
     ((_, given),) = chosen.scenes.items()
@@ -157,7 +176,9 @@ def test_where_details_decide_only_what_they_do_not_is_judged(
     last = lifted.loc["moved"].iloc[-1]
     assert given["lift_off"] > 0.9
     assert lifted.loc["carried_off", "at"] == last["at"]
-    assert lifted.loc["carried_off", "value"] == round(given["lift_off"] * last["value"])
+    assert lifted.loc["carried_off", "value"] == round(
+        given["lift_off"] * last["value"]
+    )
     assert lifted.loc["shields", "tolerance"].eq(0.2).all()
     # rows along the face are judged to their end, and nothing is said of lift
     table = pack.read(all_levels).expected.set_index("scene").filter(like="4-", axis=0)
@@ -170,7 +191,9 @@ def test_export_twice_and_without_liggghts(
 ) -> None:
     export(tmp_path / "again", None, ())
     export(tmp_path / "again", None, ())
-    first, again = (pack.read(root).manifest.sha256 for root in (formulas, tmp_path / "again"))
+    first, again = (
+        pack.read(root).manifest.sha256 for root in (formulas, tmp_path / "again")
+    )
     assert {name for name in first if first[name] != again.get(name)} <= {pack.TIMES}
     monkeypatch.setenv("PATH", str(tmp_path))
     export(tmp_path / "pack", None, (2,))
@@ -238,7 +261,10 @@ HARMS: dict[str, Callable[[Path], object]] = {
     "no JSON": lambda root: (root / INCLINE / "scene.json").write_bytes(b"\xff\xfe{"),
     "another level": lambda root: _edit(root / INCLINE / "scene.json", level=3),
     "no number": lambda root: (root / "expected.csv").write_text(
-        (root / "expected.csv").read_text().replace(",1e-06,", ",1e999,").replace("0.01,", "x,")
+        (root / "expected.csv")
+        .read_text()
+        .replace(",1e-06,", ",1e999,")
+        .replace("0.01,", "x,")
     ),
     "a table that is a link": lambda root: _replace(
         root / "expected.csv", lambda path: path.symlink_to("/dev/zero")
@@ -247,9 +273,13 @@ HARMS: dict[str, Callable[[Path], object]] = {
         (root / INCLINE).rename(root.parent / "away")
     ),
     "a pipe": lambda root: _replace(root / INCLINE / "ask.csv", os.mkfifo),
-    "a scene that is not listed": lambda root: shutil.copytree(root / INCLINE, root / "scenes/2-b"),
+    "a scene that is not listed": lambda root: shutil.copytree(
+        root / INCLINE, root / "scenes/2-b"
+    ),
     "another schema": lambda root: _edit(root / pack.MANIFEST, schema=1),
-    "bytes for a study": lambda root: (root / "study.toml").write_bytes(b"\xff\xfe\x00"),
+    "bytes for a study": lambda root: (root / "study.toml").write_bytes(
+        b"\xff\xfe\x00"
+    ),
     "a study of a file": lambda root: (root / "study.toml").write_text(
         'bed = { profile = "/etc/passwd" }\n' + (root / "study.toml").read_text()
     ),
@@ -270,9 +300,13 @@ def test_a_hostile_pack_is_refused_by_one_line(
     if name not in TOUCHED:
         seal(copy)
     before = {path for path in tmp_path.rglob("*") if "results" not in path.parts}
-    code = cli.main(["benchmark", "run", "pack", "--scene", "2-*", "--solver", "true {case} {out}"])
+    code = cli.main(
+        ["benchmark", "run", "pack", "--scene", "2-*", "--solver", "true {case} {out}"]
+    )
     printed = capsys.readouterr().err
     assert code == 2, printed
-    (line,) = (line for line in printed.splitlines() if line.startswith("orchestrator: "))
+    (line,) = (
+        line for line in printed.splitlines() if line.startswith("orchestrator: ")
+    )
     assert "pack" in line
     assert {p for p in tmp_path.rglob("*") if "results" not in p.parts} == before

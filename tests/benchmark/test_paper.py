@@ -34,7 +34,9 @@ def test_it_is_of_the_preset_paper(expected: pd.DataFrame, paper: Study) -> None
     assert (FOLDER / "study.toml").read_text() == paper.text
     planned = plan.make(paper)
     names = scene_names(planned, paper)
-    piles = {names[one] for one, pile in planned.piles.items() if not pile.bed.is_replica}
+    piles = {
+        names[one] for one, pile in planned.piles.items() if not pile.bed.is_replica
+    }
     flows = {names[pile.flow.id[:12]] for pile in planned.piles.values()}
     grains = {names[one.id] for one in paper.scenes if one.id not in planned.piles}
     level, name = expected["scene"].str[0], expected["scene"].str[2:]
@@ -43,7 +45,9 @@ def test_it_is_of_the_preset_paper(expected: pd.DataFrame, paper: Study) -> None
     assert set(pd.read_csv(FOLDER / "scenes.csv")["scene"]) == set(expected["scene"])
 
 
-def test_fresh_piles_are_as_expected(expected: pd.DataFrame, paper: Study, tmp_path: Path) -> None:
+def test_fresh_piles_are_as_expected(
+    expected: pd.DataFrame, paper: Study, tmp_path: Path
+) -> None:
     chosen = [
         scene
         for scene in next(g for g in paper.groups if g.name == "piles").scenes
@@ -69,18 +73,30 @@ def test_fresh_piles_are_as_expected(expected: pd.DataFrame, paper: Study, tmp_p
             stated = expected[expected["scene"] == problem.scene].set_index(fresh.index)
             assert (fresh["quantity"] == stated["quantity"]).all()
             at, stated_at = (pd.to_numeric(table["at"]) for table in (fresh, stated))
-            assert at.to_numpy() == pytest.approx(stated_at.to_numpy(), rel=1e-6, nan_ok=True)
+            assert at.to_numpy() == pytest.approx(
+                stated_at.to_numpy(), rel=1e-6, nan_ok=True
+            )
             margin = 1e-4 * stated["value"].abs()
-            is_held = fresh["ours"].between(stated["low"] - margin, stated["high"] + margin)
+            is_held = fresh["ours"].between(
+                stated["low"] - margin, stated["high"] + margin
+            )
             assert is_held[stated["tolerance"].notna()].all(), problem.scene
 
 
 def test_it_is_called_a_table_and_no_pack() -> None:
     """Whoever tries to run it is told what it is, by the program and by each link to it."""
-    with pytest.raises(InputError, match=r"a table of expected answers, and no pack.*README"):
+    with pytest.raises(
+        InputError, match=r"a table of expected answers, and no pack.*README"
+    ):
         pack.read(FOLDER)
     for page in ("README.md", "docs/README.md", "docs/benchmark.md"):
         text = (ROOT / page).read_text(encoding="utf-8")
-        (line,) = (line for line in text.splitlines() if "benchmark/paper/README.md" in line)
+        (line,) = (
+            line for line in text.splitlines() if "benchmark/paper/README.md" in line
+        )
         assert "paper's pack" not in line
-    assert (FOLDER / "README.md").read_text(encoding="utf-8").startswith("# The expected answers")
+    assert (
+        (FOLDER / "README.md")
+        .read_text(encoding="utf-8")
+        .startswith("# The expected answers")
+    )

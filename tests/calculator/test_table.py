@@ -20,11 +20,15 @@ def test_every_point_and_law_is_the_closed_form_of_it() -> None:
     assert len(table) == 40 * len(LAWS)
     for name, law in LAWS.items():
         here = Exposure(d, d / 30, 1.0, 1e-5)
-        one = threshold(law, here, density=2500.0, slope_deg=slopes, entrainment_angle_deg=60.0)
+        one = threshold(
+            law, here, density=2500.0, slope_deg=slopes, entrainment_angle_deg=60.0
+        )
         rows = table[table["law"] == name]
         np.testing.assert_allclose(rows["ustar_m_s"], one.friction_velocity, rtol=1e-9)
         np.testing.assert_array_equal(rows["valid"], one.valid)
-        why = why_not(law, one.friction_velocity, here, density=2500.0, slope_deg=slopes)
+        why = why_not(
+            law, one.friction_velocity, here, density=2500.0, slope_deg=slopes
+        )
         assert rows["why_not"].tolist() == why
 
 
@@ -37,15 +41,21 @@ def test_parameters_are_fields_of_a_scene_with_their_columns_and_defaults() -> N
         part, _, field = parameter.field.partition(".")
         declared = PARTS[part].model_fields[field]
         if name != "roughness":  # its default is a part of the diameter
-            assert parameter.default == (None if declared.is_required() else declared.default)
-        for value in map(float, parameter.ordinary):  # no scene of an ordinary value is refused
+            assert parameter.default == (
+                None if declared.is_required() else declared.default
+            )
+        for value in map(
+            float, parameter.ordinary
+        ):  # no scene of an ordinary value is refused
             given: dict[str, object] = {
                 "bed.slope_deg": 30.0,
                 "grain.diameter": 10.0,
                 "grain.density": 2.5e4,
             }
             given |= {"fluid.density": 1e-6, "protocol.method": '"pivot"'}
-            text = "\n".join(f"{k} = {v}" for k, v in {**given, parameter.field: value}.items())
+            text = "\n".join(
+                f"{k} = {v}" for k, v in {**given, parameter.field: value}.items()
+            )
             (scene,) = parse(text, name="t", where="t").scenes
             limits.check(scene, "t")
 

@@ -44,7 +44,9 @@ def _json(ended: Ended) -> Any:
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_json_has_an_object_for_each_law_that_agrees_with_itself(run: Run, law: str) -> None:
+def test_json_has_an_object_for_each_law_that_agrees_with_itself(
+    run: Run, law: str
+) -> None:
     angles = ["--slope", "10", "--entrainment-angle", "50"]
     record = _json(run("--diameter", "2e-4", *angles, "--law", law, "--json"))
     assert (record["regime"], record["paper"]) == ("transition", ["low", "high"])
@@ -78,16 +80,25 @@ def test_a_liquid_of_a_depth_has_a_mean_velocity_and_no_winds(run: Run) -> None:
     assert "wind" not in run(*QUARTZ_IN_WATER, "--depth", "1")[1]
     assert "--depth in m" in run(*QUARTZ_IN_WATER)[1]
     oil = ["--fluid-density", "870", "--viscosity", "5e-5", "--depth", "0.02"]
-    assert "no mean velocity: U D/nu is below 2000" in run(*D, "--density", "2650", *oil)[1]
+    assert (
+        "no mean velocity: U D/nu is below 2000"
+        in run(*D, "--density", "2650", *oil)[1]
+    )
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_the_answer_comes_first_and_the_other_laws_beside_it(run: Run, law: str) -> None:
+def test_the_answer_comes_first_and_the_other_laws_beside_it(
+    run: Run, law: str
+) -> None:
     code, out, err = run(*SAND_IN_AIR, "--law", law)
     assert (code, err) == (0, "")
     record = _json(run(*SAND_IN_AIR, "--law", law, "--json"))
     answer, *_, table = out.split("\n\n")[0].splitlines()[1:], out.split("\n\n")[2]
-    assert answer[0].split() == ["u*,", "m/s", f"{record[law]['friction_velocity']:.4g}"]
+    assert answer[0].split() == [
+        "u*,",
+        "m/s",
+        f"{record[law]['friction_velocity']:.4g}",
+    ]
     rows = [line.split() for line in table.splitlines()[1:]]
     assert rows[0][0] == law
     for name, ustar, *_, shields, _, holds in (row[:7] for row in rows):
@@ -101,9 +112,13 @@ def test_the_papers_rule_gives_both_equations_in_the_transition(run: Run) -> Non
     lines = run(*SAND_IN_AIR, "--law", "paper")[1].splitlines()
     assert lines[1].split() == ["low", "high"]
     assert lines[2].split() == ["u*,", "m/s", "0.4658", "0.2242"]
-    rows = csv.DictReader(io.StringIO(run("--diameter", RANGE, "--law", "paper", "--csv")[1]))
+    rows = csv.DictReader(
+        io.StringIO(run("--diameter", RANGE, "--law", "paper", "--csv")[1])
+    )
     for row in rows:
-        laws = {"low": ["low"], "high": ["high"], "transition": ["low", "high"]}[row["regime"]]
+        laws = {"low": ["low"], "high": ["high"], "transition": ["low", "high"]}[
+            row["regime"]
+        ]
         assert (row["answer"] == "True") == (row["law"] in laws)
 
 
@@ -112,7 +127,9 @@ def test_csv_and_json_say_the_same(run: Run) -> None:
     rows = list(csv.DictReader(io.StringIO(run(*asked, "--csv")[1])))
     records = _json(run(*asked, "--json"))
     assert len(rows) == 3 * len(LAWS)
-    for row, (record, law) in zip(rows, ((r, n) for r in records for n in LAWS), strict=True):
+    for row, (record, law) in zip(
+        rows, ((r, n) for r in records for n in LAWS), strict=True
+    ):
         one = record[law]
         assert row["law"] == law
         assert float(row["z0_m"]) == record["input"]["roughness"]
@@ -147,17 +164,33 @@ def test_a_number_that_is_usual_in_another_unit_is_asked_about_and_answered(
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--diameter", "a:b:c"], ["--diameter: 'a:b:c' is neither a number nor a range"]),
+        (
+            ["--diameter", "a:b:c"],
+            ["--diameter: 'a:b:c' is neither a number nor a range"],
+        ),
         (["--diameter", "1:2"], ["--diameter: '1:2' is not a range"]),
         *(
             (["--diameter", text], [f"--diameter: '{text}' is not a range"])
-            for text in ("1:2:1", "1:2:2.5", "1:2:inf", "2e-3:1e-4:5", "1e-4:inf:5", "1:2:1e9")
+            for text in (
+                "1:2:1",
+                "1:2:2.5",
+                "1:2:inf",
+                "2e-3:1e-4:5",
+                "1e-4:inf:5",
+                "1:2:1e9",
+            )
         ),
         ([*D, "--roughness", "d/10:d/30:3"], ["--roughness", "values that rise"]),
         ([*D, "--roughness", "d/30:1e-4:3"], ["--roughness: 'd/30:1e-4:3' is neither"]),
         ([*D, "--slope", "0:31:5"], ["--slope: 31 deg"]),
-        (["--diameter", "1e-4:1e-3:400", "--slope", "0:30:400"], ["160000 points", "COUNT"]),
-        ([*D, "--density", "2.65", *WATER], ["--density: 2.65 kg/m3: did you", "--density 2650?"]),
+        (
+            ["--diameter", "1e-4:1e-3:400", "--slope", "0:30:400"],
+            ["160000 points", "COUNT"],
+        ),
+        (
+            [*D, "--density", "2.65", *WATER],
+            ["--density: 2.65 kg/m3: did you", "--density 2650?"],
+        ),
         ([*D, "--density", "900", *WATER], ["--density", "lower --fluid-density"]),
         ([*D, "--depth", "1"], ["--depth", "gas", "--fluid water"]),
         ([*QUARTZ_IN_WATER, "--depth", "1e-4"], ["--depth", "does not cover"]),
@@ -168,7 +201,10 @@ def test_a_number_that_is_usual_in_another_unit_is_asked_about_and_answered(
             ["--diameter: 200 m: did you mean", "--diameter 0.0002? (else"],
         ),
         ([*D, "--diameter", "0,25"], ["--diameter", "write 0.25"]),
-        ([*D, "--diameter", "0.25 mm"], ["--diameter", "write 0.00025, without a unit"]),
+        (
+            [*D, "--diameter", "0.25 mm"],
+            ["--diameter", "write 0.00025, without a unit"],
+        ),
         ([*D, "--diameter", "1_0e-4"], ["--diameter: '1_0e-4' is neither"]),
         ([*D, "--diameter", "١e-3"], ["--diameter: '١e-3' is neither"]),
         ([*D, "--roughness", "d/٣٠"], ["--roughness: 'd/٣٠' is not a length"]),
@@ -195,10 +231,14 @@ def test_gravel_is_answered_by_a_law_that_holds(run: Run) -> None:
     gravel = ["--diameter", "0.03", "--density", "2650", "--fluid", "water"]
     code, out, _ = run(*gravel)
     assert code == 0
-    assert out.startswith("Force law bridged-gravel: a grain of 30 mm starts to move at")
+    assert out.startswith(
+        "Force law bridged-gravel: a grain of 30 mm starts to move at"
+    )
     assert "stress, Pa           19.21" in out
     asked = run(*gravel, "--law", "bridged")[1].splitlines()[0]
-    assert asked.startswith("Force law bridged does not hold here: particle Reynolds number")
+    assert asked.startswith(
+        "Force law bridged does not hold here: particle Reynolds number"
+    )
     assert "(choose --law bridged-gravel)" in asked
     sizes = ["--diameter", "1e-3:0.03:3", "--density", "2650", *WATER]
     rows = csv.DictReader(io.StringIO(run(*sizes, "--csv")[1]))

@@ -51,7 +51,9 @@ class Slurm:
 
     def says(self, *command: str) -> str:
         """What one of its commands prints."""
-        return subprocess.check_output(command, env=self.environment, text=True, timeout=60)
+        return subprocess.check_output(
+            command, env=self.environment, text=True, timeout=60
+        )
 
     def jobs(self) -> dict[str, str]:
         """Ids of the jobs that have not ended, with their state."""
@@ -61,7 +63,11 @@ class Slurm:
     def idle(self) -> int:
         """Number of the nodes that wait for a job."""
         with contextlib.suppress(subprocess.CalledProcessError):
-            return self.says("sinfo", "--noheader", "--Node", "--format=%t").split().count("idle")
+            return (
+                self.says("sinfo", "--noheader", "--Node", "--format=%t")
+                .split()
+                .count("idle")
+            )
         return 0
 
 
@@ -70,7 +76,9 @@ def missing() -> list[str]:
     path = os.pathsep.join([os.environ.get("PATH", ""), SBIN])
     lacking = [program for program in PROGRAMS if not shutil.which(program, path=path)]
     if not _orphans_vanish():
-        lacking.append("a process 1 that waits for orphans (`--init` of podman and docker)")
+        lacking.append(
+            "a process 1 that waits for orphans (`--init` of podman and docker)"
+        )
     return lacking
 
 
@@ -79,7 +87,9 @@ def _orphans_vanish() -> bool:
 
     It waits a minute for the end of such a job, and then takes the node out of service.
     """
-    said = subprocess.check_output(["sh", "-c", "sleep 0.1 >/dev/null & echo $!"], text=True)
+    said = subprocess.check_output(
+        ["sh", "-c", "sleep 0.1 >/dev/null & echo $!"], text=True
+    )
     orphan = Path("/proc", said.strip())
     for _ in range(200):
         if not orphan.exists():
@@ -121,7 +131,9 @@ def running(root: Path, *, nodes: int, cores: int) -> Iterator[Slurm]:
         for command in daemons:
             # a test run that is killed leaves no daemon
             words = ["setpriv", "--pdeathsig", "KILL", "--", *command]
-            daemon = subprocess.Popen(words, env=slurm.environment, stdout=log, stderr=log)
+            daemon = subprocess.Popen(
+                words, env=slurm.environment, stdout=log, stderr=log
+            )
             stack.callback(_end, daemon)
             started.append(daemon)
             until((root / "munge.socket").exists, "munged", goes_on)
@@ -136,7 +148,10 @@ def running(root: Path, *, nodes: int, cores: int) -> Iterator[Slurm]:
 def _free_ports(count: int) -> int:
     """The first of so many neighbouring ports that nobody listens on."""
     while True:
-        with contextlib.ExitStack() as stack, contextlib.suppress(OSError, OverflowError):
+        with (
+            contextlib.ExitStack() as stack,
+            contextlib.suppress(OSError, OverflowError),
+        ):
             first = 0
             for place in range(count):
                 port = stack.enter_context(socket.socket())
@@ -155,7 +170,9 @@ def _end(daemon: "subprocess.Popen[bytes]") -> None:
 
 
 def until(
-    condition: Callable[[], object], what: str, goes_on: Callable[[], None] = lambda: None
+    condition: Callable[[], object],
+    what: str,
+    goes_on: Callable[[], None] = lambda: None,
 ) -> None:
     """Wait for something, at most five minutes; `goes_on` raises where it can no longer come."""
     for _ in range(6000):

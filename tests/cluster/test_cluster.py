@@ -55,7 +55,9 @@ def queue(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Slurm]:
     if lacking:
         stop = pytest.fail if os.environ.get("SKIP_NOTHING") else pytest.skip
         stop(f"without {', '.join(lacking)}; `sh tools/setup.sh test` installs all")
-    with slurm.running(tmp_path_factory.mktemp("slurm") / "root", nodes=2, cores=1) as started:
+    with slurm.running(
+        tmp_path_factory.mktemp("slurm") / "root", nodes=2, cores=1
+    ) as started:
         yield started
 
 
@@ -104,7 +106,9 @@ def test_a_killed_driver(bench: Bench) -> None:
         return bool(first) and bool(_at_work(bench))
 
     assert wait_for(second_runs, driver), ended(driver)
-    before = {path: path.stat().st_mtime_ns for path in bench.out.glob("cases/*/done.json")}
+    before = {
+        path: path.stat().st_mtime_ns for path in bench.out.glob("cases/*/done.json")
+    }
     driver.kill()
     driver.communicate()
     code, printed = bench.study()

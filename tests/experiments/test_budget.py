@@ -39,7 +39,9 @@ def test_an_alternative_changes_one_part_and_is_not_the_scene_itself(
     for bed in ({}, {"bed.packing": "poured"}):
         asked = changed(scene, bed)
         for _, other in choice.scenes(asked):
-            parts = [p for p in Scene.model_fields if getattr(other, p) != getattr(asked, p)]
+            parts = [
+                p for p in Scene.model_fields if getattr(other, p) != getattr(asked, p)
+            ]
             assert len(parts) == 1
 
 
@@ -55,7 +57,11 @@ def test_an_alternative_changes_one_part_and_is_not_the_scene_itself(
         ("first cell", LEVEL, set()),
         ("friction angle", LEVEL, {"-5°", "+5°"}),
         ("exposure", {"bed.packing": "poured"}, {"protrusion"}),
-        ("packing", {"bed.packing": "poured"}, {f"poured, seed {seed}" for seed in (1, 2, 3)}),
+        (
+            "packing",
+            {"bed.packing": "poured"},
+            {f"poured, seed {seed}" for seed in (1, 2, 3)},
+        ),
     ],
 )
 def test_the_alternatives_are_those_that_a_scene_can_have(
@@ -66,9 +72,20 @@ def test_the_alternatives_are_those_that_a_scene_can_have(
 
 
 def _moved(*changes: tuple[str, str, float], scene: str = "a") -> pd.DataFrame:
-    row = {"scene_id": scene, "scene": scene, "model_class": "aligned, rough", "fraction": 0.3}
+    row = {
+        "scene_id": scene,
+        "scene": scene,
+        "model_class": "aligned, rough",
+        "fraction": 0.3,
+    }
     return pd.DataFrame(
-        {**row, "choice": choice, "alternative": other, "shields": change, "ustar0": change / 2}
+        {
+            **row,
+            "choice": choice,
+            "alternative": other,
+            "shields": change,
+            "ustar0": change / 2,
+        }
         for choice, other, change in changes
     )
 
@@ -88,7 +105,11 @@ def test_the_share_of_a_choice_is_the_range_of_its_alternatives() -> None:
     # of a class the largest is kept
     worse = budget.shares(_moved(("law", "a", -0.4), scene="b"))
     known = budget.known(pd.concat([shares.reset_index(), worse])).set_index("choice")
-    assert list(known.loc["law", ["shields_low", "shields_high", "scenes"]]) == [0.4, 0.2, 2.0]
+    assert list(known.loc["law", ["shields_low", "shields_high", "scenes"]]) == [
+        0.4,
+        0.2,
+        2.0,
+    ]
 
 
 def test_every_choice_has_its_share_on_a_poured_pile(tmp_path: Path) -> None:

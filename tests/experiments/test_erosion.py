@@ -17,33 +17,49 @@ PILE = 'bed.kind = "triangle"\nbed.slope_deg = 30.0\n'
 def test_the_classes_of_ap42_and_its_potential_by_hand() -> None:
     assert erosion.AREAS.groupby("pile")["share"].sum().tolist() == [100] * 4
     parts = erosion.AREAS["sub_areas"].str.split(" + ", regex=False)
-    assert [sum(map(int, filter(None, p))) for p in parts] == erosion.AREAS["share"].tolist()
+    assert [sum(map(int, filter(None, p))) for p in parts] == erosion.AREAS[
+        "share"
+    ].tolist()
     # u* in a wind of 20 m/s is 0.4, 1.2, 1.8 m/s; 36, 50 and 14 % of the area of pile B1
     surface = erosion.Surface("", pd.DataFrame(), 0.0, threshold=1.12)
     by_epa = erosion.Pile("", [surface], is_flat=False, has_bare=True).by_epa
     hand = 0.5 * (58 * 0.08**2 + 25 * 0.08) + 0.14 * (58 * 0.68**2 + 25 * 0.68)
     assert by_epa[1].potential([20.0, 10.0]) == pytest.approx([hand, 0.0])
-    assert by_epa[2].faces["ratio"].tolist() == pytest.approx([0.39, 1.17, 1.75, 2.14], abs=0.005)
+    assert by_epa[2].faces["ratio"].tolist() == pytest.approx(
+        [0.39, 1.17, 1.75, 2.14], abs=0.005
+    )
 
 
 def test_a_flat_bed_loses_what_the_log_law_takes(tmp_path: Path) -> None:
     text = 'flow.roughness = 0.005\nbed.kind = "flat"\ngrain.diameter = 1e-3\n' + WINDS
-    erosion.experiment(study.parse(text, name="", where=""), tmp_path).run(tmp_path, workers=1)
+    erosion.experiment(study.parse(text, name="", where=""), tmp_path).run(
+        tmp_path, workers=1
+    )
     table = pd.read_csv(tmp_path / "tables/erosion.csv")
     assert (table["u*/u*₀"] == 1).all()
-    ustar = np.array([0.41 * 20 / np.log(2001), 0.053 * 20])  # 10 m/s is below the threshold
-    assert table["P, g/m²"].unique() == pytest.approx(58 * (ustar - 0.6) ** 2 + 25 * (ustar - 0.6))
+    ustar = np.array(
+        [0.41 * 20 / np.log(2001), 0.053 * 20]
+    )  # 10 m/s is below the threshold
+    assert table["P, g/m²"].unique() == pytest.approx(
+        58 * (ustar - 0.6) ** 2 + 25 * (ustar - 0.6)
+    )
 
 
 def test_the_preset_is_run(tmp_path: Path) -> None:
-    ended = erosion.experiment(study.load("stockpile"), tmp_path).run(tmp_path, workers=2)
+    ended = erosion.experiment(study.load("stockpile"), tmp_path).run(
+        tmp_path, workers=2
+    )
     table = pd.read_csv(tmp_path / "tables/erosion.csv")
     lost = table[table["part"] == "all"].groupby("pile", sort=False)["P, g/m²"]
-    (flat_top, fenced, *by_epa), (ridge, behind, *by_epa_again) = (group for _, group in lost)
+    (flat_top, fenced, *by_epa), (ridge, behind, *by_epa_again) = (
+        group for _, group in lost
+    )
     assert by_epa == by_epa_again
     assert max(fenced / flat_top, behind / ridge) < 0.7
     assert min(by_epa) < flat_top < max(by_epa)
-    assert f"{flat_top:.3g} g/m²" in ended.answer.split("\n")[0] in ended.page.read_text()
+    assert (
+        f"{flat_top:.3g} g/m²" in ended.answer.split("\n")[0] in ended.page.read_text()
+    )
 
 
 def test_what_is_wrong_is_said_in_one_message(tmp_path: Path) -> None:
@@ -99,7 +115,9 @@ def test_piles_are_compared_that_differ_in_the_obstacle_alone(tmp_path: Path) ->
         ("k-ω SST", "k-ε"), ("kOmegaSST", "kEpsilon"), told, strict=True
     ):
         assert f"{name}; no obstacle)" in sentence
-        alone, own = _run(_text(obstacles, f'turbulence_model = "{model}"'), tmp_path / model)
+        alone, own = _run(
+            _text(obstacles, f'turbulence_model = "{model}"'), tmp_path / model
+        )
         assert len(alone) == 1
         assert _change(sentence) == _change(alone[0])
         rows = table[table["pile"].str.endswith(name)]
@@ -121,7 +139,10 @@ def test_obstacles_are_not_compared_with_one_another(tmp_path: Path) -> None:
     assert "; with a fence of 4 m at -4 m)" in told
     assert " With a block of 3 m at -6 m: " in told
     assert "%" not in told
-    assert table["surface"].tolist()[:2] == ["fence of 4 m at -4 m", "block of 3 m at -6 m"]
+    assert table["surface"].tolist()[:2] == [
+        "fence of 4 m at -4 m",
+        "block of 3 m at -6 m",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -137,9 +158,13 @@ def test_obstacles_are_not_compared_with_one_another(tmp_path: Path) -> None:
         ('"protocol.method" = ["pivot", "peeling"]', ["pivot", "peeling"]),
     ],
 )
-def test_each_pile_has_a_name_that_tells_it_from_the_others(axis: str, words: list[str]) -> None:
+def test_each_pile_has_a_name_that_tells_it_from_the_others(
+    axis: str, words: list[str]
+) -> None:
     """Whatever differs: the rows of two piles are never taken for those of one."""
-    asked = study.parse(_text(f"{axis}\n" + '"bed.obstacles" = [[]]'), name="", where="")
+    asked = study.parse(
+        _text(f"{axis}\n" + '"bed.obstacles" = [[]]'), name="", where=""
+    )
     names = erosion.names_of(asked.scenes)
     assert len({*names}) == len(names) == 2
     for word in words:
@@ -164,7 +189,9 @@ def test_another_file_has_another_directory(tmp_path: Path) -> None:
     run = [erosion.experiment(study.load(file), out).run for file in (first, second)]
     page = run[0](out, workers=1).page
     before = page.read_bytes()
-    with pytest.raises(InputError, match=r"the erosion of another file, .*heap\.toml.*--out"):
+    with pytest.raises(
+        InputError, match=r"the erosion of another file, .*heap\.toml.*--out"
+    ):
         run[1](out, workers=1)
     assert page.read_bytes() == before
     # the file itself may change, or go

@@ -19,29 +19,47 @@ from orchestrator.study import study
 from orchestrator.study.parts import PileBed
 
 FAST = "1 layer, fast"
-TAU = {"tau_0.1": 1.0, "tau_0.3": 1.5, "tau_0.5": 2.0, "tau_0.7": 2.5, "curve_0.50": 2.0}
+TAU = {
+    "tau_0.1": 1.0,
+    "tau_0.3": 1.5,
+    "tau_0.5": 2.0,
+    "tau_0.7": 2.5,
+    "curve_0.50": 2.0,
+}
 (REFERENCE, AGAIN), (LEVEL_REFERENCE, LEVEL_AGAIN), (FLOW_REFERENCE, FINER) = REFERENCES
 
 
 def test_every_level_is_run_and_each_pile_beside_its_reference() -> None:
     asked = study.load("ladder")
-    made = [(one.asked, one.levels) for one in ladder.decisions(asked).values() if one.levels]
+    made = [
+        (one.asked, one.levels)
+        for one in ladder.decisions(asked).values()
+        if one.levels
+    ]
     for part, levels in enumerate(LEVELS.values()):
         assert {pair[part] for _, pair in made} == set(levels)
     for scene in piles(asked):
-        run = {(pair.flow.name, pair.grains.name) for whose, pair in made if whose == scene}
+        run = {
+            (pair.flow.name, pair.grains.name) for whose, pair in made if whose == scene
+        }
         assert isinstance(scene.bed, PileBed)
         if scene.bed.is_level:  # no flow is solved over it
             assert {LEVEL_REFERENCE, LEVEL_AGAIN} <= run
             assert {flow for flow, _ in run} == {FLAT.name}
         else:
-            assert (REFERENCE in run) == (AGAIN in run) == (scene.protocol.method == "dem")
+            assert (
+                (REFERENCE in run) == (AGAIN in run) == (scene.protocol.method == "dem")
+            )
             assert FLOW_REFERENCE in run
 
 
-def test_what_has_not_run_has_no_point_and_what_needs_no_run_no_error(tmp_path: Path) -> None:
+def test_what_has_not_run_has_no_point_and_what_needs_no_run_no_error(
+    tmp_path: Path,
+) -> None:
     bed = 'kind = "pile", height = 0.01, slope_deg = 20.0, roughness = "d/30"'
-    text = f'grain = {{ diameter = 1e-3 }}\nbed = {{ {bed} }}\nflow = {{ model = "flat" }}'
+    text = (
+        f'grain = {{ diameter = 1e-3 }}\nbed = {{ {bed} }}\nflow = {{ model = "flat" }}'
+    )
     pairs = ladder.decisions(study.parse(text, name="one", where="one"))
     points = ladder.points(pairs, Runs(plan.of(pairs), tmp_path, {}))
     assert set(points["grain_level"]) == {"pivot", "peeling"}
@@ -53,7 +71,9 @@ def test_the_cost_of_a_pile_does_not_depend_on_what_was_asked_before(
 ) -> None:
     """A packing that another pile had asked for once cost nothing."""
     bed = 'kind = "pile", height = 0.01, slope_deg = 20.0, roughness = "d/30"'
-    text = f'grain = {{ diameter = 1e-3 }}\nbed = {{ {bed} }}\nflow = {{ model = "flat" }}'
+    text = (
+        f'grain = {{ diameter = 1e-3 }}\nbed = {{ {bed} }}\nflow = {{ model = "flat" }}'
+    )
     text += '\nprotocol = { method = "pivot" }'
     (pile,) = plan.make(study.parse(text, name="one", where="one")).piles.values()
     done: list[str] = []
@@ -115,7 +135,11 @@ def test_errors_are_relative_to_the_reference_and_the_front_is_not_beaten() -> N
 
 
 def test_known_errors_stand_beside_the_uncertainty_of_the_reference() -> None:
-    over: dict[str, Any] = {"scene_id": "b", "class_flow": LEVEL_BED, "class_grains": "poured"}
+    over: dict[str, Any] = {
+        "scene_id": "b",
+        "class_flow": LEVEL_BED,
+        "class_grains": "poured",
+    }
     table = _table(
         _point(LEVEL_REFERENCE, **over),
         _point(LEVEL_AGAIN, 1.05, **over),
@@ -145,4 +169,6 @@ def test_points_are_the_errors_of_the_pairs() -> None:
     pairs = ladder.together(ladder.errors(_table()))
     (ax,) = ladder.chart(pairs, {"largest": ""}).axes
     xy = [np.ravel(line.get_xydata()) for line in ax.lines if line.get_gid() == "point"]
-    np.testing.assert_array_equal(xy, pairs[["cost_core_s", "largest"]].abs().clip(ladder.FLOOR))
+    np.testing.assert_array_equal(
+        xy, pairs[["cost_core_s", "largest"]].abs().clip(ladder.FLOOR)
+    )

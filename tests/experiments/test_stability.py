@@ -26,7 +26,9 @@ forces = { law = "high" }
 """
 
 
-@pytest.mark.parametrize("path", sorted(FOLDER.glob("*.toml")), ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", sorted(FOLDER.glob("*.toml")), ids=lambda path: path.stem
+)
 def test_a_maps_file_spans_its_axes(path: Path) -> None:
     read = stability.load(path)
     across, down = ({place[axis] for place in read.places} for axis in (0, 1))

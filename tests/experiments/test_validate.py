@@ -29,7 +29,9 @@ def test_grains_laid_on_a_close_packed_layer_lie_in_its_pockets() -> None:
     y, x = np.meshgrid(np.arange(columns) + 0.0, np.arange(rows) * math.sqrt(3) / 2)
     y = (y + np.where(np.arange(rows)[:, None] % 2, 0.5, 0.0)).ravel()
     every, flat = np.ones(len(y), bool), np.column_stack([x.ravel(), np.zeros_like(y)])
-    packing = Packing(flat, np.ones(len(y)), every, every, ~every, x.ravel(), y, float(columns))
+    packing = Packing(
+        flat, np.ones(len(y)), every, every, ~every, x.ravel(), y, float(columns)
+    )
     angles = strips.laid(packing, 20)
     exact = np.degrees(np.arctan([math.sqrt(1 / 8), math.sqrt(1 / 2)]))
     assert np.abs(angles[:, None] - exact).min(axis=1).max() < 0.1
@@ -38,10 +40,12 @@ def test_grains_laid_on_a_close_packed_layer_lie_in_its_pockets() -> None:
 
 
 def test_a_score_is_of_rows_that_were_read_alone() -> None:
-    rows = pd.DataFrame({"set": "a", "model": "m", "ratio": [0.5, 2.0, 4.0, 100.0, np.nan]})
-    (score,) = validate.scores(rows.assign(sure=["read"] * 3 + ["memory", "read"])).to_dict(
-        "records"
+    rows = pd.DataFrame(
+        {"set": "a", "model": "m", "ratio": [0.5, 2.0, 4.0, 100.0, np.nan]}
     )
+    (score,) = validate.scores(
+        rows.assign(sure=["read"] * 3 + ["memory", "read"])
+    ).to_dict("records")
     assert (score["rows"], score["answered"]) == (4, 3)
     assert (score["ratio"], score["factor"], score["worst"]) == (2.0, 2.0, 4.0)
 
@@ -59,7 +63,13 @@ def test_the_interval_of_a_kind_holds_its_rows_in_flumes() -> None:
     beds = pd.read_csv(validate.FOLDER / "beds.csv").query("set in @FLUMES")
     at = validate.single(beds, "bridged")
     here = (at.reynolds >= 1) & (at.reynolds < 10)
-    grain = {"force_law": "bridged", "beta_deg": 60.0, "d_m": 3e-4, "z0_m": 1e-5, "alpha_deg": 0.0}
+    grain = {
+        "force_law": "bridged",
+        "beta_deg": 60.0,
+        "d_m": 3e-4,
+        "z0_m": 1e-5,
+        "alpha_deg": 0.0,
+    }
     grain |= {"alpha_s": 1.615, "cohesion_n_m": 0.0, "rho_f_kg_m3": 1000.0}
     low, high, rows, held = beside.interval(beside.kind_of(grain), 5.0)
     ratio = (beds["shields"] / at.shields)[here]
@@ -74,7 +84,11 @@ SPANNED = {
     **{"fluid.density": 1025.0, "fluid.viscosity": 2e-6, "fluid.gravity": 3.7},
     **{"grain.density": 2000.0, "bed.height": 0.5, "bed.length": 0.8},
     # over a level bed u* is u*_0, whatever is above it; pivots of poured grains know no beta
-    **{"flow.top": "open water", "forces.stress": "eq10", "forces.averaging_length": 0.1},
+    **{
+        "flow.top": "open water",
+        "forces.stress": "eq10",
+        "forces.averaging_length": 0.1,
+    },
     "bed.entrainment_angle_deg": 59.5,
 }
 """Fields of a strip, and other values of them, that its tested interval spans: its threshold is a
@@ -82,9 +96,18 @@ function of the Galileo number."""
 UNTESTED: dict[str, Any] = {
     **{"fluid.density": 1.2, "grain.diameter": 0.022, "grain.friction_angle_deg": 10.0},
     **{"grain.cohesion": 1e-3, "grain.sizes": {"sigma_g": 1.4}, "bed.roughness": 1e-3},
-    **{"bed.poured_depth": 8.0, "bed.width": 12.0, "bed.mobile_layers": 6, "bed.length": 0.2},
+    **{
+        "bed.poured_depth": 8.0,
+        "bed.width": 12.0,
+        "bed.mobile_layers": 6,
+        "bed.length": 0.2,
+    },
     **{"bed.counted": (0.1, 0.3), "bed.packing": "aligned", "bed.shape": "step down"},
-    **{"bed.slope_deg": 5.0, "flow.gusts": {"intensity": 0.2, "events": 50}, "flow.model": "x"},
+    **{
+        "bed.slope_deg": 5.0,
+        "flow.gusts": {"intensity": 0.2, "events": 50},
+        "flow.model": "x",
+    },
     **{"forces.law": "profile", "forces.lift_coefficient": 1.0},
     **{"forces.loaded_grains": "all but crest", "forces.sheltering": "balanced"},
     **{"protocol.method": "dem", "protocol.fractions": (0.3,)},
@@ -116,7 +139,9 @@ def test_an_interval_is_of_strips_that_differ_in_nothing_else_than_the_tested() 
         if field.info.about == "question" and fields.APPLIES[field.info.scope](strip)
     }
     # forms of a train, profiles and obstacles are no level beds, depth and lee side are not set
-    others = {f"bed.{name}" for name in ("kind", "forms", "spacing", "profile", "obstacles")}
+    others = {
+        f"bed.{name}" for name in ("kind", "forms", "spacing", "profile", "obstacles")
+    }
     others |= {"bed.lee_slope_deg", "flow.depth", "bed.disorder"}
     # strips with grains that stand out were tested by themselves
     others.add("forces.exposure")

@@ -62,12 +62,22 @@ class Bench:
         """The directories of the cases of a kind."""
         return [*self.out.glob(f"cases/{kind}-*")]
 
-    def start(self, *, programs: Path | None = None, under: Sequence[str] = ()) -> Driver:
+    def start(
+        self, *, programs: Path | None = None, under: Sequence[str] = ()
+    ) -> Driver:
         """Start the study's driver, with programs before the real ones, under a command."""
         paths = [*([str(programs)] if programs else []), os.environ["PATH"]]
         variables = {"PYTHONPATH": str(ROOT), "PATH": os.pathsep.join(paths)}
         driver = subprocess.Popen(
-            [*under, *ORCHESTRATOR, "study", "small.toml", "--out", str(self.out), *self.options],
+            [
+                *under,
+                *ORCHESTRATOR,
+                "study",
+                "small.toml",
+                "--out",
+                str(self.out),
+                *self.options,
+            ],
             cwd=self.folder,
             env={**self.environment, **variables},
             stdout=subprocess.PIPE,

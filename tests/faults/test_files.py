@@ -46,7 +46,12 @@ OF_CELLS = (
     *("load_steps.csv", "motion.csv"),
 )
 OF_A_PILE = (
-    *("flow-*/case.json", "flow-*/done.json", "flow-*/[1-9]*/U", "flow-*/wall_stress.csv"),
+    *(
+        "flow-*/case.json",
+        "flow-*/done.json",
+        "flow-*/[1-9]*/U",
+        "flow-*/wall_stress.csv",
+    ),
     *("pile-*/done.json", "pile-*/motion.csv"),
 )
 
@@ -112,7 +117,15 @@ def _contents(folder: Path) -> dict[str, str]:
     return contents
 
 
-ODD = ("two\nlines", os.fsdecode(b"\xff\xfe"), "-rf", "*", "x" * 255, ".x.1.tmp", "a.csv")
+ODD = (
+    "two\nlines",
+    os.fsdecode(b"\xff\xfe"),
+    "-rf",
+    "*",
+    "x" * 255,
+    ".x.1.tmp",
+    "a.csv",
+)
 """Names of files of a user, whatever they look like."""
 
 
@@ -126,7 +139,9 @@ def test_files_of_others_in_every_directory(pile: Bench, outside: Path) -> None:
         (folder / "mine" / "deep" / "notes.txt").write_text("mine")
         (folder / "link").symlink_to(outside)
         (folder / "link.csv").symlink_to(outside / "thesis.txt")
-    planted = {name: text for name, text in _contents(pile.out).items() if name not in ours}
+    planted = {
+        name: text for name, text in _contents(pile.out).items() if name not in ours
+    }
     for word in ("status", "study", "report", "prune"):
         assert pile.command(word)[0] == 0, word
         assert planted.items() <= _contents(pile.out).items(), word
@@ -144,7 +159,16 @@ def test_files_of_others_in_every_directory(pile: Bench, outside: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "place", ["tables", "cases", "tables/scenes.csv", "report.html", "study.json", ".lock", RECORD]
+    "place",
+    [
+        "tables",
+        "cases",
+        "tables/scenes.csv",
+        "report.html",
+        "study.json",
+        ".lock",
+        RECORD,
+    ],
 )
 def test_links_are_refused(finished: Bench, outside: Path, place: str) -> None:
     path, target = finished.out / place, outside / "moved"
@@ -166,7 +190,9 @@ def test_links_in_a_case_are_not_followed(pile: Bench, outside: Path) -> None:
     shutil.move(mesh, outside / "mesh")
     mesh.symlink_to(outside / "mesh")
     before = _contents(outside)
-    case.prune(plan.make(study.load(str(pile.source))).cases[flow.name], pile.out / "cases")
+    case.prune(
+        plan.make(study.load(str(pile.source))).cases[flow.name], pile.out / "cases"
+    )
     assert _contents(outside) == before
     (flow / case.DONE).unlink()
     assert pile.command("study")[0] == 0

@@ -38,11 +38,18 @@ def _of_another_version(out: Path) -> None:
 @pytest.mark.parametrize("lose", [_lose_cases, _of_another_version])
 def test_tables_without_cases(finished: Bench, lose: Callable[[Path], None]) -> None:
     lose(finished.out)
-    before = {path: path.read_bytes() for path in finished.out.rglob("*") if path.is_file()}
+    before = {
+        path: path.read_bytes() for path in finished.out.rglob("*") if path.is_file()
+    }
     code, printed = finished.command("report")
     assert (code, "the tables stay as they are" in printed) == (1, True)
-    after = {path: path.read_bytes() for path in finished.out.rglob("*") if path.is_file()}
-    assert {**after, finished.out / ".lock": b""} == {**before, finished.out / ".lock": b""}
+    after = {
+        path: path.read_bytes() for path in finished.out.rglob("*") if path.is_file()
+    }
+    assert {**after, finished.out / ".lock": b""} == {
+        **before,
+        finished.out / ".lock": b"",
+    }
 
 
 def test_a_pruned_study_stays_finished(pile: Bench) -> None:
@@ -53,13 +60,16 @@ def test_a_pruned_study_stays_finished(pile: Bench) -> None:
     assert size == pytest.approx(whole / 1e6, abs=0.06)
     code, printed = pile.command("prune")
     assert (code, "pruned: 1 cases" in printed) == (0, True)
-    assert {bed.name, flow.name} <= {*re.split(r"[ ,\n]", printed)}  # the page shows them
+    assert {bed.name, flow.name} <= {
+        *re.split(r"[ ,\n]", printed)
+    }  # the page shows them
     assert not list(cells.glob("*.dump"))
     assert "no solver was started" in pile.command("study")[1]
     assert pile.command("report")[0] == 0
     assert tables(pile.out) == tables(pile.undisturbed)
     figures = (
-        {path.name for path in (out / "figures").iterdir()} for out in (pile.out, pile.undisturbed)
+        {path.name for path in (out / "figures").iterdir()}
+        for out in (pile.out, pile.undisturbed)
     )
     assert len({*map(frozenset, figures)}) == 1
 
@@ -194,7 +204,9 @@ EDITS = _edits()
 
 
 @pytest.mark.parametrize("name", EDITS)
-def test_an_edited_study_is_not_answered_with_the_old_answer(name: str, edited: Path) -> None:
+def test_an_edited_study_is_not_answered_with_the_old_answer(
+    name: str, edited: Path
+) -> None:
     """A deleted end, even an empty file, was once answered with the old answer."""
     file, out = edited / "edited.toml", edited / "out"
     stamp = file.stat()
@@ -226,7 +238,9 @@ def test_a_file_that_a_study_names_is_a_part_of_it(name: str, edited: Path) -> N
         assert _is_finished(file, out)
 
 
-def test_tolerance_and_place_are_parts_of_the_question(edited: Path, tmp_path: Path) -> None:
+def test_tolerance_and_place_are_parts_of_the_question(
+    edited: Path, tmp_path: Path
+) -> None:
     file, out = edited / "edited.toml", edited / "out"
     assert _is_finished(file, out)
     for tolerance in (0.05, 0.3, float("nan")):

@@ -14,7 +14,15 @@ import pytest
 
 from orchestrator.runs import process
 from tests.faults import bench
-from tests.faults.bench import Bench, Driver, ended, none_left_in, processes_in, wait_for, wrapper
+from tests.faults.bench import (
+    Bench,
+    Driver,
+    ended,
+    none_left_in,
+    processes_in,
+    wait_for,
+    wrapper,
+)
 
 SINCE = ".started"
 """A file in the study's parent: younger ones are of the driver that runs."""
@@ -91,7 +99,9 @@ def test_an_ended_driver(
             assert not list(pile.out.glob(after)), stage
         else:
             assert code == 130, printed
-            assert printed.count("orchestrator: stopped; the same command continues") == 1
+            assert (
+                printed.count("orchestrator: stopped; the same command continues") == 1
+            )
             assert not (pile.out / "report.json").exists(), stage
     pile.check_finished()
 
@@ -100,7 +110,16 @@ def test_an_ended_driver(
 def test_a_terminal_that_is_closed(pile: Bench, under: tuple[str, ...]) -> None:
     master, slave = os.openpty()
     driver = subprocess.Popen(
-        ["setsid", "--ctty", *under, *bench.ORCHESTRATOR, "study", "small.toml", "--out", "out"],
+        [
+            "setsid",
+            "--ctty",
+            *under,
+            *bench.ORCHESTRATOR,
+            "study",
+            "small.toml",
+            "--out",
+            "out",
+        ],
         cwd=pile.folder,
         env=bench.ENVIRONMENT,
         stdin=slave,
@@ -123,7 +142,9 @@ SOLVERS = {"simpleFoam": "flow", "liggghts": "pile"}
 
 def _kill_program(pile: Bench, kind: str, name: str) -> bool:
     """Kill the program of a name in a case of a kind; whether there was one."""
-    running = [process for case in pile.cases(kind) for process in processes_in(case).items()]
+    running = [
+        process for case in pile.cases(kind) for process in processes_in(case).items()
+    ]
     pids = [pid for pid, program in running if program == name]
     for pid in pids:
         with contextlib.suppress(ProcessLookupError):
@@ -144,9 +165,13 @@ def test_each_solver_that_is_killed_once_is_run_again(pile: Bench) -> None:
     pile.check_finished()
 
 
-def test_a_solver_that_is_killed_each_time_fails_and_the_others_are_finished(pile: Bench) -> None:
+def test_a_solver_that_is_killed_each_time_fails_and_the_others_are_finished(
+    pile: Bench,
+) -> None:
     before = '[ "$1" = -help ] || { echo >>../../../tries; kill -KILL $$; }'
-    code, printed = pile.study(programs=wrapper(pile.folder / "bin", "simpleFoam", before))
+    code, printed = pile.study(
+        programs=wrapper(pile.folder / "bin", "simpleFoam", before)
+    )
     assert code == 3, printed
     assert len((pile.folder / "tries").read_text().splitlines()) == process.TRIES
     assert "simpleFoam" in printed

@@ -45,13 +45,19 @@ def test_a_clock_that_has_jumped_back(pile: Bench) -> None:
     assert none_left_in(pile.folder)
     for _ in range(2):
         for path in pile.out.rglob("*"):
-            os.utime(path, (4e9, 4e9))  # the files of before are in the future: here in 2096
+            os.utime(
+                path, (4e9, 4e9)
+            )  # the files of before are in the future: here in 2096
         pile.check_finished()
 
 
 def test_a_solver_that_hangs(pile: Bench) -> None:
-    pile.source.write_text(pile.source.read_text().replace("time_limit = 300", "time_limit = 8"))
-    programs = wrapper(pile.folder / "bin", "simpleFoam", '[ "$1" = -help ] || sleep 600')
+    pile.source.write_text(
+        pile.source.read_text().replace("time_limit = 300", "time_limit = 8")
+    )
+    programs = wrapper(
+        pile.folder / "bin", "simpleFoam", '[ "$1" = -help ] || sleep 600'
+    )
     code, printed = pile.study(programs=programs)
     assert code == 3, printed
     assert "did not end within 8 s" in printed

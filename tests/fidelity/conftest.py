@@ -19,6 +19,8 @@ def pile() -> MakePile:
     (scene,) = study.parse(text, name="one", where="test").scenes
 
     def make(fields: dict[str, object] | None = None, **bed: object) -> Scene:
-        return changed(scene, {**{f"bed.{k}": v for k, v in bed.items()}, **(fields or {})})
+        return changed(
+            scene, {**{f"bed.{k}": v for k, v in bed.items()}, **(fields or {})}
+        )
 
     return make

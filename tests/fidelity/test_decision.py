@@ -74,7 +74,9 @@ def test_what_is_asked_for_or_not_known_is_answered_as_asked(
     assert word in chosen.why
 
 
-def test_over_a_level_bed_the_flow_is_exact_and_the_grains_are_chosen(pile: MakePile) -> None:
+def test_over_a_level_bed_the_flow_is_exact_and_the_grains_are_chosen(
+    pile: MakePile,
+) -> None:
     asked = pile({"flow.model": "flat"}, packing="poured", shape="flat", slope_deg=0.0)
     assert levels.classes("flow", asked) == (LEVEL_BED,)
     for tolerance in (0.9, 0.7, 0.1):
@@ -84,8 +86,12 @@ def test_over_a_level_bed_the_flow_is_exact_and_the_grains_are_chosen(pile: Make
         assert chosen.scene.flow.model == "flat"
 
 
-@pytest.mark.parametrize(("slope", "angle", "method"), [(20.0, 60.0, "pivot"), (69.0, 20.0, "dem")])
-def test_a_single_grain_needs_no_levels(slope: float, angle: float, method: str) -> None:
+@pytest.mark.parametrize(
+    ("slope", "angle", "method"), [(20.0, 60.0, "pivot"), (69.0, 20.0, "dem")]
+)
+def test_a_single_grain_needs_no_levels(
+    slope: float, angle: float, method: str
+) -> None:
     text = f"""
         grain = {{ diameter = 1e-3, friction_angle_deg = 80.0 }}
         bed = {{ kind = "grain", slope_deg = {slope}, entrainment_angle_deg = {angle} }}
@@ -108,8 +114,12 @@ def _asked(bed: str = "", protocol: str = "", diameter: float = 1e-3) -> Scene:
 
 @pytest.mark.parametrize("packing", ["aligned", "horizontal", "disordered"])
 @pytest.mark.parametrize("diameter", [2e-4, 1e-3])
-def test_the_default_errs_less_than_the_model_is_worth(packing: str, diameter: float) -> None:
-    scene = _asked(f', packing = "{packing}", height = 0.01', "fractions = [0.3]", diameter)
+def test_the_default_errs_less_than_the_model_is_worth(
+    packing: str, diameter: float
+) -> None:
+    scene = _asked(
+        f', packing = "{packing}", height = 0.01', "fractions = [0.3]", diameter
+    )
     chosen = decide(scene, None)
     assert chosen.is_chosen
     assert chosen.scene.protocol.method != "dem"
@@ -118,9 +128,12 @@ def test_the_default_errs_less_than_the_model_is_worth(packing: str, diameter: f
 
 
 @pytest.mark.parametrize("packing", ["aligned", "horizontal", "disordered"])
-def test_more_grains_are_answered_without_them_in_rows_along_the_bed_alone(packing: str) -> None:
+def test_more_grains_are_answered_without_them_in_rows_along_the_bed_alone(
+    packing: str,
+) -> None:
     few, many = (
-        decide(_asked(f', packing = "{packing}", height = {height}'), None) for height in (0.6, 0.7)
+        decide(_asked(f', packing = "{packing}", height = {height}'), None)
+        for height in (0.6, 0.7)
     )
     assert few.levels
     assert many.levels
@@ -157,7 +170,9 @@ def test_what_a_file_says_stays(bed: str, protocol: str, word: str) -> None:
 
 
 @pytest.mark.parametrize("field", ["flow.speed", "flow.viscosity"])
-def test_a_number_of_the_solve_that_levels_keep_asks_for_no_dem(field: str, pile: MakePile) -> None:
+def test_a_number_of_the_solve_that_levels_keep_asks_for_no_dem(
+    field: str, pile: MakePile
+) -> None:
     value = {"flow.speed": 1.0, "flow.viscosity": 1e-6}[field]
     plain, other = decide(pile(), None), decide(pile({field: value}), None)
     assert plain.is_chosen

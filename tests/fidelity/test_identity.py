@@ -114,7 +114,11 @@ properties = settings(max_examples=60, deadline=None)
 
 
 @properties
-@given(listed=st.lists(groups(), min_size=2, max_size=4), tolerance=tolerances, data=st.data())
+@given(
+    listed=st.lists(groups(), min_size=2, max_size=4),
+    tolerance=tolerances,
+    data=st.data(),
+)
 def test_groups_in_any_order_and_alone_have_the_same_answers(
     listed: list[Group], tolerance: float | None, data: st.DataObject
 ) -> None:
@@ -142,7 +146,10 @@ def test_defaults_that_are_written_and_integers_change_nothing(
 
 def test_a_method_that_is_asked_for_answers_whatever_other_groups_leave_open() -> None:
     by_dem, left_open = {"protocol.method": "dem"}, dict[str, Any]()
-    (first, second), (third, fourth) = answers(by_dem, left_open), answers(left_open, by_dem)
+    (first, second), (third, fourth) = (
+        answers(by_dem, left_open),
+        answers(left_open, by_dem),
+    )
     assert (first, second) == (fourth, third)
     assert first[2] == "standard | as asked"
     assert second[2] == "short | pivot"

@@ -47,18 +47,29 @@ def test_a_scene_on_a_level_is_recognised_and_asks_the_same(
 
 def test_the_flow_over_fine_sand_has_a_roughness_of_its_own(pile: MakePile) -> None:
     water = {"fluid.density": 1000.0, "fluid.viscosity": 1e-6, "grain.density": 2650.0}
-    fine, coarse = (pile({**water, "grain.diameter": d}, roughness=d / 30) for d in (2e-4, 3e-3))
+    fine, coarse = (
+        pile({**water, "grain.diameter": d}, roughness=d / 30) for d in (2e-4, 3e-3)
+    )
     ustar = float(closed_form(fine).friction_velocity)
-    own = [each.answer(fine).flow.roughness for each in (COARSE.flow, level("flow", "waves"))]
+    own = [
+        each.answer(fine).flow.roughness
+        for each in (COARSE.flow, level("flow", "waves"))
+    ]
     assert own == pytest.approx([2e-4 / 30 + 1e-6 / (9 * ustar)] * 2, rel=5e-3)
-    assert levels.known(COARSE, COARSE.flow.answer(fine)) == levels.known(COARSE, fine) != UNKNOWN
+    assert (
+        levels.known(COARSE, COARSE.flow.answer(fine))
+        == levels.known(COARSE, fine)
+        != UNKNOWN
+    )
     # over a level bed, a rough one and by Eqs. 2 and 4 it is the bed's, and nothing changes
     papers = changed(fine, {"forces.law": "low"})
     for flow, scene in ((FLAT, fine), (COARSE.flow, coarse), (COARSE.flow, papers)):
         assert flow.answer(scene).flow.roughness is None
 
 
-@pytest.mark.parametrize("field", ["flow.expansion_ration", "grain.stiffness", "nothing", "flow"])
+@pytest.mark.parametrize(
+    "field", ["flow.expansion_ration", "grain.stiffness", "nothing", "flow"]
+)
 def test_a_scene_is_changed_in_fields_that_exist(field: str, pile: MakePile) -> None:
     with pytest.raises(InputError, match=rf"changed: {re.escape(field)}"):
         changed(pile(), {field: -1.0})
@@ -81,7 +92,10 @@ def test_the_theory_takes_the_flows_that_it_knows(
 
 def test_errors_of_the_parts_add_up_by_their_squares(pile: MakePile) -> None:
     table = levels.measured()
-    flow, grains = table["flow", "coarse", "wall"], table["grains", "peeling", "aligned"]
+    flow, grains = (
+        table["flow", "coarse", "wall"],
+        table["grains", "peeling", "aligned"],
+    )
     squares = flow[:2] ** 2 + grains[:2] ** 2
     known = levels.known(COARSE, pile())
     assert known.total == pytest.approx(math.sqrt(squares.sum(axis=0).max()))
@@ -92,7 +106,10 @@ def test_errors_of_the_parts_add_up_by_their_squares(pile: MakePile) -> None:
     "fields",
     [
         *({"forces.averaging_length": 10.0}, {"forces.loaded_grains": "all but crest"}),
-        *({"flow.first_cell_height": 0.005}, {"flow.speed": 0.5, "flow.viscosity": 1e-5}),
+        *(
+            {"flow.first_cell_height": 0.005},
+            {"flow.speed": 0.5, "flow.viscosity": 1e-5},
+        ),
         *({"flow.roughness": 1e-8}, {"flow.turbulence_model": "kOmegaSST"}),
         *({"flow.convection_scheme": "upwind"}, {"flow.lid": 20.0}),
         {"protocol.displacement_criterion": 0.1},
@@ -113,10 +130,14 @@ def test_grains_that_lift_takes_off_have_a_class_of_their_own(pile: MakePile) ->
     for packing in ("aligned", "horizontal"):
         scene = pile(low, packing=packing)
         assert levels.classes("grains", scene) == (f"{packing}, lifted",)
-        assert math.isfinite(levels.known(COARSE, scene).total) == (packing == "aligned")
+        assert math.isfinite(levels.known(COARSE, scene).total) == (
+            packing == "aligned"
+        )
 
 
-def test_the_protocol_of_a_study_file_has_the_error_of_a_coarser_level(pile: MakePile) -> None:
+def test_the_protocol_of_a_study_file_has_the_error_of_a_coarser_level(
+    pile: MakePile,
+) -> None:
     """Poured beds by the default protocol were off by up to 40 %, with an interval of 2 %."""
     bed = {"packing": "poured", "shape": "flat", "slope_deg": 0.0}
     scene = written(pile({"flow.model": "flat"}, **bed))

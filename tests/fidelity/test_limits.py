@@ -18,20 +18,44 @@ MOUND = "beyond what poured grains hold"
 GRAIN: dict[str, object] = {"bed.kind": "grain", "grain.friction_angle_deg": 35.0}
 REFUSED: list[tuple[dict[str, object], str, str]] = [
     ({**GRAIN, "bed.slope_deg": 31.0}, "bed.slope_deg", "= 30 deg"),
-    ({**GRAIN, "bed.slope_deg": 36.0, "bed.entrainment_angle_deg": 50.0}, "bed.slope_deg", "= 35"),
+    (
+        {**GRAIN, "bed.slope_deg": 36.0, "bed.entrainment_angle_deg": 50.0},
+        "bed.slope_deg",
+        "= 35",
+    ),
     ({"bed.slope_deg": 31.0}, "bed.slope_deg", "90 deg - entrainment angle"),
     ({"bed.entrainment_angle_deg": 55.0}, "bed.entrainment_angle_deg", "wedged"),
     ({"flow.first_cell_height": 3e-5}, "bed.roughness", "z_e"),
     ({"flow.viscosity": 1e-2}, "flow.viscosity", "not turbulent"),
     ({"protocol.time_step": 0.5}, "protocol.time_step", "above 0.4"),
-    ({"grain.damping": 0.3, "protocol.time_step": 0.3}, "protocol.time_step", "above 0.2"),
+    (
+        {"grain.damping": 0.3, "protocol.time_step": 0.3},
+        "protocol.time_step",
+        "above 0.2",
+    ),
     ({"grain.damping": 0.01}, "grain.damping", "does not come to rest"),
-    ({"bed.shape": "cosine", "bed.slope_deg": 31.0}, "bed", "deg at x = .* is beyond min"),
-    ({"bed.shape": "dune", "bed.counted": "all", "bed.lee_slope_deg": 33.0}, "bed", "33 deg at x"),
-    ({"bed.forms": 2, "bed.spacing": 0.1}, "bed", r"bed.spacing: forms 0.149\d* m long over"),
+    (
+        {"bed.shape": "cosine", "bed.slope_deg": 31.0},
+        "bed",
+        "deg at x = .* is beyond min",
+    ),
+    (
+        {"bed.shape": "dune", "bed.counted": "all", "bed.lee_slope_deg": 33.0},
+        "bed",
+        "33 deg at x",
+    ),
+    (
+        {"bed.forms": 2, "bed.spacing": 0.1},
+        "bed",
+        r"bed.spacing: forms 0.149\d* m long over",
+    ),
     (SOLVED_LEVEL, "flow.model", "nothing to solve"),
     ({"flow.model": "waves", **FENCE}, "flow.model", "rises by 75 deg at x = -0.1"),
-    ({**LONG, "bed.height": 20.0}, "bed", "128.734 m of bed are 128734 grains, more than"),
+    (
+        {**LONG, "bed.height": 20.0},
+        "bed",
+        "128.734 m of bed are 128734 grains, more than",
+    ),
     ({**POURED, "bed.slope_deg": 30.0, "bed.height": 60.0}, "bed", "grains, more than"),
     # poured beds settled at 35 to 39 deg, with grains 4.4 d under the line of the flow
     ({**POURED, "bed.shape": "step up", "bed.slope_deg": 60.0}, "bed", MOUND),
@@ -39,11 +63,19 @@ REFUSED: list[tuple[dict[str, object], str, str]] = [
 ]
 ROLLING = {"bed.slope_deg": 69.0, "bed.entrainment_angle_deg": 20.0}
 WARNED: list[tuple[dict[str, object], str, str]] = [
-    ({**GRAIN, **ROLLING, "grain.friction_angle_deg": 80.0}, "bed.slope_deg", "half-way"),
+    (
+        {**GRAIN, **ROLLING, "grain.friction_angle_deg": 80.0},
+        "bed.slope_deg",
+        "half-way",
+    ),
     ({"protocol.waiting_time": 2.0}, "protocol.waiting_time", "ramp"),
     ({"protocol.load_increment": 0.1}, "protocol.load_increment", "interval"),
     ({"forces.loaded_grains": "all but crest"}, "forces.loaded_grains", "blocks"),
-    ({"flow.convection_scheme": "upwind"}, "flow.convection_scheme", "does not converge"),
+    (
+        {"flow.convection_scheme": "upwind"},
+        "flow.convection_scheme",
+        "does not converge",
+    ),
 ]
 ALLOWED: list[dict[str, object]] = [
     {**GRAIN, "bed.slope_deg": 25.0},
@@ -72,7 +104,9 @@ def _toml(value: object) -> str:
 
 
 @pytest.mark.parametrize(("fields", "field", "what"), REFUSED)
-def test_beyond_a_limit_a_plan_is_refused(fields: dict[str, object], field: str, what: str) -> None:
+def test_beyond_a_limit_a_plan_is_refused(
+    fields: dict[str, object], field: str, what: str
+) -> None:
     asked = _asked(fields)
     with pytest.raises(InputError, match=what) as caught:
         plan.make(asked)
@@ -101,5 +135,7 @@ def test_a_study_beyond_the_limits_writes_nothing(
     text = 'grain = { diameter = 1e-3 }\nbed = { kind = "pile", slope_deg = 15.0 }\n'
     source.write_text(text + "[[group]]\n[[group]]\nbed = { slope_deg = 31.0 }\n")
     assert cli.main([command, str(source), "--out", str(tmp_path / "out")]) == 2
-    assert f"{source}: group 2: bed.slope_deg: 31 deg is beyond" in capsys.readouterr().err
+    assert (
+        f"{source}: group 2: bed.slope_deg: 31 deg is beyond" in capsys.readouterr().err
+    )
     assert list(tmp_path.iterdir()) == [source]

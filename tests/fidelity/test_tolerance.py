@@ -64,12 +64,19 @@ def test_an_answer_that_its_check_contradicts_is_not_usable(
         for cost, one in enumerate(LEVELS[part])
         if one.name in ("coarse", "standard", "pivot", "peeling", "2 layers, fast")
     }
-    wrong |= {(part, name, f"{like}, limiting slope"): v for (part, name, like), v in wrong.items()}
+    wrong |= {
+        (part, name, f"{like}, limiting slope"): v
+        for (part, name, like), v in wrong.items()
+    }
     monkeypatch.setattr(levels, "measured", lambda: wrong)
     for cached in (levels.known_of_classes, decision._cheapest):
-        monkeypatch.setattr(cached.__module__ + "." + cached.__name__, cached.__wrapped__)
+        monkeypatch.setattr(
+            cached.__module__ + "." + cached.__name__, cached.__wrapped__
+        )
     tables = _run("horizontal", tmp_path, BY_HAND)
-    answers = tables["pile_threshold"].merge(tables["scenes"][["scene_id", "group", "why"]])
+    answers = tables["pile_threshold"].merge(
+        tables["scenes"][["scene_id", "group", "why"]]
+    )
     check = tables["check"]
     small = answers[answers["group"] == "small"]
     # the smaller of the two piles is checked, and every pile keeps its answer
@@ -97,11 +104,16 @@ def test_a_run_on_chosen_levels_that_fails_names_the_next_step(tmp_path: Path) -
         bed = { kind = "pile", slope_deg = 15.0, height = 0.01 }
     """
     for method, is_advised in (("auto", True), ("dem", False)):
-        asked = study.parse(f'{text}protocol.method = "{method}"', name="slow", where="slow")
+        asked = study.parse(
+            f'{text}protocol.method = "{method}"', name="slow", where="slow"
+        )
         finished = pipeline.run(asked, tmp_path / method, workers=1)
         (flow,) = (name for name in finished.failures if name.startswith("flow-"))
         said = str(finished.failures[flow])
-        assert ("did not end within 0.01 s" in said, "time_limit" in said) == (True, True)
+        assert ("did not end within 0.01 s" in said, "time_limit" in said) == (
+            True,
+            True,
+        )
         assert ('protocol.method = "dem"' in said) == is_advised
         assert len(list((tmp_path / method / "cases").glob("flow-*"))) == 1
 
@@ -132,7 +144,14 @@ def test_a_tolerance_of_the_command_line_is_kept_for_the_next_report(
     text = 'grain = { diameter = 1e-3 }\nbed = { kind = "grain", slope_deg = 10.0 }\n'
     (tmp_path / "one.toml").write_text(text)
     out = tmp_path / "out"
-    command = ["study", str(tmp_path / "one.toml"), "--out", str(out), "--tolerance", "0.1"]
+    command = [
+        "study",
+        str(tmp_path / "one.toml"),
+        "--out",
+        str(out),
+        "--tolerance",
+        "0.1",
+    ]
     assert cli.main(command) == 0
     assert not list((out / "cases").glob("cells-*"))
     assert cli.main(["report", str(out)]) == 0
@@ -140,7 +159,9 @@ def test_a_tolerance_of_the_command_line_is_kept_for_the_next_report(
     assert set(table["answered_method"]) == {"pivot"}
 
 
-def test_a_tolerance_out_of_range_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_tolerance_out_of_range_is_refused(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     for value in ("1", "-0.1", "nan"):
         assert cli.main(["study", "first-look", "--tolerance", value]) == 2
         assert "tolerance: " in capsys.readouterr().err

@@ -15,7 +15,11 @@ from orchestrator.study.parts import Flow
 from tests.conftest import Shared
 
 SETTINGS = Flow(
-    speed=10.0, roughness=1e-4 / 3.0, viscosity=1e-5, first_cell_height=5e-4, cells_per_face=16
+    speed=10.0,
+    roughness=1e-4 / 3.0,
+    viscosity=1e-5,
+    first_cell_height=5e-4,
+    cells_per_face=16,
 )
 PILE = FlowCase(0.02, 15.0, SETTINGS)
 
@@ -54,7 +58,9 @@ def solve(shared: Shared) -> Solve:
                 ended = allrun(directory)
                 flow.collect(directory)
                 wall_s = ended.seconds
-                case.finish(flow, directory, solver_s=wall_s, cpu_s=ended.cpu_s, wall_s=wall_s)
+                case.finish(
+                    flow, directory, solver_s=wall_s, cpu_s=ended.cpu_s, wall_s=wall_s
+                )
             return cases / flow.name
 
     return to_its_end

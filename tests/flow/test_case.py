@@ -39,14 +39,23 @@ def test_a_case_from_its_inputs_to_its_table(solve: Solve) -> None:
     assert case.done_state(PILE, directory.parent)
     kept = WallStress.from_csv(directory / WALL_STRESS)
     read = SolvedFlow(directory).stress(PILE.roughness_m)
-    for name, values in vars(read).items():  # the table loses nothing but digits beyond nine
+    for name, values in vars(
+        read
+    ).items():  # the table loses nothing but digits beyond nine
         np.testing.assert_allclose(getattr(kept, name), values, rtol=5e-9)
     assert (directory / "parameters").read_text().count("//") == 13
     sums = (directory / "results.sha256").read_text().splitlines()
     assert [line.split()[1] for line in sums] == ["bed_flow.csv", "column_flow.csv"]
     # the fields, whose last digits are those of this processor, are known by their digests, too
     others = read_json(directory / "done.json")["others_sha256"]
-    assert {Path(name).name for name in others} >= {"U", "epsilon", "k", "nut", "p", "phi"}
+    assert {Path(name).name for name in others} >= {
+        "U",
+        "epsilon",
+        "k",
+        "nut",
+        "p",
+        "phi",
+    }
 
 
 def test_the_flow_speeds_up_to_the_crest_and_separates_behind_it(solve: Solve) -> None:
@@ -54,9 +63,15 @@ def test_the_flow_speeds_up_to_the_crest_and_separates_behind_it(solve: Solve) -
     windward = (stress.s_m > 0.0) & (stress.s_m < FACE)
     assert np.count_nonzero(windward) == PILE.settings.cells_per_face
     x = stress.s_m * np.where(windward, np.cos(np.radians(15.0)), 1.0)
-    np.testing.assert_allclose(stress.x_m[stress.s_m < FACE], x[stress.s_m < FACE], rtol=1e-5)
-    np.testing.assert_allclose(stress.edges_m[:-1], stress.s_m - stress.length_m / 2, atol=1e-8)
-    np.testing.assert_allclose(stress.z_e_m[windward], PILE.first_cell_m / 2.0, rtol=2e-3)
+    np.testing.assert_allclose(
+        stress.x_m[stress.s_m < FACE], x[stress.s_m < FACE], rtol=1e-5
+    )
+    np.testing.assert_allclose(
+        stress.edges_m[:-1], stress.s_m - stress.length_m / 2, atol=1e-8
+    )
+    np.testing.assert_allclose(
+        stress.z_e_m[windward], PILE.first_cell_m / 2.0, rtol=2e-3
+    )
     places, lengths = np.array([[0.05, 0.5, 0.98, 1.5], [0.1, 0.1, 0.04, 0.2]]) * FACE
     toe, mid, crest, lee = stress.mean_over(places, lengths)
     assert 0.0 < toe < mid < crest
@@ -71,7 +86,9 @@ def test_a_copy_run_by_hand_gives_the_same_bytes(solve: Solve, tmp_path: Path) -
     copy = Path(shutil.copytree(solve(PILE), tmp_path / '-a "b" c\'é'))
     shutil.rmtree(next(copy.glob("[1-9]*")))
     environment = {"PATH": os.environ["PATH"]}
-    ended = subprocess.run([copy / "Allrun"], env=environment, capture_output=True, text=True)
+    ended = subprocess.run(
+        [copy / "Allrun"], env=environment, capture_output=True, text=True
+    )
     assert ended.returncode == 0, ended.stderr
     assert ended.stdout == "bed_flow.csv: OK\ncolumn_flow.csv: OK\n"
     edit(copy / "parameters", "freeStream       10.0;", "freeStream       10.1;")
@@ -97,7 +114,9 @@ def test_short_chords_do_not_end_the_iterations_early(solve: Solve) -> None:
     for chords in (40, 240):
         t = np.linspace(0, 1, chords + 1)
         length = np.pi * PILE.height_m / np.tan(np.radians(26))
-        wave = np.column_stack([length * t, PILE.height_m / 2 * (1 - np.cos(2 * np.pi * t))])
+        wave = np.column_stack(
+            [length * t, PILE.height_m / 2 * (1 - np.cos(2 * np.pi * t))]
+        )
         line = between_flats(wave, PILE.height_m)
         domain = changed(PILE, lid=30.0, upstream=10.0, downstream=40.0)
         hill = replace(domain, slope_deg=26.0, line=line)
@@ -108,17 +127,26 @@ def test_short_chords_do_not_end_the_iterations_early(solve: Solve) -> None:
 
 @pytest.mark.parametrize(
     ("trap", "cause"),
-    [("true", "floating point exception after iteration"), ("false", "residuals are not numbers")],
+    [
+        ("true", "floating point exception after iteration"),
+        ("false", "residuals are not numbers"),
+    ],
 )
 def test_a_diverged_run(tmp_path: Path, trap: str, cause: str) -> None:
     directory = case.prepare(PILE, tmp_path)
-    edit(directory / "system" / "fvSolution", "consistent      yes;", "consistent      no;")
+    edit(
+        directory / "system" / "fvSolution",
+        "consistent      yes;",
+        "consistent      no;",
+    )
     assert allrun(directory, FOAM_SIGFPE=trap).returncode != 0
     with pytest.raises(Exploded, match=f"simpleFoam diverged: .*{cause}"):
         PILE.collect(directory)
 
 
-@pytest.mark.parametrize("name", ["wallShearStress", "U", "../constant/polyMesh/points"])
+@pytest.mark.parametrize(
+    "name", ["wallShearStress", "U", "../constant/polyMesh/points"]
+)
 def test_a_broken_file_is_not_a_result(solve: Solve, tmp_path: Path, name: str) -> None:
     copy = Path(shutil.copytree(solve(PILE), tmp_path / "copy"))
     file = next(copy.glob("[1-9]*")) / name
@@ -136,8 +164,19 @@ def test_a_broken_file_is_not_a_result(solve: Solve, tmp_path: Path, name: str) 
         ({"turbulence_model": "RNGkEpsilon", "cells_per_face": 16}, APPROACH_ERROR),
         ({"turbulence_model": "realizableKE", "cells_per_face": 16}, APPROACH_ERROR),
         ({"turbulence_model": "kOmegaSST", "cells_per_face": 16}, APPROACH_ERROR),
-        ({"top": "open water", "depth": 0.12, "upstream": 20.0, "downstream": 20.0}, 2e-3),
-        ({"top": "closed channel", "depth": 0.12, "upstream": 20.0, "downstream": 20.0}, 2e-3),
+        (
+            {"top": "open water", "depth": 0.12, "upstream": 20.0, "downstream": 20.0},
+            2e-3,
+        ),
+        (
+            {
+                "top": "closed channel",
+                "depth": 0.12,
+                "upstream": 20.0,
+                "downstream": 20.0,
+            },
+            2e-3,
+        ),
     ],
 )
 def test_a_flat_bed_keeps_the_friction_velocity(
@@ -146,15 +185,23 @@ def test_a_flat_bed_keeps_the_friction_velocity(
     """Along 40 h the flow does not change; the log law, or the slope of a channel, gives u*_0."""
     channel, other = "depth" in settings, "turbulence_model" in settings
     cells = 16 if channel else 40
-    flow = replace(changed(PILE, **{"cells_per_face": cells, **settings}), slope_deg=0.0)
+    flow = replace(
+        changed(PILE, **{"cells_per_face": cells, **settings}), slope_deg=0.0
+    )
     directory = case.prepare(flow, tmp_path)
     if not channel:  # the residuals of a flat bed do not fall: only noise is left
-        edit(directory / "system/controlDict", "endTime             1000;", "endTime 300;")
+        edit(
+            directory / "system/controlDict",
+            "endTime             1000;",
+            "endTime 300;",
+        )
         edit(directory / "system/controlDict", "Interval       1000", "Interval 300")
     allrun(directory)
     solved = SolvedFlow(directory)
     stress = solved.stress(flow.roughness_m)
-    np.testing.assert_allclose(stress.ustar_over_ustar0_wall, 1.0, atol=0.01 if other else 0.002)
+    np.testing.assert_allclose(
+        stress.ustar_over_ustar0_wall, 1.0, atol=0.01 if other else 0.002
+    )
     assert solved.ustar0 / flow.ustar0_m_s == pytest.approx(1, abs=within)
     if channel:
         # k-epsilon is slow to mix below a surface: above the log law
@@ -164,7 +211,9 @@ def test_a_flat_bed_keeps_the_friction_velocity(
         np.testing.assert_allclose(stress.ustar_over_ustar0_eq10, 1.0, atol=0.02)
         printed = stress.ustar_over_ustar0_eq10_printed / stress.ustar_over_ustar0_eq10
         over = flow.first_cell_m / 2.0 / flow.roughness_m
-        np.testing.assert_allclose(printed, np.log(over + 1.0) / np.log(over), rtol=1e-4)
+        np.testing.assert_allclose(
+            printed, np.log(over + 1.0) / np.log(over), rtol=1e-4
+        )
 
 
 @pytest.mark.parametrize(
@@ -175,7 +224,11 @@ def test_a_flat_bed_keeps_the_friction_velocity(
         ({"cells_per_face": 32}, 1.0, 0.02),
         ({"non_orthogonal_correctors": 2}, 1.0, 1e-3),
         ({"lid": 200.0, "upstream": 160.0, "downstream": 200.0}, 1.0, 0.005),
-        ({"lid": 10.0, "upstream": 10.0, "downstream": 20.0}, 1.08, 0.05),  # too small a domain
+        (
+            {"lid": 10.0, "upstream": 10.0, "downstream": 20.0},
+            1.08,
+            0.05,
+        ),  # too small a domain
         ({"convection_scheme": "upwind"}, 1.1, 0.045),  # too much diffusion
     ],
 )
@@ -208,7 +261,9 @@ def test_a_pruned_flow_runs_again_for_a_finer_one(tmp_path: Path, pruned: bool) 
         flow = {{ lid = 10.0, upstream = 10.0, downstream = 20.0, cells_per_face = {} }}
         protocol = {{ method = "pivot" }}
     """
-    coarse, fine = (parse(text.format(n), name="a", where="a") for n in (FINE // 2, FINE))
+    coarse, fine = (
+        parse(text.format(n), name="a", where="a") for n in (FINE // 2, FINE)
+    )
     pipeline.run(coarse, tmp_path, workers=1)
     if pruned:
         (flow,) = plan.make(coarse).cases.values()
@@ -217,7 +272,9 @@ def test_a_pruned_flow_runs_again_for_a_finer_one(tmp_path: Path, pruned: bool) 
     assert (finished.started, finished.failures) == (1 + pruned, {})
 
 
-def test_the_stress_scales_with_the_size_and_grows_in_shallow_water(solve: Solve) -> None:
+def test_the_stress_scales_with_the_size_and_grows_in_shallow_water(
+    solve: Solve,
+) -> None:
     lengths = ("roughness", "first_cell_height", "viscosity")
     settings = {name: 10 * getattr(PILE.settings, name) for name in lengths}
     larger = replace(changed(PILE, **settings), height_m=10 * PILE.height_m)
@@ -248,16 +305,26 @@ def test_diagnostics_tell_a_sound_run_from_others(solve: Solve) -> None:
     ],
 )
 def test_runs_without_an_answer(
-    tmp_path: Path, settings: dict[str, Any], last: str, error: type[SolverError], cause: str
+    tmp_path: Path,
+    settings: dict[str, Any],
+    last: str,
+    error: type[SolverError],
+    cause: str,
 ) -> None:
     flow = changed(PILE, **settings)
     directory = case.prepare(flow, tmp_path)
-    edit(directory / "system/controlDict", "endTime             1000;", f"endTime {last};")
+    edit(
+        directory / "system/controlDict",
+        "endTime             1000;",
+        f"endTime {last};",
+    )
     allrun(directory)
     with pytest.raises(error, match=cause):
         flow.collect(directory)
 
 
 def test_results_of_another_mesh_are_refused(solve: Solve) -> None:
-    with pytest.raises(SolverError, match=r"z_e is 0.5 to 0.5 of that of the first cells"):
+    with pytest.raises(
+        SolverError, match=r"z_e is 0.5 to 0.5 of that of the first cells"
+    ):
         changed(PILE, first_cell_height=1e-3).collect(solve(PILE))

@@ -40,7 +40,9 @@ def first_cells(directory: Path) -> tuple[FloatArray, FloatArray]:
 @pytest.mark.parametrize("slope", [0.0, 5.0, 15.0, 30.0, 40.0])
 @pytest.mark.parametrize("height", [0.002, 3.0])
 @pytest.mark.parametrize("lid", [10.0, 100.0])
-def test_a_mesh_for_each_pile(slope: float, height: float, lid: float, tmp_path: Path) -> None:
+def test_a_mesh_for_each_pile(
+    slope: float, height: float, lid: float, tmp_path: Path
+) -> None:
     settings = {"first_cell_height": height / 40, "roughness": height / 600, "lid": lid}
     flow = replace(changed(PILE, **settings), slope_deg=slope, height_m=height)
     corners, heights = first_cells(case.prepare(flow, tmp_path))
@@ -55,7 +57,10 @@ def test_a_mesh_for_each_shape(name: str, tmp_path: Path) -> None:
     shape = bed(**SHAPES[name])
     settings = {"cells_per_face": 40, "first_cell_height": H / 20}
     flow = replace(
-        changed(PILE, **settings), slope_deg=shape.slope_deg, height_m=H, line=of_bed(shape)
+        changed(PILE, **settings),
+        slope_deg=shape.slope_deg,
+        height_m=H,
+        line=of_bed(shape),
     )
     corners, heights = first_cells(case.prepare(flow, tmp_path))
     line, corners = flow.bed_line, corners[2:]
@@ -66,7 +71,9 @@ def test_a_mesh_for_each_shape(name: str, tmp_path: Path) -> None:
     # but for bed at a sharp bend, neighbours differ by less than a factor
     steps = np.diff(corners[:, 0])
     assert (steps[1:] / steps[:-1]).max() < 3
-    np.testing.assert_allclose(heights, H / 20 / cos(radians(shape.slope_deg)), rtol=1e-3)
+    np.testing.assert_allclose(
+        heights, H / 20 / cos(radians(shape.slope_deg)), rtol=1e-3
+    )
 
 
 def test_the_mesh_of_the_template_is_that_of_its_geometry(template: Path) -> None:
@@ -76,22 +83,36 @@ def test_the_mesh_of_the_template_is_that_of_its_geometry(template: Path) -> Non
 
 def test_threads_make_their_meshes_in_turn(tmp_path: Path) -> None:
     flows = [replace(PILE, slope_deg=float(slope)) for slope in (10, 20, 30)]
-    threads = [threading.Thread(target=case.prepare, args=(flow, tmp_path)) for flow in flows]
+    threads = [
+        threading.Thread(target=case.prepare, args=(flow, tmp_path)) for flow in flows
+    ]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
     for flow in flows:
         expected = flow.first_cell_m / cos(radians(flow.slope_deg))
-        np.testing.assert_allclose(first_cells(tmp_path / flow.name)[1], expected, rtol=1e-3)
+        np.testing.assert_allclose(
+            first_cells(tmp_path / flow.name)[1], expected, rtol=1e-3
+        )
 
 
 @pytest.mark.parametrize(
     ("file", "old", "new", "cause"),
     [
-        ("pile.geo", '"lid"', '"lib"', r"no usable mesh: without the physical groups \['lid'\]"),
+        (
+            "pile.geo",
+            '"lid"',
+            '"lib"',
+            r"no usable mesh: without the physical groups \['lid'\]",
+        ),
         ("pile.geo", "Recombine Surface{:};", "", "not of hexahedra only"),
-        ("pile.geo", "= {x, thickness, lid}", "= {x, thickness, -lid}", "inverted cells"),
+        (
+            "pile.geo",
+            "= {x, thickness, lid}",
+            "= {x, thickness, -lid}",
+            "inverted cells",
+        ),
         ("parameters.geo", "height = 0.02;", "height = two;", "Unknown variable 'two'"),
     ],
 )
@@ -116,7 +137,10 @@ def test_a_mesh_that_is_no_such_mesh(
     ]
     + [
         ("flow = { lid = 3.0 }", "flow.lid"),
-        ("flow = { cells_per_face = 10, expansion_ratio = 2.0 }", "flow.expansion_ratio"),
+        (
+            "flow = { cells_per_face = 10, expansion_ratio = 2.0 }",
+            "flow.expansion_ratio",
+        ),
     ],
 )
 def test_beds_and_settings_without_a_mesh_are_refused_with_their_field(

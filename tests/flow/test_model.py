@@ -18,7 +18,9 @@ grain = { diameter = 1e-3 }
 bed = { kind = "pile", slope_deg = 15.0, roughness = "d/30" }
 [flow]
 """
-WATER = 'model = "flat"\ntop = "open water"\ndepth = 0.3\n[protocol]\nmethod = "pivot"\n'
+WATER = (
+    'model = "flat"\ntop = "open water"\ndepth = 0.3\n[protocol]\nmethod = "pivot"\n'
+)
 
 
 def piles(flow: str) -> list[Pile]:
@@ -29,7 +31,9 @@ def piles(flow: str) -> list[Pile]:
 
 def test_a_theory_needs_no_case(tmp_path: Path) -> None:
     # nor is it refused for a mesh that it has not
-    flat, waves = piles('first_cell_height = 0.01\n[axes]\n"flow.model" = ["flat", "waves"]\n')
+    flat, waves = piles(
+        'first_cell_height = 0.01\n[axes]\n"flow.model" = ["flat", "waves"]\n'
+    )
     assert flat.model.cases == waves.model.cases == ()
     np.testing.assert_allclose(flat.speed(tmp_path), 1)
     rising = waves.speed(tmp_path)
@@ -65,7 +69,9 @@ def test_a_flat_beds_height_moves_nothing_behind_a_fence() -> None:
     """The flow over it is measured in the height of the fence, not in a length without meaning."""
     fence = 'obstacles = [{ kind = "fence", x = -0.05, height = 0.02 }]'
     flat = f'shape = "flat", length = 0.2, {fence}, height = '
-    texts = [TEXT.replace("slope_deg = 15.0", f"{flat}{height}") for height in (0.05, 0.2)]
+    texts = [
+        TEXT.replace("slope_deg = 15.0", f"{flat}{height}") for height in (0.05, 0.2)
+    ]
     scenes = [study.parse(text, name="t", where="t").scenes[0] for text in texts]
     assert len({FlowModel(scene).cases for scene in scenes}) == 1
     assert len({scene.first_cell_height for scene in scenes}) == 1
@@ -77,7 +83,9 @@ def test_a_slow_solve_keeps_its_first_cells() -> None:
         flow = pile.flow
         assert flow.first_cell_m == pytest.approx(0.02 / 40)
         assert flow.viscosity_m2_s <= 1e-5
-        assert 0.41 * flow.ustar0_m_s * flow.first_cell_m / 2 / flow.viscosity_m2_s > 1.2
+        assert (
+            0.41 * flow.ustar0_m_s * flow.first_cell_m / 2 / flow.viscosity_m2_s > 1.2
+        )
     for pile in piles('viscosity = 1e-4\n[axes]\n"flow.speed" = [0.5, 1.0, 10.0]\n'):
         assert pile.flow.viscosity_m2_s == 1e-4
         assert pile.flow.first_cell_m > 0.02 / 40

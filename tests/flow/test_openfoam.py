@@ -8,7 +8,9 @@ import pytest
 from orchestrator.errors import SolverError
 from orchestrator.solvers import openfoam
 
-HEADER = "trapFpe: Floating point exception trapping enabled (FOAM_SIGFPE).\nCreate time\n"
+HEADER = (
+    "trapFpe: Floating point exception trapping enabled (FOAM_SIGFPE).\nCreate time\n"
+)
 STEP = """
 Time = {time}
 
@@ -31,12 +33,30 @@ def steps(*residuals: float) -> str:
     ("text", "cause"),
     [
         ("", "was stopped before its end; its log breaks off after its header"),
-        (steps(1.0, 0.5), "was stopped before its end; its log breaks off after iteration 2"),
-        (FATAL, "simpleFoam stopped: Unknown patchField type nosuch for patch type wall"),
-        (steps(1.0) + "#1  Foam::sigFpe::sigHandler", "floating point exception after iteration 1"),
-        (steps(1.0, float("nan")) + FATAL, "diverged: the residuals are not numbers: .*nan"),
-        (steps(1.0) + "#1  Foam::sigSegv::sigHandler(int) at ??:?", "segmentation fault"),
-        (steps(*0.9 ** np.arange(100)) + "\nEnd\n", r"residual of Ux is \S+ after iteration 100"),
+        (
+            steps(1.0, 0.5),
+            "was stopped before its end; its log breaks off after iteration 2",
+        ),
+        (
+            FATAL,
+            "simpleFoam stopped: Unknown patchField type nosuch for patch type wall",
+        ),
+        (
+            steps(1.0) + "#1  Foam::sigFpe::sigHandler",
+            "floating point exception after iteration 1",
+        ),
+        (
+            steps(1.0, float("nan")) + FATAL,
+            "diverged: the residuals are not numbers: .*nan",
+        ),
+        (
+            steps(1.0) + "#1  Foam::sigSegv::sigHandler(int) at ??:?",
+            "segmentation fault",
+        ),
+        (
+            steps(*0.9 ** np.arange(100)) + "\nEnd\n",
+            r"residual of Ux is \S+ after iteration 100",
+        ),
         ("\nEnd\n", "did not converge"),
     ],
 )
@@ -53,8 +73,14 @@ def test_a_run_that_did_not_end_well(tmp_path: Path, text: str, cause: str) -> N
 @pytest.mark.parametrize(
     ("stated", "cause"),
     [
-        ("Using: OpenFOAM-v1812 (see www.OpenFOAM.com)", "OpenFOAM 1812 is older than 1912"),
-        ("Using: OpenFOAM-10 (see https://openfoam.org)", "is not a known OpenFOAM: .*-10"),
+        (
+            "Using: OpenFOAM-v1812 (see www.OpenFOAM.com)",
+            "OpenFOAM 1812 is older than 1912",
+        ),
+        (
+            "Using: OpenFOAM-10 (see https://openfoam.org)",
+            "is not a known OpenFOAM: .*-10",
+        ),
         ("foo", "is not a known OpenFOAM: it ended with 0 and printed “foo”"),
         ("Using: OpenFOAM-v2312 (2312) - visit www.openfoam.com", None),
     ],

@@ -21,12 +21,17 @@ def stress() -> WallStress:
     random = np.random.default_rng(7)
     length = random.uniform(1e-4, 3e-3, 60)
     tau, eq10 = random.normal(1.0, 1.0, (2, 60))
-    s, z_e = np.cumsum(length) - length / 2 - length[:20].sum(), random.uniform(2e-4, 4e-4, 60)
+    s, z_e = (
+        np.cumsum(length) - length / 2 - length[:20].sum(),
+        random.uniform(2e-4, 4e-4, 60),
+    )
     x, z = random.normal(size=(2, 60))
     return WallStress(s, x, z, length, z_e, tau, eq10, 1.04 * eq10)
 
 
-def overlap_mean(stress: WallStress, values: np.ndarray, s: float, length: float) -> float:
+def overlap_mean(
+    stress: WallStress, values: np.ndarray, s: float, length: float
+) -> float:
     """The mean by its definition, face by face."""
     starts, ends = stress.edges_m[:-1], stress.edges_m[1:]
     shared = np.minimum(ends, s + length / 2.0) - np.maximum(starts, s - length / 2.0)
@@ -55,18 +60,24 @@ def _bent(slope_deg: float, tau: Callable[[FloatArray], FloatArray]) -> WallStre
 def test_a_stress_that_is_linear_is_read_exactly(slope_deg: float) -> None:
     stress = _bent(slope_deg, lambda s: 1.0 + 30.0 * s)
     places = np.linspace(-19e-3, 19e-3, 77)
-    np.testing.assert_allclose(stress.mean_over(places, 2e-4), 1.0 + 30.0 * places, rtol=1e-9)
+    np.testing.assert_allclose(
+        stress.mean_over(places, 2e-4), 1.0 + 30.0 * places, rtol=1e-9
+    )
 
 
 def test_no_face_reaches_beyond_its_neighbours_or_over_a_bend() -> None:
     bent = _bent(15.0, lambda s: np.where(s > 0, 2.0, 0.5))
-    np.testing.assert_allclose(bent.mean_over([-2e-4, 2e-4], 2e-4), [0.5, 2.0], rtol=1e-9)
+    np.testing.assert_allclose(
+        bent.mean_over([-2e-4, 2e-4], 2e-4), [0.5, 2.0], rtol=1e-9
+    )
     flat = _bent(0.0, lambda s: np.where(s > 0.0101, 2.0, np.where(s > 0, 0.5, 0.4)))
     read = flat.mean_over(np.linspace(-19e-3, 19e-3, 400), 1e-5)
     assert 0.4 - 1e-9 <= read.min() <= read.max() <= 2.0 + 1e-9
 
 
-@pytest.mark.parametrize(("s", "length"), [(0.0, 0.0), (0.0, -1.0), (0.0, 1.0), (9.0, 1e-4)])
+@pytest.mark.parametrize(
+    ("s", "length"), [(0.0, 0.0), (0.0, -1.0), (0.0, 1.0), (9.0, 1e-4)]
+)
 def test_no_mean_beyond_the_bed(stress: WallStress, s: float, length: float) -> None:
     with pytest.raises(InputError, match="within the bed"):
         stress.mean_over(s, length)
@@ -107,4 +118,7 @@ def test_a_corners_eddy_does_not_end_the_reversed_flow(sound: WallStress) -> Non
     assert found is not None
     assert found == pytest.approx((0.05, 6), abs=0.03)
     again = np.abs(sound.x_m - crest - 12 * HEIGHT) < HEIGHT
-    assert bubble(replace(stress, tau_wall=np.where(again, -1, stress.tau_wall)), HEIGHT) == found
+    assert (
+        bubble(replace(stress, tau_wall=np.where(again, -1, stress.tau_wall)), HEIGHT)
+        == found
+    )

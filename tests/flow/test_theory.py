@@ -46,7 +46,11 @@ def test_each_wave_is_answered_by_its_own_coefficients() -> None:
         return a, b
 
     found = theory.response(slopes, cell, alone)
-    a, b = 2 * np.mean(found[far] * np.array([np.cos(wave), -np.sin(wave)]), axis=1) / (2 * np.pi)
+    a, b = (
+        2
+        * np.mean(found[far] * np.array([np.cos(wave), -np.sin(wave)]), axis=1)
+        / (2 * np.pi)
+    )
     np.testing.assert_allclose([a, b], asked, rtol=0.01)
 
 
@@ -76,7 +80,10 @@ def wavy(slope: float, count: int) -> BedLine:
     length = np.pi * HEIGHT / slope
     x = np.arange(0, count * length, length / 80)
     z = HEIGHT / 2 * (1 - np.cos(2 * np.pi * x / length))
-    line = [-1.0, *x.tolist(), count * length, count * length + 1], [0.0, *z.tolist(), 0.0, 0.0]
+    line = (
+        [-1.0, *x.tolist(), count * length, count * length + 1],
+        [0.0, *z.tolist(), 0.0, 0.0],
+    )
     return BedLine(tuple(line[0]), tuple(line[1]), HEIGHT)
 
 
@@ -96,7 +103,9 @@ def test_the_theory_against_the_solved_flow(solve: Solve, slope: float) -> None:
     pile = replace(PILE, slope_deg=slope)
     face = pile.height_m / np.sin(np.radians(slope))
     places = np.array([0.3, 0.5, 0.7, 0.9]) * face
-    solved = WallStress.from_csv(solve(pile) / WALL_STRESS).mean_over(places, 0.2 * face)
+    solved = WallStress.from_csv(solve(pile) / WALL_STRESS).mean_over(
+        places, 0.2 * face
+    )
     stress = theory.waves(triangle(slope, pile.height_m), pile.roughness_m)
     ustar = np.sqrt(stress.mean_over(places, 0.2 * face))
     # the stress at the foot of steep faces comes out too high
@@ -107,7 +116,12 @@ def test_the_theory_against_the_solved_flow(solve: Solve, slope: float) -> None:
 
 
 def test_a_flat_beds_stress_is_the_undisturbed_one() -> None:
-    stress, face = theory.flat(triangle(15.0, HEIGHT)), HEIGHT / np.sin(np.radians(15.0))
+    stress, face = (
+        theory.flat(triangle(15.0, HEIGHT)),
+        HEIGHT / np.sin(np.radians(15.0)),
+    )
     assert (stress.tau_wall == 1).all()
-    np.testing.assert_allclose(stress.edges_m[[0, -1]], [-0.2, 2 * face + 0.4], rtol=1e-12)
+    np.testing.assert_allclose(
+        stress.edges_m[[0, -1]], [-0.2, 2 * face + 0.4], rtol=1e-12
+    )
     assert stress.s_m[stress.z_m.argmax()] == pytest.approx(face, rel=0.01)

@@ -74,7 +74,9 @@ def assert_same(ours: FloatArray, theirs: FloatArray) -> None:
 
 
 @pytest.mark.parametrize("name", FLOWS)
-def test_the_stress_is_that_of_the_function_object(solve: Solve, tmp_path: Path, name: str) -> None:
+def test_the_stress_is_that_of_the_function_object(
+    solve: Solve, tmp_path: Path, name: str
+) -> None:
     solved = solve(FLOWS[name])
     ours = SolvedFlow(solved).wall_shear
     copy = Path(shutil.copytree(solved, tmp_path / "copy"))
@@ -96,7 +98,9 @@ def test_the_stress_is_the_recorded_one_on_every_release(template: Path) -> None
 
 
 @pytest.mark.parametrize("name", ["kEpsilon", "closed channel", "cylinder"])
-def test_a_study_reads_the_fields_with_six_digits(solve: Solve, tmp_path: Path, name: str) -> None:
+def test_a_study_reads_the_fields_with_six_digits(
+    solve: Solve, tmp_path: Path, name: str
+) -> None:
     """So that processors whose fields differ in their last digits read the same."""
     copy = Path(shutil.copytree(solve(FLOWS[name]), tmp_path / "copy"))
     solved = SolvedFlow(copy)
@@ -123,23 +127,37 @@ def test_a_study_reads_the_fields_with_six_digits(solve: Solve, tmp_path: Path, 
 
 def test_the_last_iteration_is_read(template: Path) -> None:
     """Whichever of the directories a listing has first."""
-    edit(template / "system/controlDict", "writeInterval       1000;", "writeInterval 7;")
+    edit(
+        template / "system/controlDict", "writeInterval       1000;", "writeInterval 7;"
+    )
     assert allrun(template).returncode == 0
     written = sorted(int(path.name) for path in template.glob("[1-9]*"))
     assert len(written) > 10
     assert SolvedFlow(template).last_iteration.name == str(written[-1])
     assert (template / str(written[-1]) / "wallShearStress").is_file()
-    velocity = read_list(template / str(written[-1]) / "U", "internalField   nonuniform")
+    velocity = read_list(
+        template / str(written[-1]) / "U", "internalField   nonuniform"
+    )
     np.testing.assert_array_equal(SolvedFlow(template).velocity, velocity)
 
 
 @pytest.mark.parametrize("name", ["0/U", "0/nut", "constant/polyMesh/owner"])
-def test_a_stress_of_files_that_are_cut_is_none(solve: Solve, tmp_path: Path, name: str) -> None:
+def test_a_stress_of_files_that_are_cut_is_none(
+    solve: Solve, tmp_path: Path, name: str
+) -> None:
     copy = Path(shutil.copytree(solve(PILE), tmp_path / "copy"))
     last = SolvedFlow(copy).last_iteration.name
     cut = copy / name.replace("0/", f"{last}/")
     os.truncate(cut, cut.stat().st_size * 9 // 10)
-    program = ["awk", "-v", f"time={last}", "-v", "nu=1e-05", "-f", "wallShearStress.awk"]
+    program = [
+        "awk",
+        "-v",
+        f"time={last}",
+        "-v",
+        "nu=1e-05",
+        "-f",
+        "wallShearStress.awk",
+    ]
     ended = subprocess.run(program, cwd=copy, capture_output=True, text=True)
     assert ended.returncode == 1
     assert f"the results are not whole: {cut.relative_to(copy)}" in ended.stderr

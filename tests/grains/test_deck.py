@@ -37,7 +37,9 @@ def test_a_grain_feels_the_closed_forms_force_at_its_own_stress(
     drag, lift = (partial(f, at=WHERE) for f in (law.drag, law.lift))
     loading = Loading(drag, lift, np.array([ratio, 0.0]), ALONG, OUTWARD)
     local = abs(ratio) * ustar0
-    exact = np.sign(ratio) * float(drag(local)) * ALONG[0] + float(lift(local)) * OUTWARD[0]
+    exact = (
+        np.sign(ratio) * float(drag(local)) * ALONG[0] + float(lift(local)) * OUTWARD[0]
+    )
     np.testing.assert_allclose(loading.at(ustar0), [exact, [0, 0]], rtol=1e-12, atol=0)
     # and the table of forces finds the flow at which a moment is reached
     ustar = ForceTable.of(drag, lift, 1e-5 * np.ones(1), TABLE)[0].reaching(*arms, goal)
@@ -48,7 +50,10 @@ def test_a_grain_feels_the_closed_forms_force_at_its_own_stress(
 def _solve(copy: Path) -> "tuple[list[str], list[bytes]]":
     """Grains that lie at the end of each load step; the results."""
     subprocess.run(["./Allrun"], cwd=copy, check=True)
-    results = [(copy / name).read_bytes() for name in ("samples.csv", "passage.dump", "bed.dump")]
+    results = [
+        (copy / name).read_bytes()
+        for name in ("samples.csv", "passage.dump", "bed.dump")
+    ]
     rows = [row.split(",") for row in results[0].decode().splitlines()[1:]]
     return list({row[0]: row[3] for row in rows}.values()), results
 
@@ -64,7 +69,10 @@ def test_processes_that_share_the_grains_find_the_same(tmp_path: Path) -> None:
     assert os.stat(tmp_path).st_mtime_ns == untouched
     assert alone[-1] == "0"
     shared, results = _solve(tmp_path / "two")
-    assert "2 by 1 by 1 MPI processor grid" in (tmp_path / "two" / "log.liggghts").read_text()
+    assert (
+        "2 by 1 by 1 MPI processor grid"
+        in (tmp_path / "two" / "log.liggghts").read_text()
+    )
     assert shared == alone
     assert _solve(tmp_path / "again")[1] == results
 

@@ -51,7 +51,9 @@ def test_sliding_start_ends_in_rolling(run_check: Deck, speed: float) -> None:
 def test_a_pushed_grain_passes_the_marker_in_time(
     run_check: Deck, push: float, displacement_criterion: float
 ) -> None:
-    said = run_check("in.passing", push=push, displacement_criterion=displacement_criterion)
+    said = run_check(
+        "in.passing", push=push, displacement_criterion=displacement_criterion
+    )
     exact = passing_time(push, displacement_criterion)
     assert _number(said, "time of passing") == pytest.approx(exact, rel=0.005)
 
@@ -59,7 +61,9 @@ def test_a_pushed_grain_passes_the_marker_in_time(
 FOLDER = Path(__file__).parents[2] / "examples" / "flux"
 
 
-@pytest.mark.skipif(shutil.which("liggghts") is None, reason="liggghts is not installed")
+@pytest.mark.skipif(
+    shutil.which("liggghts") is None, reason="liggghts is not installed"
+)
 def test_a_bed_feeds_itself_above_its_threshold_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -73,7 +73,9 @@ fractions = [0.1, 0.3]
 def test_a_pile_that_lifts_off_has_moved_and_says_so(tmp_path: Path) -> None:
     asked = study.parse(LIFT_OFF, name="lift", where="lift")
     assert not pipeline.run(asked, tmp_path, workers=1).failures
-    paths = (tmp_path / f"tables/pile_{name}.csv" for name in ("curve", "threshold", "grain"))
+    paths = (
+        tmp_path / f"tables/pile_{name}.csv" for name in ("curve", "threshold", "grain")
+    )
     curve, thresholds, grains = map(pd.read_csv, paths)
     last = curve.iloc[-1]
     assert last["fallen_upstream"] > 0.3 * last["count"]
@@ -90,7 +92,9 @@ def test_a_pile_that_lifts_off_has_moved_and_says_so(tmp_path: Path) -> None:
     np.testing.assert_allclose(lift, scene.weight * np.cos(SLOPE), rtol=2e-8)
     assert np.isinf(loads.lifting(0.99 * lifting)).all()
     for method in ("pivot", "peeling"):
-        cheap = Pile(changed(scene, {"protocol.method": method})).thresholds(cases, (0.1, 0.3))
+        cheap = Pile(changed(scene, {"protocol.method": method})).thresholds(
+            cases, (0.1, 0.3)
+        )
         for at, dem in zip(cheap, pile.thresholds(cases, (0.1, 0.3)), strict=True):
             assert at.carried_off > 0.9
             assert 0.95 * dem.tau_low < at.tau < 1.05 * dem.tau_high
@@ -121,25 +125,39 @@ def copied(folder: Path, **numbers: float) -> Path:
     return folder
 
 
-def test_rest_and_lines_left_out_change_no_grain(tmp_path: Path, grains: GrainTable) -> None:
-    changes = {"rest": {}, "waiting": {"rest_energy": 0.0}, "long": {"waiting_time": 40.0}}
-    runs = {name: copied(tmp_path / name, **numbers) for name, numbers in changes.items()}
+def test_rest_and_lines_left_out_change_no_grain(
+    tmp_path: Path, grains: GrainTable
+) -> None:
+    changes = {
+        "rest": {},
+        "waiting": {"rest_energy": 0.0},
+        "long": {"waiting_time": 40.0},
+    }
+    runs = {
+        name: copied(tmp_path / name, **numbers) for name, numbers in changes.items()
+    }
     runs["whole"] = copied(tmp_path / "whole", stir=0.0)
     for folder in runs.values():
         subprocess.run(["./Allrun"], cwd=folder, check=True)
-    rest, *others = (motion.read(run, grains, 0.3, falls_out=False) for run in runs.values())
+    rest, *others = (
+        motion.read(run, grains, 0.3, falls_out=False) for run in runs.values()
+    )
     assert rest.moved[-1] > 0
     for other in others:
         np.testing.assert_array_equal(rest.level, other.level)
     # the waiting time is only the bound for what never rests
-    samples = {name: read_table(folder / motion.SAMPLES) for name, folder in runs.items()}
+    samples = {
+        name: read_table(folder / motion.SAMPLES) for name, folder in runs.items()
+    }
     assert len(samples["rest"]) == len(samples["long"]) < 0.6 * len(samples["waiting"])
     # grains at their places need no line in the dump
     pd.testing.assert_frame_equal(samples["rest"], samples["whole"])
     short, whole = (runs[name] for name in ("rest", "whole"))
     sizes = [(folder / motion.PASSAGE).stat().st_size for folder in (short, whole)]
     assert sizes[0] < sizes[1]
-    few, every = (motion.read_track(run, grains, samples["rest"]).travel for run in (short, whole))
+    few, every = (
+        motion.read_track(run, grains, samples["rest"]).travel for run in (short, whole)
+    )
     np.testing.assert_allclose(few, every, rtol=0, atol=0.02)
     frames = (short / motion.BED).read_text().split("ITEM: TIMESTEP")
     (short / motion.BED).write_text("ITEM: TIMESTEP".join(frames[:-1]))
@@ -164,9 +182,13 @@ def test_a_bed_comes_to_rest_unless_its_step_is_too_large(
     error: type[SolverError] | None,
     what: str,
 ) -> None:
-    settled = copied(tmp_path / "a", time_step=time_step, damping=damping, stiffness=STIFFNESS)
+    settled = copied(
+        tmp_path / "a", time_step=time_step, damping=damping, stiffness=STIFFNESS
+    )
     subprocess.run(["./Allrun"], cwd=settled, capture_output=True)
-    check = partial(motion.check_rest, settled, weight=WEIGHT, stiffness=STIFFNESS, all_rest=True)
+    check = partial(
+        motion.check_rest, settled, weight=WEIGHT, stiffness=STIFFNESS, all_rest=True
+    )
     table = read_table(settled / motion.SETTLING)
     if error is None:
         check(grains)
@@ -174,7 +196,9 @@ def test_a_bed_comes_to_rest_unless_its_step_is_too_large(
         assert energy.iloc[-5:].mean() < 0.01 * NOISE
         assert energy.iloc[0] > NOISE  # it did fall into place
         one_more = replace(grains, kind=np.append(grains.kind, grains.kind.max()))
-        with pytest.raises(Exploded, match="1 of 47 grains were lost before the flow rose"):
+        with pytest.raises(
+            Exploded, match="1 of 47 grains were lost before the flow rose"
+        ):
             check(one_more)
         return
     with pytest.raises(error, match=what):
@@ -205,7 +229,9 @@ def test_a_bed_lies_for_as_long_as_it_takes_to_come_to_rest(tmp_path: Path) -> N
     # single grains may fall, and get the time that they are given
     assert _settled(tmp_path / "cells", settle=0.5, noise=0.0) == 1
     # a bed that never rests gets no load step
-    assert _settled(tmp_path / "never", settle=0.5, time_step=0.6, most_settle=20.0) == 40
+    assert (
+        _settled(tmp_path / "never", settle=0.5, time_step=0.6, most_settle=20.0) == 40
+    )
     assert not (tmp_path / "never" / motion.SAMPLES).is_file()
     assert "does not come to rest" in (tmp_path / "never" / "log.liggghts").read_text()
 
@@ -223,14 +249,23 @@ DENSITY = 1.2
 def test_curve_holds_the_mean_stress_of_what_has_moved() -> None:
     np.testing.assert_allclose(MOTION.fraction, [0, 0.2, 0.5, 0.5, 0.9])
     found = threshold.mean_tau(MOTION, SPEED, DENSITY)
-    mean = [math.nan, 4.0, (2 * 4 + 3 * 2.25) / 5, (2 * 4 + 3 * 2.25) / 5, (8 + 6.75 + 4) / 9]
+    mean = [
+        math.nan,
+        4.0,
+        (2 * 4 + 3 * 2.25) / 5,
+        (2 * 4 + 3 * 2.25) / 5,
+        (8 + 6.75 + 4) / 9,
+    ]
     np.testing.assert_allclose(found, DENSITY * FLOW**2 * mean)
 
 
 def test_threshold_of_a_pile_at_a_fraction() -> None:
     # all of the first load step were carried off, and two of the three of the second
     carried = Motion(FLOW, LEVEL, NONE, np.arange(10) < 4, NONE)
-    shares = [threshold.of_pile(carried, SPEED, n, DENSITY).carried_off for n in (0.1, 0.4, 0.95)]
+    shares = [
+        threshold.of_pile(carried, SPEED, n, DENSITY).carried_off
+        for n in (0.1, 0.4, 0.95)
+    ]
     np.testing.assert_allclose(shares, [1.0, 0.8, np.nan])
     # 40 % is first reached in the second hold, by five of ten; the interval holds the counts'
     # resolution: half a grain more than 50 % asks for the fourth hold
@@ -242,7 +277,9 @@ def test_threshold_of_a_pile_at_a_fraction() -> None:
 
 
 def test_an_interval_is_open_where_half_a_grain_more_or_less_was_not_reached() -> None:
-    def interval(fraction: float, ends: tuple[float, float] | None = None) -> list[float]:
+    def interval(
+        fraction: float, ends: tuple[float, float] | None = None
+    ) -> list[float]:
         at = threshold.of_pile(MOTION, SPEED, fraction, DENSITY, ends)
         return [at.tau / DENSITY, at.tau_low / DENSITY, at.tau_high / DENSITY]
 
@@ -253,10 +290,14 @@ def test_an_interval_is_open_where_half_a_grain_more_or_less_was_not_reached() -
     # a fraction that was not reached takes more than the last flow
     np.testing.assert_allclose(interval(1.0), [nan, 1.69 * last, nan])
     # a sample of which none need have moved has no lower end
-    np.testing.assert_allclose(interval(0.4, (0.0, 0.5)), [1.1 * 2.95, nan, 1.21 * 2.95])
+    np.testing.assert_allclose(
+        interval(0.4, (0.0, 0.5)), [1.1 * 2.95, nan, 1.21 * 2.95]
+    )
     # of grains that never move only the highest flow is known, at the mean stress on all of them
     still = MOTION.of(LEVEL == 0)
-    at = threshold.of_pile(still, SPEED[LEVEL == 0], 0.3, DENSITY, threshold.sampled(0.3, 1))
+    at = threshold.of_pile(
+        still, SPEED[LEVEL == 0], 0.3, DENSITY, threshold.sampled(0.3, 1)
+    )
     assert math.isnan(at.tau)
     assert math.isnan(at.tau_high)
     at = threshold.of_pile(still, SPEED[LEVEL == 0], 0.9, DENSITY, (0.9, 1.0))
@@ -264,7 +305,9 @@ def test_an_interval_is_open_where_half_a_grain_more_or_less_was_not_reached() -
 
 
 def test_a_reference_is_within_a_relative_error_of_itself() -> None:
-    for reference, error in itertools.product((0.01, 3.0), (0.0, 0.05, 0.35, 0.67, 0.99)):
+    for reference, error in itertools.product(
+        (0.01, 3.0), (0.0, 0.05, 0.35, 0.67, 0.99)
+    ):
         for value in (reference * (1 - error), reference, reference * (1 + error)):
             low, high = threshold.within(value, error)
             assert low * (1 - 1e-12) <= reference <= high * (1 + 1e-12)
@@ -277,7 +320,9 @@ def test_a_reference_is_within_a_relative_error_of_itself() -> None:
     assert np.isnan(threshold.within(2.0, math.nan)).all()
 
 
-def test_the_stress_at_the_median_size_lies_between_those_of_the_classes_beside_it() -> None:
+def test_the_stress_at_the_median_size_lies_between_those_of_the_classes_beside_it() -> (
+    None
+):
     sizes = np.array([0.4, 0.8, 1.15, 2.3])
     for power in (-0.5, 0.0, 0.7):
         assert threshold.at_size(1.0, sizes, 3.0 * sizes**power) == pytest.approx(3.0)
@@ -285,12 +330,16 @@ def test_the_stress_at_the_median_size_lies_between_those_of_the_classes_beside_
     nan = math.nan
     exact = threshold.at_size(0.8, sizes, np.array([nan, 5.0, nan, nan]))
     assert exact == pytest.approx(5.0)
-    assert threshold.at_size(1.0, sizes, np.array([nan, 2.0, 2.0, nan])) == pytest.approx(2.0)
+    assert threshold.at_size(
+        1.0, sizes, np.array([nan, 2.0, 2.0, nan])
+    ) == pytest.approx(2.0)
     # no class beside it, one that has not moved, or one that lies loose
     assert math.isnan(threshold.at_size(0.3, sizes, sizes))
     assert math.isnan(threshold.at_size(3.0, sizes, sizes))
     for unknown in (nan, 0.0):
-        assert math.isnan(threshold.at_size(1.0, sizes, np.array([1.0, unknown, 2.0, 3.0])))
+        assert math.isnan(
+            threshold.at_size(1.0, sizes, np.array([1.0, unknown, 2.0, 3.0]))
+        )
 
 
 def test_a_sample_bounds_the_fraction_that_has_moved() -> None:
@@ -303,9 +352,13 @@ def test_a_sample_bounds_the_fraction_that_has_moved() -> None:
         assert bdtr(moved, count, high) == pytest.approx(0.1)
 
 
-def test_grains_that_a_reversed_flow_drives_upstream_count_with_the_size_of_their_stress() -> None:
+def test_grains_that_a_reversed_flow_drives_upstream_count_with_the_size_of_their_stress() -> (
+    None
+):
     ways = SPEED, -SPEED, np.where(LEVEL == 1, -SPEED, SPEED)
-    forward, back, both = (threshold.of_pile(MOTION, speed, 0.5, DENSITY) for speed in ways)
+    forward, back, both = (
+        threshold.of_pile(MOTION, speed, 0.5, DENSITY) for speed in ways
+    )
     assert both.tau == back.tau == forward.tau > 0
     assert [at.against_the_flow for at in (forward, back, both)] == [0, 1, 0.4]
 

@@ -45,7 +45,9 @@ def _flows(
     """The flow at which each grain leaves; those of a ratio of 0 feel none, and are fixed."""
     loading = Loading(*_law(lift), ratio, *_along(slope_deg, len(centres)))
     tables = {i: table for i, table in _tables(len(centres), lift).items() if ratio[i]}
-    return peeling.flows(Places.of(centres), np.ones(len(centres)), loading, tables, 0.3)
+    return peeling.flows(
+        Places.of(centres), np.ones(len(centres)), loading, tables, 0.3
+    )
 
 
 def test_a_table_of_forces_is_freed_with_its_last_user() -> None:
@@ -61,9 +63,14 @@ def test_a_table_of_forces_is_freed_with_its_last_user() -> None:
 
 
 @pytest.mark.parametrize("size", [0.5, 1.0, 2.0])
-def test_a_grain_of_another_size_leaves_at_the_angle_of_its_own_pocket(size: float) -> None:
+def test_a_grain_of_another_size_leaves_at_the_angle_of_its_own_pocket(
+    size: float,
+) -> None:
     half = math.sqrt(((1 + size) / 2) ** 2 - 0.25)
-    centres, sizes = np.array([[0.0, half], [-0.5, 0], [0.5, 0]]), np.array([size, 1.0, 1.0])
+    centres, sizes = (
+        np.array([[0.0, half], [-0.5, 0], [0.5, 0]]),
+        np.array([size, 1.0, 1.0]),
+    )
     loading = Loading(*_law(0.0), np.array([1.0, 0, 0]), *_along(0.0, 3))
     bed = Places.of(centres), sizes, loading, _tables(3)
     alone, leaving = peeling.pivots(*bed)[0], peeling.flows(*bed, criterion=0.3)[0]
@@ -80,8 +87,13 @@ def _row(count: int, beta_deg: float, slope_deg: float) -> FloatArray:
 
 
 @pytest.mark.parametrize("slope_deg", [-20.0, 0.0, 20.0])
-def test_a_flow_that_runs_back_is_the_flow_over_the_turned_bed(slope_deg: float) -> None:
-    centres, ratio = _row(5, 60, slope_deg), np.append(np.linspace(1.5, 0.5, 5), np.zeros(6))
+def test_a_flow_that_runs_back_is_the_flow_over_the_turned_bed(
+    slope_deg: float,
+) -> None:
+    centres, ratio = (
+        _row(5, 60, slope_deg),
+        np.append(np.linspace(1.5, 0.5, 5), np.zeros(6)),
+    )
     back = _flows(centres, -ratio, slope_deg=slope_deg, lift=1.0)
     turned = _flows(centres * [-1.0, 1.0], ratio, slope_deg=-slope_deg, lift=1.0)
     np.testing.assert_allclose(back, turned, rtol=1e-12)
@@ -94,17 +106,23 @@ def test_one_grain_leaves_at_the_pivot_of_eq_1(
     slope_deg: float, beta_deg: float, drag: float, lift: float
 ) -> None:
     ratio = np.array([math.sqrt(drag), 0.0, 0.0])
-    leaving = _flows(_row(1, beta_deg, slope_deg), ratio, slope_deg=slope_deg, lift=lift)
+    leaving = _flows(
+        _row(1, beta_deg, slope_deg), ratio, slope_deg=slope_deg, lift=lift
+    )
     alpha, beta = math.radians(slope_deg), math.radians(beta_deg)
     moment = drag * (math.sin(beta) + lift * math.cos(beta))
-    assert leaving[0] == pytest.approx(math.sqrt(math.cos(alpha - beta) / moment), rel=1e-9)
+    assert leaving[0] == pytest.approx(
+        math.sqrt(math.cos(alpha - beta) / moment), rel=1e-9
+    )
     assert np.isinf(leaving[1:]).all()
 
 
 def test_a_row_empties_from_its_end_where_the_stress_is_highest() -> None:
     drag = np.append(np.linspace(0.5, 1.5, 6), np.zeros(7))
     leaving = _flows(_row(6, 60, 15), np.sqrt(drag), slope_deg=15)[:6]
-    alone = np.sqrt(math.cos(math.radians(45)) / (drag[:6] * math.sin(math.radians(60))))
+    alone = np.sqrt(
+        math.cos(math.radians(45)) / (drag[:6] * math.sin(math.radians(60)))
+    )
     np.testing.assert_allclose(leaving, alone, rtol=1e-9)
     # a grain waits for the one in front that feels less
     waiting = _flows(_row(2, 60, 15), np.array([1.4, 1.0, 0, 0, 0]), slope_deg=15)
@@ -113,7 +131,9 @@ def test_a_row_empties_from_its_end_where_the_stress_is_highest() -> None:
 
 def test_a_fixed_neighbour_in_front_has_to_be_climbed() -> None:
     # a grain between two level neighbours: drag alone never lifts it over, lift does
-    centres = np.array([[0, 0], [1, 0], [-0.5, -math.sqrt(3) / 2], [0.5, -math.sqrt(3) / 2]])
+    centres = np.array(
+        [[0, 0], [1, 0], [-0.5, -math.sqrt(3) / 2], [0.5, -math.sqrt(3) / 2]]
+    )
     ratio = np.array([1.0, 0, 0, 0])
     assert math.isinf(_flows(centres, ratio)[0])
     assert _flows(centres, ratio, lift=0.25)[0] == pytest.approx(2.0)
@@ -152,23 +172,33 @@ def test_the_pyramid_of_three_contacts_is_the_closed_form() -> None:
     places, loading = _grains(), _loading()
     tables = _tables(len(loading.ratio), unit=0.5)
     ustar = peeling.pivots(places, np.ones(len(tables)), loading, tables)[3::4]
-    np.testing.assert_allclose(ustar**2, [_drag(turned) for turned in TURNED], rtol=1e-9)
+    np.testing.assert_allclose(
+        ustar**2, [_drag(turned) for turned in TURNED], rtol=1e-9
+    )
     angles = peeling.pivot_angles_deg(places, np.ones(len(tables)), loading.along)[3::4]
     np.testing.assert_allclose(np.tan(np.radians(angles)), ustar**2, rtol=1e-9)
 
 
 def _moved_by_dem(
-    copy: Path, grains: deck.GrainTable, force: FloatArray, rules: Protocol, **given: Any
+    copy: Path,
+    grains: deck.GrainTable,
+    force: FloatArray,
+    rules: Protocol,
+    **given: Any,
 ) -> motion.Motion:
     """Motion of grains of 1 mm under forces (W) at the friction velocities of load steps."""
     d, weight = grains.diameter, 2500.0 * np.pi / 6 * grains.diameter**3 * 9.81
     numbers = {
         **{"diameter": d, "smallest": 1.0, "density": 2500.0, "gravity": 9.81},
-        **deck.protocol(Grain(diameter=d, stiffness=3e4), rules, gusts=given.pop("asked", None)),
+        **deck.protocol(
+            Grain(diameter=d, stiffness=3e4), rules, gusts=given.pop("asked", None)
+        ),
         **{"slope": 0.0, "ceiling_x": 0.0, "ceiling_z": 5 * d, "behind": 30 * d},
     }
     shutil.copytree(templates() / "liggghts" / "bed", copy)
-    deck.write(copy, grains, numbers, given.pop("rising"), force * weight, 3 * d, **given)
+    deck.write(
+        copy, grains, numbers, given.pop("rising"), force * weight, 3 * d, **given
+    )
     subprocess.run(["./Allrun"], cwd=copy, check=True)
     return motion.read(copy, grains, rules.displacement_criterion, falls_out=False)
 
@@ -180,9 +210,13 @@ def test_dem_moves_a_grain_out_of_its_pocket_at_the_closed_form(tmp_path: Path) 
     grains = deck.GrainTable(places.xyz * d, kind, along, sizes, d, 2500.0, WIDTH)
     rising = deck.flows(0.95 * np.sqrt(_drag(0)), 1.02 * np.sqrt(_drag(60)), 0.002)
     force = _loading().at(rising)
-    moved = _moved_by_dem(tmp_path / "b", grains, force, Protocol(waiting_time=8), rising=rising)
+    moved = _moved_by_dem(
+        tmp_path / "b", grains, force, Protocol(waiting_time=8), rising=rising
+    )
     ustar = threshold.of_grains(moved).value
-    np.testing.assert_allclose(ustar, np.sqrt([_drag(turned) for turned in TURNED]), rtol=0.005)
+    np.testing.assert_allclose(
+        ustar, np.sqrt([_drag(turned) for turned in TURNED]), rtol=0.005
+    )
     # the same pocket elsewhere across the flow, here on the seam of the sides, changes nothing
     assert ustar[1] == pytest.approx(ustar[3], rel=1e-12)
 
@@ -208,10 +242,14 @@ def test_a_gust_moves_a_grain_by_its_impulse(tmp_path: Path, duration: float) ->
     kind = np.tile([deck.FIXED, deck.FIXED, deck.COUNTED], len(push))
     ways, ones = np.tile([1.0, 0.0], (len(x), 1)), np.ones(len(x))
     grains = deck.GrainTable(places * 1e-3, kind, ways, ones, 1e-3, 2500.0)
-    force = np.tile(np.where(kind == deck.COUNTED, np.repeat(push, 3), 0.0)[:, None], (2, 1, 2))
+    force = np.tile(
+        np.where(kind == deck.COUNTED, np.repeat(push, 3), 0.0)[:, None], (2, 1, 2)
+    )
     force *= [math.tan(math.pi / 6), 0.0]
     gust = Gusts(intensity=0.4, events=2, duration=duration / 2)
     gusts = {"asked": gust, "gusts": np.array([0.0, 1.0, 1.0, 0.0])}
-    level = _moved_by_dem(tmp_path / "b", grains, force, rules, rising=np.ones(2), **gusts).level
+    level = _moved_by_dem(
+        tmp_path / "b", grains, force, rules, rising=np.ones(2), **gusts
+    ).level
     exact = push[_leaves(push, duration)].min()
     assert push[level > 0].min() == pytest.approx(exact, rel=0.015)

@@ -38,7 +38,9 @@ def _pile(results: Results, method: str) -> Pile:
     return next(pile for pile in piles if pile.scene.protocol.method == method)
 
 
-def test_a_slow_pile_follows_the_pivot_law_at_each_grains_own_stress(tmp_path: Path) -> None:
+def test_a_slow_pile_follows_the_pivot_law_at_each_grains_own_stress(
+    tmp_path: Path,
+) -> None:
     results = small_study.run(tmp_path, SMALL.format(step=0.01))
     slow, cases = _pile(results, "dem"), results.cases
     motion, pivot = slow.motion(cases), slow.pivot_thresholds(slow.speed(cases))
@@ -57,7 +59,9 @@ def test_a_slow_pile_follows_the_pivot_law_at_each_grains_own_stress(tmp_path: P
     assert (grains["moved_in_load_step"] > 0).sum() == curve["moved"].iloc[-1]
 
 
-def test_a_run_goes_on_beyond_the_largest_fraction_that_is_asked_for(tmp_path: Path) -> None:
+def test_a_run_goes_on_beyond_the_largest_fraction_that_is_asked_for(
+    tmp_path: Path,
+) -> None:
     """It is reached, and half a grain more too, whatever `final_fraction` is."""
     text = SMALL.format(step=0.05) + "waiting_time = 6.0\nfractions = [0.95]\n"
     text = text.replace("final_fraction = 0.75", "")
@@ -74,7 +78,12 @@ def test_a_run_goes_on_beyond_the_largest_fraction_that_is_asked_for(tmp_path: P
 
 @pytest.mark.parametrize(
     ("final", "fractions", "last"),
-    [(0.9, "0.1, 0.7", 0.9), (0.9, "0.95", 1.0), (0.5, "0.5", 0.55), (0.5, "0.45", 0.5)],
+    [
+        (0.9, "0.1, 0.7", 0.9),
+        (0.9, "0.95", 1.0),
+        (0.5, "0.5", 0.55),
+        (0.5, "0.45", 0.5),
+    ],
 )
 def test_runs_that_end_at_one_fraction_are_one_case(
     final: float, fractions: str, last: float
@@ -122,7 +131,10 @@ def test_the_grains_of_a_row_without_a_free_end_hold_one_another(
     text = SMALL.format(step=0.05).replace("slope_deg = 20.0", fields)
     # linear theory: the stress of each form is largest near its top
     model = '"flat"' if '"flat"' in fields else '"waves"'
-    text = text.replace("cells_per_face = 20", f"model = {model}") + f'method = "{method}"\n'
+    text = (
+        text.replace("cells_per_face = 20", f"model = {model}")
+        + f'method = "{method}"\n'
+    )
     (scene,) = study.parse(text, name="row", where="test").scenes
     assert least <= Pile(scene).row_hold(tmp_path) <= most
 
@@ -144,7 +156,9 @@ def test_load_steps_begin_below_the_first_grain_that_is_held(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("law", ["bridged", "zeng-torque"])
 def test_a_torque_of_the_law_is_no_hold_of_a_row(tmp_path: Path, law: str) -> None:
-    text = SMALL.format(step=0.05).replace("slope_deg = 20.0", 'shape = "step up"\nslope_deg = 15')
+    text = SMALL.format(step=0.05).replace(
+        "slope_deg = 20.0", 'shape = "step up"\nslope_deg = 15'
+    )
     text = text.replace("cells_per_face = 20", 'model = "waves"')
     text += f'method = "pivot"\n[forces]\nlaw = "{law}"\n'
     (scene,) = study.parse(text, name="row", where="test").scenes
@@ -230,14 +244,20 @@ def strip(tmp_path_factory: pytest.TempPathFactory) -> Results:
 
 
 @pytest.mark.parametrize("name", ["mixed", "strip"])
-def test_each_method_answers_on_one_shared_bed(request: pytest.FixtureRequest, name: str) -> None:
+def test_each_method_answers_on_one_shared_bed(
+    request: pytest.FixtureRequest, name: str
+) -> None:
     results: Results = request.getfixturevalue(name)
     assert sorted(one.kind for one in results.plan.cases.values()) == ["pile", "poured"]
     assert len({id(pile.packing) for pile in results.plan.piles.values()}) == 1
     made = results.tables
-    rows = made["pile_threshold"].merge(made["scenes"][["scene_id", "method"]], on="scene_id")
+    rows = made["pile_threshold"].merge(
+        made["scenes"][["scene_id", "method"]], on="scene_id"
+    )
     early = rows[rows["fraction"] == 0.1].set_index("method")["shields"]
-    assert set(early.index) == {pile.scene.protocol.method for pile in results.plan.piles.values()}
+    assert set(early.index) == {
+        pile.scene.protocol.method for pile in results.plan.piles.values()
+    }
     assert early.between(0.003, 0.2).all()
     held = made["pile_grain"]["pivot_deg"].dropna()
     assert held.between(-90, 180).all()
@@ -248,7 +268,9 @@ def test_each_method_answers_on_one_shared_bed(request: pytest.FixtureRequest, n
 
 def test_each_size_class_has_its_threshold(mixed: Results) -> None:
     rows, pile = mixed.tables["size_class"], _pile(mixed, "dem")
-    assert (rows.groupby(["scene_id", "fraction"])["count"].sum() == pile.packing.count).all()
+    assert (
+        rows.groupby(["scene_id", "fraction"])["count"].sum() == pile.packing.count
+    ).all()
     # of 5 grains 0 to 3 have moved with 80 % where three of ten of all have, so 4 have not
     assert sampled(0.3, 5) == (0.0, 0.8)
     # stresses are over that at d50, which lies between those of two classes
@@ -282,7 +304,9 @@ def test_load_steps_rise_where_the_last_grain_asked_for_lies_loose(
 
 
 @pytest.mark.parametrize("name", ["mixed", "strip"])
-def test_the_deck_has_the_grains_as_they_lie(request: pytest.FixtureRequest, name: str) -> None:
+def test_the_deck_has_the_grains_as_they_lie(
+    request: pytest.FixtureRequest, name: str
+) -> None:
     results: Results = request.getfixturevalue(name)
     pile = _pile(results, "dem")
     text = (results.cases / pile.case.name / "grains.data").read_text()
@@ -293,7 +317,9 @@ def test_the_deck_has_the_grains_as_they_lie(request: pytest.FixtureRequest, nam
     if name == "mixed":  # each is driven by its own size
         sizes = pile.packing.sizes[exposed]
         assert pile.packing.sizes.max() / pile.packing.sizes.min() > 1.5
-        assert (np.diff(np.linalg.norm(force[exposed], axis=1)[np.argsort(sizes)]) > 0).all()
+        assert (
+            np.diff(np.linalg.norm(force[exposed], axis=1)[np.argsort(sizes)]) > 0
+        ).all()
         return
     assert 0 <= y.min() < y.max() < 3e-3
     assert (force[exposed] > 0).all()

@@ -37,11 +37,15 @@ def _drag(ustar: FloatArray, sizes: FloatArray, gaps: FloatArray) -> FloatArray:
     return LAW.drag(ustar, Exposure(D * sizes, Z0, RHO, NU, gap=gaps))
 
 
-def _levels(packing: Packing, gaps: FloatArray, ustar: float) -> tuple[FloatArray, FloatArray]:
+def _levels(
+    packing: Packing, gaps: FloatArray, ustar: float
+) -> tuple[FloatArray, FloatArray]:
     """Of each grain the level over which it feels a flow; of its patch the area, m2."""
     patch, areas = sheltering.patches(packing, 1.0)
     given = {"diameter": D, "unit": ustar, "density": RHO}
-    shelter = sheltering.balanced(_drag, patch, packing.sizes, gaps, areas * D**2, **given)
+    shelter = sheltering.balanced(
+        _drag, patch, packing.sizes, gaps, areas * D**2, **given
+    )
     return shelter.level(ustar, patch), areas * D**2
 
 
@@ -80,10 +84,17 @@ def test_a_sphere_that_stands_clear_and_one_level_with_its_neighbours() -> None:
 
 @pytest.mark.parametrize(
     ("intensity", "over_mean"),
-    [(0.36, [1.47, 1.78, 2.12, 2.43, 2.77, 3.45]), (0.4, [1.52, 1.88, 2.28, 2.64, 3.05, 3.89])],
+    [
+        (0.36, [1.47, 1.78, 2.12, 2.43, 2.77, 3.45]),
+        (0.4, [1.52, 1.88, 2.28, 2.64, 3.05, 3.89]),
+    ],
 )
-def test_the_largest_of_many_log_normal_stresses(intensity: float, over_mean: list[float]) -> None:
-    peaks = [peak_over_mean(intensity, events) for events in (10, 30, 100, 300, 1000, 10_000)]
+def test_the_largest_of_many_log_normal_stresses(
+    intensity: float, over_mean: list[float]
+) -> None:
+    peaks = [
+        peak_over_mean(intensity, events) for events in (10, 30, 100, 300, 1000, 10_000)
+    ]
     assert peaks == pytest.approx(over_mean, abs=0.006)
     width = math.sqrt(math.log1p(intensity**2))
     drawn = np.random.default_rng(2).lognormal(-(width**2) / 2, width, 2_000_000)
@@ -109,17 +120,25 @@ def test_cohesion_is_shao_and_lu_s(gamma: float, method: str) -> None:
             for value in (cohesion, 0.0)
         )
     else:
-        find = peeling.pivots if method == "pivot" else partial(peeling.flows, criterion=0.3)
+        find = (
+            peeling.pivots
+            if method == "pivot"
+            else partial(peeling.flows, criterion=0.3)
+        )
         centres = np.array([[0.0, math.cos(phi)], [-0.5, 0], [0.5, 0]])
         ways = np.tile(np.eye(2), (3, 1, 1)).transpose(1, 0, 2)
         loading = Loading(np.square, np.zeros_like, np.array([1.0, 0, 0]), *ways)
         ustar = np.geomspace(*peeling.RANGE, peeling.PLACES)
-        tables = dict(enumerate(ForceTable.of(np.square, np.zeros_like, np.ones(3), ustar)))
+        tables = dict(
+            enumerate(ForceTable.of(np.square, np.zeros_like, np.ones(3), ustar))
+        )
         bonds = cohesion * d / (math.pi / 6 * d**3 * (density - 1.2) * g)
         given = Places.of(centres), np.ones(3), loading, tables
         with_it = np.array([find(*given, bond=bond)[0] for bond in bonds])
         without = np.full(len(d), find(*given)[0])
-    assert (with_it / without) ** 2 == pytest.approx(1 + gamma / ((density - 1.2) * g * d**2))
+    assert (with_it / without) ** 2 == pytest.approx(
+        1 + gamma / ((density - 1.2) * g * d**2)
+    )
 
 
 def test_each_grain_of_a_lattice_bears_the_stress_of_its_own_bed() -> None:
@@ -130,7 +149,12 @@ def test_each_grain_of_a_lattice_bears_the_stress_of_its_own_bed() -> None:
         loads = Geometry(scene).loads(Path())
         answers[method] = loads.alone() if method == "pivot" else loads.leaving()
     beta, alpha = math.radians(60), math.radians(15)
-    tau = scene.weight * math.cos(alpha - beta) / math.sin(beta) / (2 * math.cos(beta) * 1e-6)
+    tau = (
+        scene.weight
+        * math.cos(alpha - beta)
+        / math.sin(beta)
+        / (2 * math.cos(beta) * 1e-6)
+    )
     exact = math.sqrt(tau / scene.fluid.density)
     assert np.median(answers["pivot"]) == pytest.approx(exact, rel=1e-6)
     # by peeling a grain waits for those before it, and needs no more flow once they have gone; the

@@ -56,8 +56,12 @@ protocol = { load_increment = 0.02, displacement_criterion = 1e-3 }
 """A displacement criterion may be very small."""
 
 
-@pytest.mark.parametrize(("text", "within"), [(FIGURE, 0.005), (POCKETS, 0.002), (SHORT, 0.02)])
-def test_one_grain_moves_at_its_closed_form(tmp_path: Path, text: str, within: float) -> None:
+@pytest.mark.parametrize(
+    ("text", "within"), [(FIGURE, 0.005), (POCKETS, 0.002), (SHORT, 0.02)]
+)
+def test_one_grain_moves_at_its_closed_form(
+    tmp_path: Path, text: str, within: float
+) -> None:
     cells = _cells(text)
     assert [batch.id for batch in batches(reversed(cells.scenes))] == [cells.id]
     # the deck's flow is the friction velocity over that of the closed form
@@ -83,10 +87,14 @@ def test_a_bed_has_no_scale(tmp_path: Path) -> None:
 
 
 def test_grains_of_two_contact_laws_share_no_deck() -> None:
-    (scene,) = study.parse("grain = { diameter = 1e-3 }", name="cells", where="test").scenes
+    (scene,) = study.parse(
+        "grain = { diameter = 1e-3 }", name="cells", where="test"
+    ).scenes
     for name in set(Grain.model_fields) - {"sizes"}:
         value = 1.1 * getattr(scene.grain, name) + 0.1
-        other = scene.model_copy(update={"grain": scene.grain.model_copy(update={name: value})})
+        other = scene.model_copy(
+            update={"grain": scene.grain.model_copy(update={name: value})}
+        )
         decks = len(list(batches([scene, other])))
         assert decks == (1 if name in ("diameter", "density") else 2), name
 
@@ -111,7 +119,11 @@ STOPPED = """pid=$$
     ],
 )
 def test_a_solver_that_fails_says_why(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, limit_s: float, word: str
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    script: str,
+    limit_s: float,
+    word: str,
 ) -> None:
     # the script runs before the real solver; what it does to the case, the solver then suffers
     program = tmp_path / "bin" / "liggghts"

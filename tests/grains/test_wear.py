@@ -43,7 +43,11 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
 
 
 def _pile(results: Results, method: str, *, frozen: bool = False) -> Pile:
-    piles = [pile for pile in results.plan.piles.values() if pile.scene.protocol.method == method]
+    piles = [
+        pile
+        for pile in results.plan.piles.values()
+        if pile.scene.protocol.method == method
+    ]
     return next(pile for pile in piles if (pile.scene.protocol.update == 0) == frozen)
 
 
@@ -58,8 +62,12 @@ WORN: dict[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("packing", ["aligned", "horizontal", "disordered"])
 @pytest.mark.parametrize("name", WORN)
-def test_the_line_of_any_bed_sinks_with_the_counted_grains_alone(name: str, packing: str) -> None:
-    bed = Geometry(Scene(grain=Grain(diameter=1e-3), bed=bed_of(packing=packing, **WORN[name])))
+def test_the_line_of_any_bed_sinks_with_the_counted_grains_alone(
+    name: str, packing: str
+) -> None:
+    bed = Geometry(
+        Scene(grain=Grain(diameter=1e-3), bed=bed_of(packing=packing, **WORN[name]))
+    )
     whole, counted = Worn.whole(bed.packing), bed.packing.windward
     x = np.linspace(bed.line.x[0], bed.line.x[-1], 2000)
     line = wear.sunk(bed, whole)
@@ -76,7 +84,9 @@ def test_the_line_of_any_bed_sinks_with_the_counted_grains_alone(name: str, pack
 
 
 @pytest.mark.parametrize("method", ["peeling", "dem"])
-def test_a_bed_changes_after_each_part_of_its_grains(results: Results, method: str) -> None:
+def test_a_bed_changes_after_each_part_of_its_grains(
+    results: Results, method: str
+) -> None:
     pile, cases = _pile(results, method), results.cases
     assert [flow.kind for flow in pile.flows] == ["flow", "worn", "worn"]
     begun = (wear.grains(pile, flow, cases) for flow in pile.flows)
@@ -97,7 +107,9 @@ def test_a_bed_changes_after_each_part_of_its_grains(results: Results, method: s
     assert motion.fraction[-1] >= 0.75
     assert np.all(np.diff(motion.flow) >= 0)
     # the picture has the line as it sinks
-    steps, frozen = (bed.read(_pile(results, method, frozen=f), cases) for f in (False, True))
+    steps, frozen = (
+        bed.read(_pile(results, method, frozen=f), cases) for f in (False, True)
+    )
     starts = [step for step, _ in steps.lines]
     assert (starts[0], len(starts)) == (0, 3)
     assert all(steps.totals[step - 1] < steps.totals[step] for step in starts[1:])
@@ -110,7 +122,9 @@ def test_the_table_sets_both_beds_side_by_side(results: Results) -> None:
     assert table["scene_id"].nunique() == 2
     for scene_id, own in table.groupby("scene_id"):
         pile = results.plan.piles[str(scene_id)]
-        thresholds = results.tables["pile_threshold"].set_index(["scene_id", "fraction"])
+        thresholds = results.tables["pile_threshold"].set_index(
+            ["scene_id", "fraction"]
+        )
         at = own[own["moved"] == np.ceil(0.75 * pile.packing.count)].iloc[0]
         shields = thresholds.loc[(str(scene_id), 0.75), "shields"]
         assert at["shields"] == pytest.approx(shields)

@@ -34,9 +34,13 @@ class Shell:
             code = int(end.code or 0)
         printed = self.captured.readouterr().err
         assert "Traceback" not in printed
-        lines = [line for line in printed.splitlines() if line.startswith("orchestrator")]
+        lines = [
+            line for line in printed.splitlines() if line.startswith("orchestrator")
+        ]
         # a study is asked about its units before it is refused
-        lines = [line for line in lines if not line.startswith("orchestrator: warning: ")]
+        lines = [
+            line for line in lines if not line.startswith("orchestrator: warning: ")
+        ]
         assert len(lines) <= 1, printed
         return code, "\n".join(lines)
 
@@ -46,7 +50,10 @@ class Shell:
         source.write_bytes(text.encode() if isinstance(text, str) else text)
         # a directory that cannot be used: even a study that is right by chance is refused
         code, printed = self.run("study", "bad.toml", "--out", "bad.toml/out")
-        assert (code, "bad.toml" in printed, place in printed) == (2, True, True), (text, printed)
+        assert (code, "bad.toml" in printed, place in printed) == (2, True, True), (
+            text,
+            printed,
+        )
         assert len(printed) < 1000
         assert [*self.folder.rglob("*")] == [source]
 
@@ -65,7 +72,17 @@ PARTS: dict[str, type[BaseModel]] = {
 }
 HUGE = "1" + "0" * 400
 VALUES = (
-    *("-1.0", "nan", "inf", "1e30", "1e308", "'; rm -rf /'", "true", "[[1]]", "{ a = 1 }"),
+    *(
+        "-1.0",
+        "nan",
+        "inf",
+        "1e30",
+        "1e308",
+        "'; rm -rf /'",
+        "true",
+        "[[1]]",
+        "{ a = 1 }",
+    ),
     *("2026-01-01", "'" + "x" * 3000 + "'", HUGE),
 )
 FIXED = {"grain.diameter": "1e-3", "bed.kind": "'pile'", "bed.slope_deg": "15.0"}
@@ -74,7 +91,10 @@ FIXED = {"grain.diameter": "1e-3", "bed.kind": "'pile'", "bed.slope_deg": "15.0"
 def test_study_files_with_one_wrong_value(shell: Shell) -> None:
     for (part, model), value in itertools.product(PARTS.items(), VALUES):
         for field, info in model.model_fields.items():
-            if (field, value) == ("seed", HUGE) or (info.annotation, value) == (bool, "true"):
+            if (field, value) == ("seed", HUGE) or (info.annotation, value) == (
+                bool,
+                "true",
+            ):
                 continue
             given = {**FIXED, f"{part}.{field}": value}
             text = "".join(f"{key} = {value}\n" for key, value in given.items())
@@ -86,13 +106,25 @@ GRAIN = "[grain]\ndiameter = 1e-3\n"
 PROTOCOL = "[protocol]\nload_increment = 0.2\nwaiting_time = 3.0\n"
 BAD_FILES = (
     *("", "a = " + "[" * 100_000, "[" + ".".join(["a"] * 5000) + "]", "title = '\x00'"),
-    *("time_limit = 1" + "0" * 5000, '"gr\'ain" = 1', '"gr\\nain" = 1', f"{'k' * 3000} = 1"),
+    *(
+        "time_limit = 1" + "0" * 5000,
+        '"gr\'ain" = 1',
+        '"gr\\nain" = 1',
+        f"{'k' * 3000} = 1",
+    ),
     *(f"title = 3\n{GRAIN}", f"{GRAIN}[group]\n", f"group = [1, 2]\n{GRAIN}"),
     *(f"time_limit = {value}\n{GRAIN}" for value in ("nan", "0", "'long'")),
-    *(f"[axes]\n'{axis}' = [1]\n" for axis in ("grain", ".", "../grain.diameter", "grain.d.x")),
+    *(
+        f"[axes]\n'{axis}' = [1]\n"
+        for axis in ("grain", ".", "../grain.diameter", "grain.d.x")
+    ),
     *(f"[axes]\n'grain.diameter' = [{value}]\n" for value in ("{ a = 1 }", "[1]")),
     f"{GRAIN}[axes]\n'bed.seed' = [{'1,' * 1000}]\n'flow.speed' = [{'1.0,' * 1000}]\n",
-    *(f"{GRAIN}diameter = 1e-3\n", "grain:\n  diameter: 1e-3\n", '{"grain": {"diameter": 1}}'),
+    *(
+        f"{GRAIN}diameter = 1e-3\n",
+        "grain:\n  diameter: 1e-3\n",
+        '{"grain": {"diameter": 1}}',
+    ),
     *(f"{GRAIN}[bed]\nroughness = 'd/{part}'\n" for part in ("1e999", "0")),
 )
 
@@ -110,13 +142,22 @@ def test_a_study_file_without_an_end_is_not_read_whole(shell: Shell) -> None:
 
 
 QUICK = settings(
-    deadline=None, max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    deadline=None,
+    max_examples=100,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
-VALID = Path(study.__file__).with_name("presets").joinpath("first-look.toml").read_text("utf-8")
+VALID = (
+    Path(study.__file__)
+    .with_name("presets")
+    .joinpath("first-look.toml")
+    .read_text("utf-8")
+)
 
 
 @QUICK
-@given(content=st.one_of(st.binary(max_size=200), st.text(max_size=200).map(str.encode)))
+@given(
+    content=st.one_of(st.binary(max_size=200), st.text(max_size=200).map(str.encode))
+)
 def test_study_files_of_any_bytes(shell: Shell, content: bytes) -> None:
     shell.refuses(content)
 
@@ -132,10 +173,33 @@ def test_study_files_mixed_up(shell: Shell, at: int, length: int, text: str) -> 
 
 
 ARGUMENTS = (
-    *("", "study --workers 0", "study --workers many", "study --workers 1e99", "study ."),
-    *("study /dev/null", "study /", "study \udcff.toml", f"study {'x' * 5000}", "study --out"),
-    *("study first-look.toml", "study ../../first-look", "study a.toml b.toml", "status"),
-    *("status nowhere", f"status {'x' * 5000}", "report nowhere", "report \udcff", "prune /"),
+    *(
+        "",
+        "study --workers 0",
+        "study --workers many",
+        "study --workers 1e99",
+        "study .",
+    ),
+    *(
+        "study /dev/null",
+        "study /",
+        "study \udcff.toml",
+        f"study {'x' * 5000}",
+        "study --out",
+    ),
+    *(
+        "study first-look.toml",
+        "study ../../first-look",
+        "study a.toml b.toml",
+        "status",
+    ),
+    *(
+        "status nowhere",
+        f"status {'x' * 5000}",
+        "report nowhere",
+        "report \udcff",
+        "prune /",
+    ),
     *("benchmark", "benchmark data nowhere there", "undo", "--frobnicate"),
     *(
         f"threshold --diameter 1e-3 --{option} {value}"
@@ -153,10 +217,23 @@ def test_wrong_arguments(shell: Shell, words: str) -> None:
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=20),
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=9), inner),
+    lambda inner: (
+        st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=9), inner)
+    ),
     max_leaves=12,
 )
-KEYS = ("name", "study", "cases", "orchestrator", "id", "kind", "file", "ended", "cause", "bytes")
+KEYS = (
+    "name",
+    "study",
+    "cases",
+    "orchestrator",
+    "id",
+    "kind",
+    "file",
+    "ended",
+    "cause",
+    "bytes",
+)
 STATE = JSON | st.dictionaries(st.sampled_from(KEYS), JSON)
 
 
@@ -180,8 +257,22 @@ def test_any_state(
 
 
 NAMES = (
-    *("$(touch reached)", "`touch reached`", "; touch reached #", "a'b\"c", "two\nlines", "-rf"),
-    *("%s%n{0}", "back\\slash", "<script>alert(1)</script>", "..", "../../reached", "/reached"),
+    *(
+        "$(touch reached)",
+        "`touch reached`",
+        "; touch reached #",
+        "a'b\"c",
+        "two\nlines",
+        "-rf",
+    ),
+    *(
+        "%s%n{0}",
+        "back\\slash",
+        "<script>alert(1)</script>",
+        "..",
+        "../../reached",
+        "/reached",
+    ),
     *("\u202eright to left ∑ 沙", "x" * 3000),
 )
 STEMS = ("$(touch reached);`touch reached`'\"%s\\<b>\n∑ 沙", "-rf", "x" * 240)
@@ -230,7 +321,10 @@ SETTINGS = (
 
 
 def test_settings_of_matplotlib(
-    finished_pile: Path, tmp_path: Path, orchestrator: Command, monkeypatch: pytest.MonkeyPatch
+    finished_pile: Path,
+    tmp_path: Path,
+    orchestrator: Command,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     out = shutil.copytree(finished_pile, tmp_path / "out")
     drawn = [out / "report.html", *(out / "figures").iterdir()]
@@ -255,13 +349,21 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("name", BROKEN)
-def test_a_broken_library_is_one_line(tmp_path: Path, orchestrator: Command, name: str) -> None:
+def test_a_broken_library_is_one_line(
+    tmp_path: Path, orchestrator: Command, name: str
+) -> None:
     (tmp_path / f"{name}.py").write_text(BROKEN[name])  # python -m looks here first
-    (tmp_path / "small.toml").write_text("bed.kind = 'flat'\nprotocol.method = 'pivot'\n" + GRAIN)
-    ended = orchestrator("study", "small.toml")  # it needs scipy when its grains are packed
+    (tmp_path / "small.toml").write_text(
+        "bed.kind = 'flat'\nprotocol.method = 'pivot'\n" + GRAIN
+    )
+    ended = orchestrator(
+        "study", "small.toml"
+    )  # it needs scipy when its grains are packed
     assert ended.returncode == 1
     assert "Traceback" not in ended.stderr
-    assert ended.stderr.splitlines()[-1].startswith("orchestrator: a library does not load: ")
+    assert ended.stderr.splitlines()[-1].startswith(
+        "orchestrator: a library does not load: "
+    )
     examined = orchestrator("doctor")
     assert examined.returncode == 1
     (line,) = (line for line in examined.stdout.splitlines() if line.startswith("NOT"))

@@ -37,18 +37,27 @@ def exact() -> Tables:
     asked, grains = [], []
     for scene in study.load("paper").scenes:
         if scene.bed.kind == "grain":
-            own = {"scene_id": scene.id, **fields.asked(scene), **fields.answered(scene)}
+            own = {
+                "scene_id": scene.id,
+                **fields.asked(scene),
+                **fields.answered(scene),
+            }
             asked.append({**own, "law_holds": law_holds(scene)})
             found = closed_form(scene)
             shields, ustar = float(found.shields), float(found.friction_velocity)
-            row = dict.fromkeys(("shields_dem", "shields_dem_low", "shields_closed_form"), shields)
+            row = dict.fromkeys(
+                ("shields_dem", "shields_dem_low", "shields_closed_form"), shields
+            )
             row |= dict.fromkeys(("ustar_m_s", "ustar_closed_form_m_s"), ustar)
-            grains.append({"scene_id": scene.id, **row, "reynolds": float(found.reynolds)})
+            grains.append(
+                {"scene_id": scene.id, **row, "reynolds": float(found.reynolds)}
+            )
     return {"scenes": pd.DataFrame(asked), "single_grain": pd.DataFrame(grains)}
 
 
 @pytest.mark.parametrize(
-    ("true", "verdict"), [(19, "reproduced"), (18, "partly"), (1, "not"), (None, "no data")]
+    ("true", "verdict"),
+    [(19, "reproduced"), (18, "partly"), (1, "not"), (None, "no data")],
 )
 def test_a_verdict_follows_from_the_share(true: int | None, verdict: Verdict) -> None:
     numbers = np.where(np.arange(0 if true is None else 20) < (true or 0), 2.0, 0.5)
@@ -69,7 +78,10 @@ def test_pairs_agree_in_all_else() -> None:
     ratio = pairs(table, "alpha_deg", "value")["ratio"]
     assert ratio[0] == 1.5
     assert len(ratio) == 2
-    for column in (*fields.others([*fields.COLUMNS, *fields.ANSWERS], "alpha_deg"), "flow_level"):
+    for column in (
+        *fields.others([*fields.COLUMNS, *fields.ANSWERS], "alpha_deg"),
+        "flow_level",
+    ):
         if column not in ("force_law", "d_m", "seed"):
             differing = table.assign(**{column: ["a", "b", "c", "d"]})
             assert pairs(differing, "alpha_deg", "value").empty, column
@@ -77,7 +89,9 @@ def test_pairs_agree_in_all_else() -> None:
 
 def test_a_small_study_is_judged(results: Results) -> None:
     judged = judge(results.tables)
-    verdicts = {name: one.verdict for name, one in judged.items() if one.verdict != "no data"}
+    verdicts = {
+        name: one.verdict for name, one in judged.items() if one.verdict != "no data"
+    }
     assert verdicts == {
         "constant": "partly",
         "held beta_deg": "reproduced",
@@ -88,7 +102,9 @@ def test_a_small_study_is_judged(results: Results) -> None:
     }
 
 
-def test_a_reason_explains_its_verdict_or_is_none(results: Results, exact: Tables) -> None:
+def test_a_reason_explains_its_verdict_or_is_none(
+    results: Results, exact: Tables
+) -> None:
     for tables in (results.tables, exact, {"scenes": results.tables["scenes"]}):
         for one in claims.judge(tables):
             assert (one.why == one.claim.why) == (one.verdict == one.claim.verdict)
@@ -97,14 +113,21 @@ def test_a_reason_explains_its_verdict_or_is_none(results: Results, exact: Table
 def test_ramps_alone_reproduce_nothing(results: Results) -> None:
     scenes, grains = results.tables["scenes"], results.tables["single_grain"]
     raised = grains.assign(shields_dem_low=2 * grains["shields_closed_form"])
-    one = judge(results.tables, scenes=scenes.assign(waiting_time=1.0), single_grain=raised)
+    one = judge(
+        results.tables, scenes=scenes.assign(waiting_time=1.0), single_grain=raised
+    )
     assert one["numerical"].verdict == "no data"
     assert "held flows" in one["numerical"].why
     is_ramp = scenes["alpha_deg"] > 0
     both = scenes.assign(waiting_time=np.where(is_ramp, 1.0, 6.0))
-    factor = np.where(grains["scene_id"].isin(scenes.loc[is_ramp, "scene_id"]), 2.0, 0.9)
+    factor = np.where(
+        grains["scene_id"].isin(scenes.loc[is_ramp, "scene_id"]), 2.0, 0.9
+    )
     raised = grains.assign(shields_dem_low=factor * grains["shields_closed_form"])
-    assert judge(results.tables, scenes=both, single_grain=raised)["numerical"].verdict == "partly"
+    assert (
+        judge(results.tables, scenes=both, single_grain=raised)["numerical"].verdict
+        == "partly"
+    )
 
 
 def test_verdicts_turn_with_the_numbers(results: Results) -> None:
@@ -117,7 +140,9 @@ def test_verdicts_turn_with_the_numbers(results: Results) -> None:
     assert judge(results.tables, pile_grain=reverse)["order"].verdict == "not"
     for change, verdict in ((0.04, "reproduced"), (0.2, "not")):
         frozen = results.tables["pile_threshold"].assign(frozen_bed=change)
-        assert judge(results.tables, pile_threshold=frozen)["coupling"].verdict == verdict
+        assert (
+            judge(results.tables, pile_threshold=frozen)["coupling"].verdict == verdict
+        )
 
 
 def test_the_closed_form_is_judged(exact: Tables) -> None:
@@ -153,7 +178,11 @@ def test_the_transition_and_other_fluids_are_not_judged(results: Results) -> Non
 def test_a_study_of_the_paper_alone_gets_a_report_card(
     results: Results, tmp_path: Path, is_paper: bool
 ) -> None:
-    text = (PRESETS / "paper.toml").read_text(encoding="utf-8") if is_paper else "title = ''"
+    text = (
+        (PRESETS / "paper.toml").read_text(encoding="utf-8")
+        if is_paper
+        else "title = ''"
+    )
     (tmp_path / "cases").mkdir()
     grains = {name: results.tables[name] for name in ("scenes", "single_grain")}
     whole = replace(results, study=replace(results.study, text=text), tables=grains)

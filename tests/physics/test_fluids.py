@@ -15,6 +15,8 @@ TABLES: dict[str, list[tuple[float, float, float]]] = {
 @pytest.mark.parametrize("kind", TABLES)
 def test_fluids_are_those_of_tables(kind: str) -> None:
     for degrees, density, viscosity in TABLES[kind]:
-        numbers = numbers_of({"kind": kind, "temperature_deg_c": degrees, "gravity": 3.7})
+        numbers = numbers_of(
+            {"kind": kind, "temperature_deg_c": degrees, "gravity": 3.7}
+        )
         assert numbers["density"] == pytest.approx(density, rel=2e-4)
         assert numbers["viscosity"] == pytest.approx(viscosity, rel=5e-3)

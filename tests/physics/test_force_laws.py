@@ -39,7 +39,9 @@ def test_the_forces_of_eqs_2_and_4(part: int) -> None:
     low, high = LAWS["low"], LAWS["high"]
     stokes = 1.5 * np.pi * (1 + 2 * r) * rho * (d * u) ** 2 * np.ones_like(nu)
     np.testing.assert_allclose(low.drag(u, at), stokes)
-    np.testing.assert_allclose(low.lift(u, at), a / 2 * (1 + 2 * r) * rho * (d * u) ** 3 / nu)
+    np.testing.assert_allclose(
+        low.lift(u, at), a / 2 * (1 + 2 * r) * rho * (d * u) ** 3 / nu
+    )
     speed = 2.5 * ((1 + r) * np.log1p(1 / r) - 1) * u
     drag = 3 * np.pi * rho * nu * d * speed * (1 + 0.15 * (speed * d / nu) ** 0.687)
     np.testing.assert_allclose(high.drag(u, at), drag)
@@ -50,12 +52,16 @@ def test_the_forces_of_eqs_2_and_4(part: int) -> None:
 def test_laws_of_every_reynolds_number_tend_to_eqs_2_and_4() -> None:
     every = ("bridged", "bridged-gravel", "profile")
     # the difference is the drag's own inertia, 0.15 (V d/nu)^0.687, and falls as Re*^1.37
-    ends = [(name, "low", *end) for name in every for end in ((1e-3, 1e-5), (1e-6, 1e-9))]
+    ends = [
+        (name, "low", *end) for name in every for end in ((1e-3, 1e-5), (1e-6, 1e-9))
+    ]
     # and here it falls as 4 to 11 over Re*
     ends += [("bridged", "high", 1e4, 11e-4), ("bridged", "high", 1e6, 11e-6)]
     for name, limit, reynolds, within in ends:
         for force, ratio in product(("drag", "lift"), (1 / 30, 1 / 10)):
-            value, exact = (getattr(LAWS[n], force)(reynolds, unit(ratio)) for n in (name, limit))
+            value, exact = (
+                getattr(LAWS[n], force)(reynolds, unit(ratio)) for n in (name, limit)
+            )
             assert float(value) == pytest.approx(float(exact), rel=within)
 
 
@@ -133,11 +139,17 @@ def test_a_law_names_the_ranges_that_it_is_beyond(
 
 
 def test_clift_and_gauvin_go_on_where_schiller_and_naumann_end() -> None:
-    ratio = CLIFT_GAUVIN.factor(np.array(800.0)) / SCHILLER_NAUMANN.factor(np.array(800.0))
+    ratio = CLIFT_GAUVIN.factor(np.array(800.0)) / SCHILLER_NAUMANN.factor(
+        np.array(800.0)
+    )
     assert float(ratio) == pytest.approx(1.046, abs=5e-4)
     reynolds = np.array([1e3, 1e4, 1e5])
-    printed = 24 / reynolds * (1 + 0.15 * reynolds**0.687) + 0.42 / (1 + 42500 * reynolds**-1.16)
-    np.testing.assert_allclose(24 / reynolds * CLIFT_GAUVIN.factor(reynolds), printed, rtol=1e-13)
+    printed = 24 / reynolds * (1 + 0.15 * reynolds**0.687) + 0.42 / (
+        1 + 42500 * reynolds**-1.16
+    )
+    np.testing.assert_allclose(
+        24 / reynolds * CLIFT_GAUVIN.factor(reynolds), printed, rtol=1e-13
+    )
     # the plateau of the standard drag curve of a sphere
     assert np.all((printed > 0.38) & (printed < 0.51))
 
@@ -148,7 +160,9 @@ def _coefficients(reynolds: float, ratio: float) -> tuple[float, float]:
     for _ in range(200):
         ustar *= (reynolds / float(zeng.speed(ustar, unit(ratio)))) ** 0.5
     area = np.pi / 8 * reynolds**2
-    return float(zeng.drag(ustar, unit(ratio))) / area, float(zeng.lift(ustar, unit(ratio))) / area
+    return float(zeng.drag(ustar, unit(ratio))) / area, float(
+        zeng.lift(ustar, unit(ratio))
+    ) / area
 
 
 def test_zeng_touching_the_wall_in_creeping_flow() -> None:
@@ -159,10 +173,19 @@ def test_zeng_touching_the_wall_in_creeping_flow() -> None:
 
 
 def test_zeng_fits_the_lift_that_was_simulated_and_saffman_is_above() -> None:
-    for reynolds, simulated, within in ((2, 2.653, 0.012), (10, 1.305, 0.02), (200, 0.338, 0.06)):
+    for reynolds, simulated, within in (
+        (2, 2.653, 0.012),
+        (10, 1.305, 0.02),
+        (200, 0.338, 0.06),
+    ):
         assert _coefficients(reynolds, 1e-9)[1] == pytest.approx(simulated, rel=within)
         # Saffman's lift in the same linear shear: the speed at the centre is G d/2
-        saffman = LIFT_COEFFICIENT * reynolds * np.sqrt(2 * reynolds) / (np.pi / 8 * reynolds**2)
+        saffman = (
+            LIFT_COEFFICIENT
+            * reynolds
+            * np.sqrt(2 * reynolds)
+            / (np.pi / 8 * reynolds**2)
+        )
         assert 1.21 < saffman / simulated < 1.56
 
 
@@ -181,13 +204,23 @@ PAGE = Path(__file__).parents[2] / "docs" / "model.md"
 def test_the_table_of_the_model_page_has_what_a_law_gives(name: str) -> None:
     text = PAGE.read_text(encoding="utf-8")
     section = text.split("### The laws side by side")[1]
-    cells = [line.strip("|\n ").split(" | ") for line in section.splitlines() if "| `" in line]
+    cells = [
+        line.strip("|\n ").split(" | ")
+        for line in section.splitlines()
+        if "| `" in line
+    ]
     rows = {law.strip("`"): numbers for law, *numbers in cells}
     assert set(rows) == set(LAWS)
-    assert any(line.startswith("### ") and f"`{name}`" in line for line in text.splitlines())
+    assert any(
+        line.startswith("### ") and f"`{name}`" in line for line in text.splitlines()
+    )
     reynolds = np.array([0.1, 1, 3, 10, 30, 100])
-    theta = shields_at(LAWS[name], reynolds, roughness_ratio=1 / 30, entrainment_angle_deg=60)
-    assert [f"{value:.4f}" for value in theta] == [cell.strip("()") for cell in rows[name]]
+    theta = shields_at(
+        LAWS[name], reynolds, roughness_ratio=1 / 30, entrainment_angle_deg=60
+    )
+    assert [f"{value:.4f}" for value in theta] == [
+        cell.strip("()") for cell in rows[name]
+    ]
     holds = LAWS[name].valid(reynolds, unit())
     assert [not cell.startswith("(") for cell in rows[name]] == holds.tolist()
 
@@ -199,7 +232,9 @@ def test_the_registry_holds_each_law_under_its_own_name() -> None:
 
 
 @pytest.mark.parametrize(("name", "is_near"), [("brigded", True), ("newton", False)])
-def test_an_unknown_law_is_answered_with_the_known_ones(name: str, is_near: bool) -> None:
+def test_an_unknown_law_is_answered_with_the_known_ones(
+    name: str, is_near: bool
+) -> None:
     with pytest.raises(InputError) as caught:
         law(name)
     text = str(caught.value)

@@ -22,7 +22,10 @@ fluid = { density = 1000.0, viscosity = 1e-6 }
 grain = { diameter = 1e-3, density = 2650.0 }
 protocol = { method = "pivot" }
 """
-PILE = SAND + 'bed = { kind = "pile", slope_deg = 15.0, height = 0.01 }\nflow.model = "flat"\n'
+PILE = (
+    SAND
+    + 'bed = { kind = "pile", slope_deg = 15.0, height = 0.01 }\nflow.model = "flat"\n'
+)
 
 
 def _scene(text: str, intensity: float, events: int) -> Scene:
@@ -57,7 +60,9 @@ def test_no_gusts_strengthen_a_bed(intensity: float, events: int) -> None:
 @pytest.mark.parametrize(
     ("intensity", "events"), [(1e-17, 2), (1e-15, 100), (0.4, 2), (1.0, 3), (0.4, 100)]
 )
-def test_the_force_of_each_event_is_that_of_its_stress(intensity: float, events: int) -> None:
+def test_the_force_of_each_event_is_that_of_its_stress(
+    intensity: float, events: int
+) -> None:
     scene = _scene(PILE, intensity, events)
     loads = Geometry(scene).loads(Path())
     rising = float(closed_form(scene).friction_velocity) * np.array([1.0, 1.3])

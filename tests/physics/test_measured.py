@@ -23,28 +23,49 @@ def test_the_bins_follow_each_other_and_are_those_of_the_rows() -> None:
     assert sum(b.count for b in BUFFINGTON_MONTGOMERY) == 240
     for bins in (BUFFINGTON_MONTGOMERY, VISUAL):
         assert all(one.high == other.low for one, other in pairwise(bins))
-        assert all(b.low < b.middle < b.high and b.tenth < b.median < b.ninetieth for b in bins)
+        assert all(
+            b.low < b.middle < b.high and b.tenth < b.median < b.ninetieth for b in bins
+        )
     rows = pd.read_csv(FOLDER / "beds.csv")
     excess = (rows["rho_sol_kg_m3"] / rows["rho_f_kg_m3"] - 1) * 9.81 * rows["d_m"]
     reynolds = np.sqrt(rows["shields"] * excess) * rows["d_m"] / rows["nu_m2_s"]
     for one in VISUAL:
-        here = (rows["set"] == "flumes, visual") & (reynolds >= one.low) & (reynolds < one.high)
+        here = (
+            (rows["set"] == "flumes, visual")
+            & (reynolds >= one.low)
+            & (reynolds < one.high)
+        )
         theta = sorted(rows["shields"][here])
         n, found = len(theta), (one.count, one.median, one.tenth, one.ninetieth)
-        assert found == pytest.approx((n, np.median(theta), theta[n // 10], theta[9 * n // 10]))
+        assert found == pytest.approx(
+            (n, np.median(theta), theta[n // 10], theta[9 * n // 10])
+        )
     assert sorted(rows["shields"][rows["set"] == "wind, field"]) == sorted(FIELD)
 
 
 def test_what_was_measured_stands_beside_a_threshold() -> None:
-    fluids = {"rho_f_kg_m3": [1e3, 1e3, 1.22, 0.02], "nu_m2_s": [1e-6, 1e-6, 1.5e-5, 5e-4]}
-    rows = {"reynolds": [5.0, 2e3, 10.0, 1.0], "d_m": [3.5e-4, 0.05, 3.5e-4, 1e-4], **fluids}
+    fluids = {
+        "rho_f_kg_m3": [1e3, 1e3, 1.22, 0.02],
+        "nu_m2_s": [1e-6, 1e-6, 1.5e-5, 5e-4],
+    }
+    rows = {
+        "reynolds": [5.0, 2e3, 10.0, 1.0],
+        "d_m": [3.5e-4, 0.05, 3.5e-4, 1e-4],
+        **fluids,
+    }
     bed: dict[str, Any] = {
         "rho_sol_kg_m3": 2650.0,
         "g_m_s2": 9.81,
         "shields": 0.02,
         "force_law": "none",
     }
-    bed |= {"alpha_deg": 0.0, "beta_deg": 60.0, "z0_m": 1e-5, "alpha_s": 1.0, "cohesion_n_m": 0.0}
+    bed |= {
+        "alpha_deg": 0.0,
+        "beta_deg": 60.0,
+        "z0_m": 1e-5,
+        "alpha_s": 1.0,
+        "cohesion_n_m": 0.0,
+    }
     table = pd.DataFrame(rows).assign(**bed)
     curve, median, *_, count = (beside(table)[name] for name in MEASURED)
     np.testing.assert_array_equal(count, [46, 0, 3, 0])
@@ -67,10 +88,14 @@ def test_pivots_and_hiding_of_a_natural_bed() -> None:
     assert np.all(np.diff(wilcock_crowe_hiding(size)) > 0)
     assert np.all(np.diff(egiazaroff_hiding(size)) < 0)
     # b = 0.67/(1 + e^0.5) at half the mean, tends to 0.67 for the largest
-    assert float(wilcock_crowe_hiding(0.5)) == pytest.approx(0.5 ** (0.67 / 3.718281828459045))
+    assert float(wilcock_crowe_hiding(0.5)) == pytest.approx(
+        0.5 ** (0.67 / 3.718281828459045)
+    )
     assert float(wilcock_crowe_hiding(20.0)) == pytest.approx(20**0.67, rel=1e-6)
     assert np.all(np.isnan(egiazaroff_hiding([0.01, 1 / 19.01])))
-    assert float(egiazaroff_hiding(2.0)) == pytest.approx((2.944438979 / 3.637586160) ** 2)
+    assert float(egiazaroff_hiding(2.0)) == pytest.approx(
+        (2.944438979 / 3.637586160) ** 2
+    )
 
 
 def test_curves_at_points() -> None:

@@ -10,7 +10,12 @@ from orchestrator.physics import curves
 from orchestrator.physics import threshold as physics
 from orchestrator.physics.constants import LIFT_COEFFICIENT
 from orchestrator.physics.laws import LAWS, Exposure
-from orchestrator.physics.threshold import Threshold, friction_velocity_at, shields_at, threshold
+from orchestrator.physics.threshold import (
+    Threshold,
+    friction_velocity_at,
+    shields_at,
+    threshold,
+)
 
 few = settings(max_examples=30, deadline=None)
 every_law = pytest.mark.parametrize("name", LAWS)
@@ -40,10 +45,14 @@ def of_air(
 
 def water(d: float, beta: float = 50, law: str = "bridged") -> Threshold:
     where = Exposure(d, d / 30, 1000.0, 1e-6)
-    return threshold(LAWS[law], where, density=2650.0, slope_deg=0, entrainment_angle_deg=beta)
+    return threshold(
+        LAWS[law], where, density=2650.0, slope_deg=0, entrainment_angle_deg=beta
+    )
 
 
-@pytest.mark.parametrize(("name", "d", "alpha", "beta", "part", "nu", "ustar"), INDEPENDENT)
+@pytest.mark.parametrize(
+    ("name", "d", "alpha", "beta", "part", "nu", "ustar"), INDEPENDENT
+)
 def test_threshold_is_the_root_of_the_printed_equations(
     name: str, d: float, alpha: float, beta: float, part: float, nu: float, ustar: float
 ) -> None:
@@ -53,7 +62,11 @@ def test_threshold_is_the_root_of_the_printed_equations(
 
 def test_bridged_thresholds_in_water_and_air() -> None:
     # computed for the specification, by another program
-    for d, theta, curve in ((1e-4, 0.0701, 0.0771), (5e-4, 0.0348, 0.0308), (2e-3, 0.0410, 0.0399)):
+    for d, theta, curve in (
+        (1e-4, 0.0701, 0.0771),
+        (5e-4, 0.0348, 0.0308),
+        (2e-3, 0.0410, 0.0399),
+    ):
         assert float(water(d).shields) == pytest.approx(theta, abs=5e-5)
         dstar = np.array(d * (1.65 * 9.81 / 1e-12) ** (1 / 3))
         assert float(curves.soulsby_whitehouse(dstar)) == pytest.approx(curve, abs=5e-5)
@@ -64,27 +77,41 @@ def test_bridged_thresholds_in_water_and_air() -> None:
         assert bool(found.valid)
 
 
-def test_the_bridged_curve_dips_between_the_regimes_and_leaves_soulsby_below_one() -> None:
+def test_the_bridged_curve_dips_between_the_regimes_and_leaves_soulsby_below_one() -> (
+    None
+):
     reynolds, theta = next(c for c in curves.WATER if "Soulsby" in c.name).points(2000)
-    own = shields_at(LAWS["bridged"], reynolds, roughness_ratio=1 / 30, entrainment_angle_deg=50)
+    own = shields_at(
+        LAWS["bridged"], reynolds, roughness_ratio=1 / 30, entrainment_angle_deg=50
+    )
     assert 10 < reynolds[np.argmin(own)] < 30
     assert own.min() == pytest.approx(0.0319, abs=2e-4)
     ratio = own / theta
     sand = (reynolds > 1) & (reynolds < 150)
     assert 0.85 < ratio[sand].min() < ratio[sand].max() < 1.2
-    assert np.interp([0.5, 0.1], reynolds, ratio) == pytest.approx([0.66, 0.41], abs=0.01)
+    assert np.interp([0.5, 0.1], reynolds, ratio) == pytest.approx(
+        [0.66, 0.41], abs=0.01
+    )
 
 
 @every_law
 @few
-@given(d=diameters, ratio=ratios, beta=betas, slope=st.floats(0, 30), nu=st.floats(1e-6, 1e-3))
+@given(
+    d=diameters,
+    ratio=ratios,
+    beta=betas,
+    slope=st.floats(0, 30),
+    nu=st.floats(1e-6, 1e-3),
+)
 def test_moments_balance_at_the_threshold(
     name: str, d: float, ratio: float, beta: float, slope: float, nu: float
 ) -> None:
     law, where = LAWS[name], Exposure(d, ratio * d, 1.0, nu)
     found = of_air(name, d, ratio, slope, beta, nu)
     b, u = np.radians(beta), found.friction_velocity
-    moment = found.drag * np.sin(b) + found.lift * np.cos(b) + 2 * law.torque(u, where) / d
+    moment = (
+        found.drag * np.sin(b) + found.lift * np.cos(b) + 2 * law.torque(u, where) / d
+    )
     submerged = physics.weight(diameter=d, density=2500.0, fluid_density=1.0)
     resistance = submerged * physics.pivot_resistance(slope, beta)
     assert float(moment) == pytest.approx(float(resistance), rel=1e-12)
@@ -96,12 +123,19 @@ def test_moments_balance_at_the_threshold(
 @every_law
 def test_an_array_of_grains_is_its_grains_in_turn(name: str) -> None:
     d, slope = np.array([[5e-5], [3e-4], [2e-3]]), np.array([0.0, 10.0, 25.0])
-    where, grain = Exposure(d, d / 10, 1.0, 1e-5), {"density": 2500.0, "entrainment_angle_deg": 60}
+    where, grain = (
+        Exposure(d, d / 10, 1.0, 1e-5),
+        {"density": 2500.0, "entrainment_angle_deg": 60},
+    )
     many = threshold(LAWS[name], where, slope_deg=slope, **grain)
     assert many.friction_velocity.shape == many.valid.shape == many.drag.shape == (3, 3)
     for i, j in np.ndindex(3, 3):
-        single = of_air(name, float(d[i, 0]), 0.1, float(slope[j]), 60, 1e-5).friction_velocity
-        assert float(many.friction_velocity[i, j]) == pytest.approx(float(single), rel=1e-14)
+        single = of_air(
+            name, float(d[i, 0]), 0.1, float(slope[j]), 60, 1e-5
+        ).friction_velocity
+        assert float(many.friction_velocity[i, j]) == pytest.approx(
+            float(single), rel=1e-14
+        )
 
 
 @every_law
@@ -113,7 +147,9 @@ def test_thresholds_rise_with_slope_weight_and_the_depth_of_the_pocket(
     where, grain = Exposure(d, ratio * d, 1.0, 1e-5), {"density": 2500.0}
     slopes = np.linspace(0, beta, 9)
     angle = {"entrainment_angle_deg": beta}
-    up = threshold(LAWS[name], where, slope_deg=slopes, **grain, **angle).friction_velocity
+    up = threshold(
+        LAWS[name], where, slope_deg=slopes, **grain, **angle
+    ).friction_velocity
     assert np.all(np.diff(up) > 0)
     heavy = threshold(LAWS[name], where, density=2500.0 * factor, slope_deg=0, **angle)
     assert float(heavy.friction_velocity) > up[0]
@@ -156,7 +192,9 @@ def test_a_lift_beyond_the_weight_ends_the_pivot() -> None:
         where = Exposure(5e-4, 5e-4 / 30, 1.2, 1.5e-5, lift)
         found = threshold(LAWS["bridged"], where, entrainment_angle_deg=50, **grain)
         assert bool(found.valid) == (not reason)
-        (text,) = physics.why_not(LAWS["bridged"], found.friction_velocity, where, **grain)
+        (text,) = physics.why_not(
+            LAWS["bridged"], found.friction_velocity, where, **grain
+        )
         assert reason in text
         assert bool(text) == bool(reason)
 
@@ -177,15 +215,23 @@ class TestFrictionVelocityAt:
         found = friction_velocity_at(LAWS["bridged"], self.where, 1e-6, speed_up=ratio)
         np.testing.assert_allclose(found * ratio, np.full(3, found[1]), rtol=1e-14)
 
-    def test_a_flow_that_runs_backwards_turns_drag_and_torque_but_not_lift(self) -> None:
-        law, sums = LAWS["zeng-torque"], {"along": 0.8, "outward": 0.5, "turning": 100.0}
+    def test_a_flow_that_runs_backwards_turns_drag_and_torque_but_not_lift(
+        self,
+    ) -> None:
+        law, sums = (
+            LAWS["zeng-torque"],
+            {"along": 0.8, "outward": 0.5, "turning": 100.0},
+        )
         forth = friction_velocity_at(law, self.where, 1e-6, speed_up=0.7, **sums)
         mirrored = {**sums, "along": -0.8, "turning": -100.0}
         back = friction_velocity_at(law, self.where, 1e-6, speed_up=-0.7, **mirrored)
         assert float(back) == pytest.approx(float(forth), rel=1e-14)
 
     def test_unreached_is_infinite_and_no_need_of_flow_is_not_a_number(self) -> None:
-        given = {"along": np.array([-1.0, 1.0, 1.0, 1.0]), "speed_up": np.array([1, 0, 1, 1.0])}
+        given = {
+            "along": np.array([-1.0, 1.0, 1.0, 1.0]),
+            "speed_up": np.array([1, 0, 1, 1.0]),
+        }
         target = np.array([1e-6, 1e-6, 0.0, -1e-6])
         found = friction_velocity_at(LAWS["bridged"], self.where, target, **given)
         np.testing.assert_array_equal(found, [np.inf, np.inf, np.nan, np.nan])

@@ -29,9 +29,13 @@ DIAMETER, ROUGHNESS = np.array(D), np.array(Z0)
 
 
 @given(speed=st.floats(1e-3, 50), height=st.floats(0.02, 20), z0=st.floats(1e-6, 1e-2))
-def test_speed_and_friction_velocity_are_inverse(speed: float, height: float, z0: float) -> None:
+def test_speed_and_friction_velocity_are_inverse(
+    speed: float, height: float, z0: float
+) -> None:
     ustar = log_law_ustar(speed, height, z0)
-    assert float(ustar) == pytest.approx(0.41 * speed / np.log((height + z0) / z0), rel=1e-10)
+    assert float(ustar) == pytest.approx(
+        0.41 * speed / np.log((height + z0) / z0), rel=1e-10
+    )
     assert float(log_law_speed(ustar, height, z0)) == pytest.approx(speed, rel=1e-13)
 
 
@@ -39,32 +43,50 @@ def test_viscosity_adds_to_the_roughness_of_a_bed_that_is_not_rough() -> None:
     z0 = outer_roughness([1e-6, 2e-4], 0.01, 1e-6)  # u* z0/nu 0.01 and 2
     np.testing.assert_allclose(z0, [1e-6 + 1e-6 / 0.09, 2e-4 + 1e-6 / 0.09])
     # rough, no flow, no threshold
-    np.testing.assert_array_equal(outer_roughness(2.4e-4, [0.01, 0.0, np.nan], 1e-6), 2.4e-4)
+    np.testing.assert_array_equal(
+        outer_roughness(2.4e-4, [0.01, 0.0, np.nan], 1e-6), 2.4e-4
+    )
 
 
 def test_eq_10_as_printed_changes_its_sign_below_z0() -> None:
-    assert float(log_law_ustar(1.0, 1e-3, 1e-4, printed=True)) == pytest.approx(0.41 / np.log(10))
-    assert float(log_law_ustar(1.0, 5e-5, 1e-4, printed=True)) < 0 < log_law_ustar(1.0, 5e-5, 1e-4)
+    assert float(log_law_ustar(1.0, 1e-3, 1e-4, printed=True)) == pytest.approx(
+        0.41 / np.log(10)
+    )
+    assert (
+        float(log_law_ustar(1.0, 5e-5, 1e-4, printed=True))
+        < 0
+        < log_law_ustar(1.0, 5e-5, 1e-4)
+    )
 
 
 @pytest.mark.parametrize("depth", [0.05, 1.0, 5.0])
 def test_the_depth_mean_is_the_mean_of_the_profile(depth: float) -> None:
-    total = quad(lambda z: float(log_law_speed(0.05, z, 1e-4)), 0, depth, epsrel=1e-12)[0]
-    assert float(depth_mean_speed(0.05, depth, 1e-4)) == pytest.approx(total / depth, rel=1e-9)
+    total = quad(lambda z: float(log_law_speed(0.05, z, 1e-4)), 0, depth, epsrel=1e-12)[
+        0
+    ]
+    assert float(depth_mean_speed(0.05, depth, 1e-4)) == pytest.approx(
+        total / depth, rel=1e-9
+    )
 
 
 @pytest.mark.parametrize("gap", [-0.6 * D, -0.1 * D, 0.0, Z0, 0.2 * D, 1.5 * D])
 def test_speeds_and_shears_are_means_over_the_height_of_the_grain(gap: float) -> None:
     height = np.array(gap)
-    mean, _ = quad(lambda z: 2.5 * np.log(max(z, Z0) / Z0), gap, gap + D, points=[Z0], limit=200)
+    mean, _ = quad(
+        lambda z: 2.5 * np.log(max(z, Z0) / Z0), gap, gap + D, points=[Z0], limit=200
+    )
     assert rough_speed(DIAMETER, ROUGHNESS, height) == pytest.approx(mean / D, rel=1e-6)
     linear, _ = quad(lambda z: max(z, 0.0), gap, gap + D, points=[0.0])
     assert viscous_length(DIAMETER, height) == pytest.approx(linear / D, rel=1e-6)
     rise = 2.5 * (np.log((gap + D) / Z0) - np.log(max(gap, Z0) / Z0))
-    assert rough_gradient(DIAMETER, ROUGHNESS, height) == pytest.approx(rise / D, rel=1e-9)
+    assert rough_gradient(DIAMETER, ROUGHNESS, height) == pytest.approx(
+        rise / D, rel=1e-9
+    )
 
 
-@given(reynolds=st.floats(1e-6, 1e6), viscous=st.floats(1e-3, 1e3), rough=st.floats(1, 50))
+@given(
+    reynolds=st.floats(1e-6, 1e6), viscous=st.floats(1e-3, 1e3), rough=st.floats(1, 50)
+)
 def test_the_root_of_the_bridge_is_right_to_the_last_digits(
     reynolds: float, viscous: float, rough: float
 ) -> None:
@@ -93,7 +115,9 @@ def _by_quadrature(base: float, top: float, moved: float) -> tuple[float, float]
 
 @pytest.mark.parametrize("reynolds", [1e-3, 0.3, 5.0, 40.0, 500.0, 2000.0, 1e9, 1e20])
 @pytest.mark.parametrize("ratio", [1 / 60, 1 / 10])
-def test_the_profile_is_the_integral_of_its_shear(reynolds: float, ratio: float) -> None:
+def test_the_profile_is_the_integral_of_its_shear(
+    reynolds: float, ratio: float
+) -> None:
     base = np.array(ratio * reynolds)
     moved = shift(30 * base)
     exact = _by_quadrature(float(base), float(base + reynolds), float(moved))

@@ -59,7 +59,9 @@ def copies(results: Results, *changes: dict[str, Any]) -> Results:
     for name in ("scenes", "pile_threshold", "pile_curve", "pile_grain"):
         own = tables[name]
         parts = [
-            own.assign(scene_id=f"copy {n}", **{k: v for k, v in one.items() if k in own})
+            own.assign(
+                scene_id=f"copy {n}", **{k: v for k, v in one.items() if k in own}
+            )
             for n, one in enumerate(changes)
         ]
         tables[name] = pd.concat(parts, ignore_index=True)
@@ -67,7 +69,9 @@ def copies(results: Results, *changes: dict[str, Any]) -> Results:
     (pile,) = results.plan.piles.values()
     decision = next(results.plan.decisions[name] for name in results.plan.piles)
     plan = replace(
-        results.plan, piles=dict.fromkeys(ids, pile), decisions=dict.fromkeys(ids, decision)
+        results.plan,
+        piles=dict.fromkeys(ids, pile),
+        decisions=dict.fromkeys(ids, decision),
     )
     return replace(heap, plan=plan, tables=tables)
 
@@ -81,4 +85,6 @@ def axes_of(figure: Figure) -> list[Axes]:
 
 def legend_of(figure: Figure) -> list[str]:
     assert figure.canvas
-    return [text.get_text() for legend in figure.canvas.legends for text in legend.texts]
+    return [
+        text.get_text() for legend in figure.canvas.legends for text in legend.texts
+    ]

@@ -96,9 +96,13 @@ def test_markers_are_hollow_exactly_where_the_closure_does_not_hold(
         assert is_white == (line.get_gid() == HOLLOW)
 
 
-def test_closed_form_lines_stop_where_they_do_not_hold(grains: dict[str, list[Axes]]) -> None:
+def test_closed_form_lines_stop_where_they_do_not_hold(
+    grains: dict[str, list[Axes]],
+) -> None:
     lines = [line for ax in grains["dem-horizontal"] for line in marked(ax, LINE)]
-    solid = np.concatenate([line.get_xdata() for line in lines if line.get_linestyle() == "-"])
+    solid = np.concatenate(
+        [line.get_xdata() for line in lines if line.get_linestyle() == "-"]
+    )
     solid = solid[np.isfinite(solid)]
     assert ((solid < 3) | (solid >= 30)).all()
     assert solid.min() < 0.1
@@ -109,18 +113,22 @@ def test_closed_form_lines_stop_where_they_do_not_hold(grains: dict[str, list[Ax
 def test_diagram_shows_the_transition(grains: dict[str, list[Axes]]) -> None:
     for ax in grains["dem-horizontal"]:
         (span,) = [patch for patch in ax.patches if patch.get_gid() == "transition"]
-        assert span.get_extents().transformed(ax.transData.inverted()).intervalx.tolist() == (
-            pytest.approx([3, 30])
-        )
+        assert span.get_extents().transformed(
+            ax.transData.inverted()
+        ).intervalx.tolist() == (pytest.approx([3, 30]))
         assert "transition" in [text.get_text() for text in ax.texts]
         assert ax.get_xscale() == ax.get_yscale() == "log"
 
 
-def test_fractions_are_those_of_the_holds(results: Results, heaps: dict[str, list[Axes]]) -> None:
+def test_fractions_are_those_of_the_holds(
+    results: Results, heaps: dict[str, list[Axes]]
+) -> None:
     table = results.joined("pile_curve")
     moved = table[table["moved"] > 0]
     (ax,) = heaps["fractions-alpha15"]
-    assert points(marked(ax, *moved["scene_id"])) == rows(moved, "shields", "fraction_moved")
+    assert points(marked(ax, *moved["scene_id"])) == rows(
+        moved, "shields", "fraction_moved"
+    )
     assert ax.get_ylim() == (0, 1)
 
 
@@ -133,9 +141,13 @@ def test_extended_diagram_shows_each_fraction_that_was_reached(
     assert points(marked(ax, SOLID)) == rows(table, "reynolds", "shields")
     assert marked(ax, LINE)
     lost = table.assign(shields=table["shields"].where(table["fraction"] < 0.5))
-    (_, figure) = pile_figures(replace(results, tables={**results.tables, "pile_threshold": lost}))
+    (_, figure) = pile_figures(
+        replace(results, tables={**results.tables, "pile_threshold": lost})
+    )
     (ax,) = drawn([figure])["extended-shields-d30"]
-    assert points(marked(ax, SOLID)) == rows(lost.dropna(subset=["shields"]), "reynolds", "shields")
+    assert points(marked(ax, SOLID)) == rows(
+        lost.dropna(subset=["shields"]), "reynolds", "shields"
+    )
 
 
 def test_friction_velocity_is_that_of_the_flow(results: Results) -> None:
@@ -143,7 +155,10 @@ def test_friction_velocity_is_that_of_the_flow(results: Results) -> None:
     top, profile = drawn(flows.stress(results))["wall-stress"]
     for name in flows.ESTIMATES:
         (line,) = marked(top, name)
-        assert np.asarray(line.get_ydata()).tolist() == table[f"ustar_over_ustar0_{name}"].tolist()
+        assert (
+            np.asarray(line.get_ydata()).tolist()
+            == table[f"ustar_over_ustar0_{name}"].tolist()
+        )
         assert line.get_xdata() == pytest.approx(table["x_m"] / 0.01)
     (bed,) = marked(profile, "bed")
     assert np.max(bed.get_ydata()) == pytest.approx(1, abs=0.05)
@@ -155,10 +170,17 @@ def test_closed_form_is_drawn_before_there_are_results(results: Results) -> None
     empty = replace(results, tables={**none, "scenes": results.tables["scenes"]})
     names = {"closed-form-horizontal", "closed-form-slope-beta60"}
     assert {figure.name for figure in single_figures(empty)} == names
-    assert list(pile_figures(empty)) == list(flows.stress(empty)) == list(bed.draw(empty)) == []
+    assert (
+        list(pile_figures(empty))
+        == list(flows.stress(empty))
+        == list(bed.draw(empty))
+        == []
+    )
 
 
-def test_figures_have_at_most_six_panels_and_numbers_under_each_column(results: Results) -> None:
+def test_figures_have_at_most_six_panels_and_numbers_under_each_column(
+    results: Results,
+) -> None:
     several = copies(results, *({"averaging_length": i + 1.0} for i in range(7)))
     figures = [*piles.fractions(several), *shields.piles(several)]
     assert [bool(figure.fold) for figure in figures] == [False, True, True, True]
@@ -169,7 +191,9 @@ def test_figures_have_at_most_six_panels_and_numbers_under_each_column(results: 
         for ax in axes:
             place = ax.get_subplotspec()
             assert place is not None
-            numbered[place.colspan.start] = any(t.get_visible() for t in ax.get_xticklabels())
+            numbered[place.colspan.start] = any(
+                t.get_visible() for t in ax.get_xticklabels()
+            )
         assert all(numbered.values())
     assert sum(len(axes_of(figure)) for figure in figures[2:]) == 7
 
@@ -179,8 +203,15 @@ def test_figures_have_at_most_six_panels_and_numbers_under_each_column(results: 
 def test_a_threshold_without_a_place_on_a_logarithmic_axis_costs_no_figure(
     results: Results, value: float, rows: int
 ) -> None:
-    own, curve = results.tables["pile_threshold"].copy(), results.tables["pile_curve"].copy()
-    own.loc[own.index[:rows], ["shields", "shields_low", "shields_high", "reynolds"]] = value
+    own, curve = (
+        results.tables["pile_threshold"].copy(),
+        results.tables["pile_curve"].copy(),
+    )
+    own.loc[
+        own.index[:rows], ["shields", "shields_low", "shields_high", "reynolds"]
+    ] = value
     curve.loc[curve.index[: 3 if rows == 1 else None], ["shields", "reynolds"]] = value
     heap = only(changed(results, pile_threshold=own, pile_curve=curve), "pile")
-    assert len(drawn([*shields.draw(heap), *pile_figures(heap)])) == (3 if rows == 1 else 1)
+    assert len(drawn([*shields.draw(heap), *pile_figures(heap)])) == (
+        3 if rows == 1 else 1
+    )

@@ -20,12 +20,16 @@ def bridged(first: float = 0.01, last: float = 1e3) -> Line:
 
 
 def test_factors_are_those_of_the_law_from_the_medians() -> None:
-    tau = shields_at(LAWS["bridged"], MIDDLES, roughness_ratio=1 / 30, entrainment_angle_deg=50.0)
+    tau = shields_at(
+        LAWS["bridged"], MIDDLES, roughness_ratio=1 / 30, entrainment_angle_deg=50.0
+    )
     for at, one in enumerate(BUFFINGTON_MONTGOMERY):
         factor = bridged().factors[at]
         # below Re* 0.3 are a dozen measurements, from 163 on the drag has no law
         if 0.3 < one.middle < 163:
-            assert factor == pytest.approx(max(tau[at] / one.median, one.median / tau[at]))
+            assert factor == pytest.approx(
+                max(tau[at] / one.median, one.median / tau[at])
+            )
         else:
             assert np.isnan(factor)
     assert bridged().median_factor == pytest.approx(1.19, abs=0.01)
@@ -63,7 +67,9 @@ def bed(results: Results) -> pd.DataFrame:
     return flat[flat["z0_over_d"] == 0.1]
 
 
-def test_closed_form_lines_are_solid_where_their_equation_holds(bed: pd.DataFrame) -> None:
+def test_closed_form_lines_are_solid_where_their_equation_holds(
+    bed: pd.DataFrame,
+) -> None:
     reynolds = np.geomspace(1e-3, 1e4, 800)
     low, high = theory.lines(bed)
     assert (low.law, high.law) == ("low", "high")

@@ -76,7 +76,11 @@ def test_page_needs_nothing_else(html: str, parsed: Page) -> None:
     assert (set(kinds), folded) == ({"data:image/svg+xml;base64"}, 5)
     assert not {"link", "iframe", "object"} & {tag for tag, _ in parsed.tags}
     scripts = [values for tag, values in parsed.tags if tag == "script"]
-    assert [one.get("type") for one in scripts] == ["application/json", "application/json", None]
+    assert [one.get("type") for one in scripts] == [
+        "application/json",
+        "application/json",
+        None,
+    ]
     assert not any("src" in one for one in scripts)
     assert not {"url(", "@import"} & set(parsed.texts["style"].split())
     assert not any("://" in href for href in parsed.all("a", "href"))
@@ -110,7 +114,9 @@ def test_what_a_user_wrote_is_text(html: str, parsed: Page) -> None:
     assert "b" not in {tag for tag, _ in parsed.tags}
 
 
-def test_links_lead_to_what_is_there(page: Path, parsed: Page, results: Results) -> None:
+def test_links_lead_to_what_is_there(
+    page: Path, parsed: Page, results: Results
+) -> None:
     (page.parent / "tables").mkdir(exist_ok=True)
     targets = set()
     for href in (one for one in parsed.all("a", "href") if not one.startswith("#")):
@@ -133,7 +139,9 @@ def test_same_results_give_the_same_bytes(results: Results, tmp_path: Path) -> N
         (out / "cases").symlink_to(results.cases)
         pages.append(write(heap, out, {}).parent)
     for path in (pages[0] / "figures").iterdir():
-        assert path.read_bytes() == (pages[1] / "figures" / path.name).read_bytes(), path.name
+        assert path.read_bytes() == (pages[1] / "figures" / path.name).read_bytes(), (
+            path.name
+        )
     first, second = ((folder / "report.html").read_bytes() for folder in pages)
     assert first == second
 
@@ -144,7 +152,9 @@ def test_page_without_results(results: Results, tmp_path: Path) -> None:
     (tmp_path / "cases").mkdir()
     failures = dict.fromkeys(results.plan.cases, "no solver")
     parsed = Page(
-        write(replace(empty, cases=tmp_path / "cases"), tmp_path, failures).read_text("utf-8")
+        write(replace(empty, cases=tmp_path / "cases"), tmp_path, failures).read_text(
+            "utf-8"
+        )
     )
     assert "No case has given a result yet" in parsed.text
     assert parsed.text.count("no solver") == len(failures)
@@ -200,12 +210,16 @@ def test_in_a_browser_the_slider_moves_grains_and_a_point_answers(
     html = page.read_text(encoding="utf-8")
     # the policy lets no other script run: the probe comes without it
     start, end = html.index("<meta http-equiv"), html.index('<meta name="viewport"')
-    (tmp_path / "page.html").write_text(html[:start] + PROBE + html[end:], encoding="utf-8")
+    (tmp_path / "page.html").write_text(
+        html[:start] + PROBE + html[end:], encoding="utf-8"
+    )
     command = [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom",
                "--window-size=1280,900", f"--user-data-dir={tmp_path / 'profile'}",
                (tmp_path / "page.html").as_uri()]  # fmt: skip
     dom = subprocess.run(command, capture_output=True, text=True, timeout=120).stdout
-    steps, moved = (results.tables["pile_curve"][name].max() for name in ("load_step", "moved"))
+    steps, moved = (
+        results.tables["pile_curve"][name].max() for name in ("load_step", "moved")
+    )
     assert f"load step {steps} of {steps}: " in dom
     assert f"n/N = {moved}/" in dom
     tip = dom[dom.index('<div class="tip"') :]
@@ -265,22 +279,32 @@ def test_page_of_an_experiment_holds_all_of_its_sections(tmp_path: Path) -> None
         canvas = style.canvas(1.0)
         canvas.subplots().plot([0, 1])
         figures.append(Figure(name, f"The {name}", f"What <{name}> shows.", (), canvas))
-    table = pd.DataFrame({"level": ["a", "b"], "tau_c": [0.123456, np.nan], "same": [True, False]})
+    table = pd.DataFrame(
+        {"level": ["a", "b"], "tau_c": [0.123456, np.nan], "same": [True, False]}
+    )
     sections = [
         Section("What was run", "One V_f.\n\nAnother <b>paragraph</b>.", figures[:1]),
         Section("Found", "", figures[1:], [table], ["No more than <this>."]),
     ]
-    page_module.write(SPEED, sections, Folder(tmp_path), "page.html", {"liggghts": "3.8"})
+    page_module.write(
+        SPEED, sections, Folder(tmp_path), "page.html", {"liggghts": "3.8"}
+    )
     parsed = Page((tmp_path / "page.html").read_text(encoding="utf-8"))
     assert parsed.texts["title"] == parsed.texts["h1"] == SPEED
     assert parsed.texts["h2"] == "What was runFoundBehind this page"
     assert parsed.texts["h3"] == "Figure 1. The firstFigure 2. The second"
-    for said in ("Another <b>paragraph</b>.", "What <second> shows.", "No more than <this>."):
+    for said in (
+        "Another <b>paragraph</b>.",
+        "What <second> shows.",
+        "No more than <this>.",
+    ):
         assert said in parsed.text
     cells = parsed.texts["td"]
     assert cells.startswith("a0.1235yesb—no")
     assert "liggghts3.8" in cells
     assert "matplotlib" in cells
-    assert [src.split(",")[0] for src in parsed.all("img", "src")] == ["data:image/png;base64"] * 2
+    assert [src.split(",")[0] for src in parsed.all("img", "src")] == [
+        "data:image/png;base64"
+    ] * 2
     files = {path.name for path in (tmp_path / "figures").iterdir()}
     assert files == {"first.png", "first.svg", "second.png", "second.svg"}

@@ -20,7 +20,9 @@ from tests.report.conftest import axes_of
 X = np.linspace(0, 40, 201)
 RISE = 1 - np.cos(0.72 * np.pi * np.clip((X - 3) / 27, 0, 1))
 """27 m of a windward side, steepest in its middle, before a slip face of 33 deg."""
-Z = np.minimum(2 * RISE / RISE[-1], np.maximum(2 - (X - 30) * np.tan(np.radians(33)), 0))
+Z = np.minimum(
+    2 * RISE / RISE[-1], np.maximum(2 - (X - 30) * np.tan(np.radians(33)), 0)
+)
 Z += 0.01 * np.random.default_rng(1).standard_normal(len(X))
 ROWS = "\n".join(f"{x:.3f},{z:.4f}" for x, z in zip(X, Z, strict=True))
 DUNE = f"""
@@ -104,11 +106,15 @@ def test_field_is_that_of_the_flow(results: Results, pile: Pile) -> None:
     assert np.isnan(speed).mean() * 0.12 * 0.03 == pytest.approx(area, rel=0.05)
     assert np.nanmin(velocity[..., 0]) < 0
     assert figure.canvas is not None
-    image = np.ma.masked_invalid(np.asarray(figure.canvas.axes[0].images[0].get_array()))
+    image = np.ma.masked_invalid(
+        np.asarray(figure.canvas.axes[0].images[0].get_array())
+    )
     assert 0.9 < float(image.max()) < 1.2
     # |u|/U_e is 1 at 10 h far upstream; at the lid it is a quarter more
     window = (-60.0, -59.0, 10.0, 10.1)
-    far = np.linalg.norm(flows.over_u_e(pile, results.cases, window, pile.bed.height), axis=-1)
+    far = np.linalg.norm(
+        flows.over_u_e(pile, results.cases, window, pile.bed.height), axis=-1
+    )
     assert np.nanmean(far) == pytest.approx(1, abs=0.02)
 
 
@@ -146,9 +152,15 @@ def test_mesh_is_that_of_the_flow(
     assert len(middles.intersection(line)) > 0.9 * faces
 
 
-def test_the_slider_has_every_place_of_every_load_step(results: Results, steps: Steps) -> None:
+def test_the_slider_has_every_place_of_every_load_step(
+    results: Results, steps: Steps
+) -> None:
     (figure,) = bed.draw(results)
-    data, curve, counts = figure.data, results.tables["pile_curve"], steps.totals.tolist()
+    data, curve, counts = (
+        figure.data,
+        results.tables["pile_curve"],
+        steps.totals.tolist(),
+    )
     assert counts == curve["moved"].tolist()[: len(counts)]
     assert steps.flow == pytest.approx(curve["ustar0_m_s"][: len(counts)])
     assert counts[data["shown"] - 1] < 0.3 * data["count"] <= counts[data["shown"]]
@@ -181,7 +193,9 @@ def test_a_bed_without_dem_has_a_picture_of_few_stops(
     assert "load step" not in bed.words(results, peeled)
 
 
-def test_motion_starts_on_a_natural_dune_where_stress_and_slope_say(dune: Results) -> None:
+def test_motion_starts_on_a_natural_dune_where_stress_and_slope_say(
+    dune: Results,
+) -> None:
     """40 m of 0.3 mm sand without a grain, and with those of a metre of it, under one flow."""
     whole, part = dune.plan.piles.values()
     table, stress = dune.joined("pile_threshold"), dune.tables["wall_stress"]
@@ -199,7 +213,9 @@ def test_motion_starts_on_a_natural_dune_where_stress_and_slope_say(dune: Result
     assert (row["pivot_x_m"], row["pivot_first_m_s"]) == pytest.approx(answer, rel=5e-3)
     grains = dune.tables["pile_grain"]
     local, lattice = (rows for _, rows in grains.groupby("scene_id", sort=False))
-    assert len(local) <= packing.PLACES < len(lattice) == pytest.approx(1 / 3e-4, rel=0.02)
+    assert (
+        len(local) <= packing.PLACES < len(lattice) == pytest.approx(1 / 3e-4, rel=0.02)
+    )
     at_grains = np.interp(lattice["x_m"], local["x_m"], local["ustar0_m_s"])
     np.testing.assert_allclose(lattice["ustar0_m_s"], at_grains, rtol=0.02)
     assert np.ptp(part.packing.centres[:, 0]) < 3500
@@ -212,8 +228,12 @@ def test_each_form_of_a_train_has_its_thresholds(train: Results) -> None:
     table = train.tables["form"]
     assert list(table["form"].unique()) == [1, 2]
     assert table["count"].sum() / 4 == train.tables["pile_threshold"]["count"].iloc[0]
-    first, second = (table[table["form"] == form].set_index("fraction") for form in (1, 2))
-    assert (second["over_first_form"] == second["ustar0_m_s"] / first["ustar0_m_s"]).all()
+    first, second = (
+        table[table["form"] == form].set_index("fraction") for form in (1, 2)
+    )
+    assert (
+        second["over_first_form"] == second["ustar0_m_s"] / first["ustar0_m_s"]
+    ).all()
     assert (np.diff(first["ustar0_m_s"]) >= 0).all()
 
 
@@ -244,7 +264,15 @@ def test_computed_stands_beside_measured(hills: Results) -> None:
     lines = [line for axes in figure.canvas.axes for line in axes.lines]
     (measured_,) = (line for line in lines if line.get_gid() == "measured")
     np.testing.assert_array_equal(np.asarray(measured_.get_xdata()), 6.5)
-    ends = [np.asarray(one.get_xdata())[1] for one in lines if one.get_gid() == "reversed flow"]
+    ends = [
+        np.asarray(one.get_xdata())[1]
+        for one in lines
+        if one.get_gid() == "reversed flow"
+    ]
     np.testing.assert_allclose(ends, hills.tables["flow"]["reattachment_over_h"])
-    tops = [np.max(np.asarray(one.get_ydata())) for one in lines if one.get_gid() == "stress"]
+    tops = [
+        np.max(np.asarray(one.get_ydata()))
+        for one in lines
+        if one.get_gid() == "stress"
+    ]
     np.testing.assert_allclose(tops, hills.tables["flow"]["ustar_largest"])

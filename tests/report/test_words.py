@@ -40,16 +40,27 @@ def test_fields_that_tell_rows_apart(table: pd.DataFrame) -> None:
         "method": ["pivot", "peeling", "peeling", "dem"],
         "update": [np.nan, 0.0, 0.0, 0.0],
     }
-    assert labels.varying(pd.DataFrame(methods), "alpha_deg") == ["rho_f_kg_m3", "method"]
+    assert labels.varying(pd.DataFrame(methods), "alpha_deg") == [
+        "rho_f_kg_m3",
+        "method",
+    ]
 
 
-def test_what_is_asked_parts_panels_and_what_answers_has_markers(table: pd.DataFrame) -> None:
-    asked = table.assign(stiffness=1e3, packing=["aligned", "aligned", "horizontal", "aligned"])
+def test_what_is_asked_parts_panels_and_what_answers_has_markers(
+    table: pd.DataFrame,
+) -> None:
+    asked = table.assign(
+        stiffness=1e3, packing=["aligned", "aligned", "horizontal", "aligned"]
+    )
     panels, rows = shields.parted(asked.assign(answered_method="dem"), *SHOWN)
     assert panels == ["packing"]
     assert rows[SHAPE].tolist() == ["o", "s", "o", "o"]
     names = [text.rpartition(", ")[2] for text in rows[LABEL]]
-    assert names == ["mobile layers = 1", "mobile layers = 2", *["mobile layers = 1"] * 2]
+    assert names == [
+        "mobile layers = 1",
+        "mobile layers = 2",
+        *["mobile layers = 1"] * 2,
+    ]
 
 
 def test_page_lists_every_parameter(results: Results) -> None:
@@ -59,10 +70,22 @@ def test_page_lists_every_parameter(results: Results) -> None:
     assert rows["flow.first_cell_height"][0] == "default"
 
 
-def test_the_picture_is_of_the_scene_that_the_sentence_is_about(results: Results) -> None:
+def test_the_picture_is_of_the_scene_that_the_sentence_is_about(
+    results: Results,
+) -> None:
     """Of a pile in water that is usable and one in air that is not, whatever their order."""
-    air = {"rho_f_kg_m3": 1.2, "usable": False, "why_not": "smooth", "answered_method": "dem"}
-    water = {"rho_f_kg_m3": 1e3, "usable": True, "why_not": "", "answered_method": "peeling"}
+    air = {
+        "rho_f_kg_m3": 1.2,
+        "usable": False,
+        "why_not": "smooth",
+        "answered_method": "dem",
+    }
+    water = {
+        "rho_f_kg_m3": 1e3,
+        "usable": True,
+        "why_not": "",
+        "answered_method": "peeling",
+    }
     for both in ((air, water), (water, air)):
         study = copies(results, *both)
         row, _ = next(bed.chosen(study))
@@ -88,7 +111,9 @@ def test_each_fluid_has_a_row_and_a_sentence(results: Results) -> None:
 
 def test_seeds_are_one_row_with_their_range(results: Results) -> None:
     thetas = (0.04, 0.05, 0.09)
-    seeds = ({"seed": n, "packing": "disordered", "shields": t} for n, t in enumerate(thetas))
+    seeds = (
+        {"seed": n, "packing": "disordered", "shields": t} for n, t in enumerate(thetas)
+    )
     study = copies(results, *seeds)
     sheet = words.short(study)
     assert sheet is not None
@@ -102,7 +127,9 @@ def test_a_study_of_single_grains_has_an_answer_too(results: Results) -> None:
     grains = only(results, "grain")
     first, *_ = words.answer(grains).sentences
     assert first.startswith("One grain of 0.05 mm on 0° starts to move at u*₀ = ")
-    without = grains.tables["single_grain"].assign(answered_method="pivot", ustar_m_s=np.nan)
+    without = grains.tables["single_grain"].assign(
+        answered_method="pivot", ustar_m_s=np.nan
+    )
     exact = changed(grains, single_grain=without)
     sheet = words.short(exact)
     assert sheet is not None
@@ -111,7 +138,9 @@ def test_a_study_of_single_grains_has_an_answer_too(results: Results) -> None:
 
 
 def test_a_threshold_that_is_not_usable_says_so(results: Results) -> None:
-    bad = results.tables["pile_threshold"].assign(usable=False, why_not="Re* 2 is below 30")
+    bad = results.tables["pile_threshold"].assign(
+        usable=False, why_not="Re* 2 is below 30"
+    )
     study = changed(results, pile_threshold=bad)
     assert "(not usable: Re* 2 is below 30)." in words.answer(study).sentences[0]
     assert words.doubts(study)[0] == "Usable: 0 of 4 thresholds."
@@ -138,7 +167,10 @@ def test_an_interval_without_an_end_is_written_so(results: Results) -> None:
         copies(changed(results, pile_threshold=half), *({"seed": n} for n in (0, 1)))
     )
     assert ranges is not None
-    assert [text.startswith("above") for text in ranges["interval"]] == [False, True] * 2
+    assert [text.startswith("above") for text in ranges["interval"]] == [
+        False,
+        True,
+    ] * 2
     # where no error is known neither end is
     none = thresholds.assign(shields_low=np.nan, shields_high=np.nan)
     sheet = words.short(changed(results, pile_threshold=none))
@@ -147,9 +179,13 @@ def test_an_interval_without_an_end_is_written_so(results: Results) -> None:
 
 
 def test_sizes_of_a_mixture_say_what_so_few_grains_leave_open() -> None:
-    ends = {"shields_own_low": [0.02, np.nan, np.nan], "shields_own_high": [0.04, 0.05, np.nan]}
+    ends = {
+        "shields_own_low": [0.02, np.nan, np.nan],
+        "shields_own_high": [0.04, 0.05, np.nan],
+    }
     assert [
-        labels.interval(low, high, ".2g") for low, high in zip(*ends.values(), strict=True)
+        labels.interval(low, high, ".2g")
+        for low, high in zip(*ends.values(), strict=True)
     ] == ["0.02 … 0.04", "below 0.05", "—"]
     assert labels.interval(0.02, np.inf, ".2g") == "above 0.02"
     assert labels.interval(0.0391, 0.0392, ".2g") == "0.039"
@@ -172,7 +208,9 @@ def test_every_point_says_its_scene_interval_and_case(results: Results) -> None:
         assert text[2:] == [row["why_not"], row["case"]]
 
 
-def test_the_lines_beside_piles_have_the_roughness_of_the_piles(results: Results) -> None:
+def test_the_lines_beside_piles_have_the_roughness_of_the_piles(
+    results: Results,
+) -> None:
     """Single grains on d/10 fit the measurements better; the piles are on d/30."""
     (figure,) = shields.draw(results)
     lines = [text for text in legend_of(figure) if text.startswith("Eq.")]

@@ -53,7 +53,9 @@ class Step(Case):
         return {}
 
 
-def test_a_case_is_a_copy_of_its_template_with_inputs_and_then_results(tmp_path: Path) -> None:
+def test_a_case_is_a_copy_of_its_template_with_inputs_and_then_results(
+    tmp_path: Path,
+) -> None:
     step = Step(1.0)
     assert step.id == Step(1.0).id != Step(2.0).id
     directory = case.prepare(step, tmp_path)
@@ -139,7 +141,10 @@ def test_a_large_solver_is_served_before_those_that_ask_later() -> None:
         with cores.held(wanted):
             served.append(name)
 
-    threads = [threading.Thread(target=solve, args=args) for args in (("large", 2), ("small", 1))]
+    threads = [
+        threading.Thread(target=solve, args=args)
+        for args in (("large", 2), ("small", 1))
+    ]
     with cores.held(1):
         threads[0].start()
         while not cores._queue.locked():

@@ -32,7 +32,9 @@ def test_only_files_that_were_put_are_replaced_or_removed(folder: Folder) -> Non
     (folder.root / "tables" / "mine.csv").write_text("mine")
     with folder.renewed():
         folder.put("tables/a.csv", "two")
-    tables = {path.name: path.read_text() for path in (folder.root / "tables").iterdir()}
+    tables = {
+        path.name: path.read_text() for path in (folder.root / "tables").iterdir()
+    }
     assert tables == {"a.csv": "two", "c.csv": "changed", "mine.csv": "mine"}
     assert folder.written().keys() == {"tables/a.csv"}
     with pytest.raises(ValueError, match="for this test"), folder.renewed():
@@ -43,7 +45,9 @@ def test_only_files_that_were_put_are_replaced_or_removed(folder: Folder) -> Non
 
 
 @pytest.mark.filterwarnings("ignore:.*not what this program wrote")
-def test_directories_in_the_place_of_files_and_the_reverse_are_kept(folder: Folder) -> None:
+def test_directories_in_the_place_of_files_and_the_reverse_are_kept(
+    folder: Folder,
+) -> None:
     for name in ("full", "empty"):
         (folder.root / name).mkdir()
     (folder.root / "full" / "notes.txt").write_text("mine")
@@ -56,7 +60,9 @@ def test_directories_in_the_place_of_files_and_the_reverse_are_kept(folder: Fold
     assert (kept / "full" / "notes.txt").read_text() == "mine"
     # where that file is now, no directory can be
     (folder.root / "tables" / "a.csv").write_text("mine")
-    with pytest.warns(UserWarning, match=r"out/tables/a\.csv is not what this program wrote"):
+    with pytest.warns(
+        UserWarning, match=r"out/tables/a\.csv is not what this program wrote"
+    ):
         folder.put("tables/a.csv", "ours")
     assert (folder.root / f"{KEPT}-2" / "tables" / "a.csv").read_text() == "mine"
 
@@ -67,29 +73,46 @@ def test_no_link_is_followed(folder: Folder, outside: Path, link: str) -> None:
     (folder.root / "tables").mkdir()
     if path.is_dir():
         path.rmdir()
-    path.symlink_to(outside if path.suffix not in (".csv", ".sha256") else outside / "a.csv")
+    path.symlink_to(
+        outside if path.suffix not in (".csv", ".sha256") else outside / "a.csv"
+    )
     if link == KEPT:
         (folder.root / "tables" / "a.csv").write_text("mine")
     with pytest.raises(InputError, match=f"{path}: it is a link"):
         folder.put("tables/a.csv", "ours")
     assert path.is_symlink()
-    assert {file.name: file.read_text() for file in outside.iterdir()} == {"a.csv": "precious"}
+    assert {file.name: file.read_text() for file in outside.iterdir()} == {
+        "a.csv": "precious"
+    }
 
 
-@pytest.mark.parametrize("name", ["../a.csv", "/a.csv", "tables/../../a.csv", "..", "."])
+@pytest.mark.parametrize(
+    "name", ["../a.csv", "/a.csv", "tables/../../a.csv", "..", "."]
+)
 def test_no_name_leads_out(folder: Folder, name: str) -> None:
-    for write in (lambda: folder.put(name, "ours"), lambda: folder.clear(name, lambda _: True)):
+    for write in (
+        lambda: folder.put(name, "ours"),
+        lambda: folder.clear(name, lambda _: True),
+    ):
         with pytest.raises(InputError, match="out of the directory"):
             write()
 
 
-def test_a_directory_belongs_to_one_kind_and_one_name(tmp_path: Path, outside: Path) -> None:
+def test_a_directory_belongs_to_one_kind_and_one_name(
+    tmp_path: Path, outside: Path
+) -> None:
     root, kinds = tmp_path / "out", workspace.KINDS
     for _ in range(2):
         with workspace.claimed(root, workspace.RESULTS, "mine") as folder:
             folder.put("comparison.csv", "one")
-    for kind, name in ((kinds[0], "mine"), (workspace.RESULTS, "yours"), (kinds[-1], "mine")):
-        holds = pytest.raises(InputError, match=r"holds the benchmark of the solver mine, not")
+    for kind, name in (
+        (kinds[0], "mine"),
+        (workspace.RESULTS, "yours"),
+        (kinds[-1], "mine"),
+    ):
+        holds = pytest.raises(
+            InputError, match=r"holds the benchmark of the solver mine, not"
+        )
         with holds, workspace.claimed(root, kind, name):
             pass
     assert folder.is_whole()
@@ -98,7 +121,10 @@ def test_a_directory_belongs_to_one_kind_and_one_name(tmp_path: Path, outside: P
         new.mkdir()
         (new / kind.marker).write_text('{"title": "something else"}')
         for place, named in ((outside, r"a\.csv"), (new, kind.marker)):
-            with pytest.raises(InputError, match=named), workspace.claimed(place, kind, "mine"):
+            with (
+                pytest.raises(InputError, match=named),
+                workspace.claimed(place, kind, "mine"),
+            ):
                 pass
     assert [path.name for path in outside.iterdir()] == ["a.csv"]
 
@@ -114,7 +140,9 @@ def test_without_its_record_nothing_is_lost(folder: Folder, harm: bytes) -> None
 
 
 @pytest.mark.filterwarnings("ignore:.*not what this program wrote")
-def test_a_cleared_directory_leaves_what_is_not_ours(folder: Folder, outside: Path) -> None:
+def test_a_cleared_directory_leaves_what_is_not_ours(
+    folder: Folder, outside: Path
+) -> None:
     scene = folder.root / "scene"
     (scene / "deep").mkdir(parents=True)
     (scene / "answer.csv").write_text("ours")
@@ -130,7 +158,9 @@ def test_a_cleared_directory_leaves_what_is_not_ours(folder: Folder, outside: Pa
     assert (outside / "a.csv").read_text() == "precious"
 
 
-def test_another_name_of_a_file_keeps_its_content(folder: Folder, outside: Path) -> None:
+def test_another_name_of_a_file_keeps_its_content(
+    folder: Folder, outside: Path
+) -> None:
     folder.put("tables/a.csv", "one")
     second = outside / "second"
     for name in ("tables/a.csv", RECORD):

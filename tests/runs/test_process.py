@@ -32,7 +32,10 @@ def _has_ended(file: Path) -> bool:
     """Whether the process whose number a file holds ends within a moment."""
     pid = int(file.read_text())
     for _ in range(200):
-        if not psutil.pid_exists(pid) or psutil.Process(pid).status() == psutil.STATUS_ZOMBIE:
+        if (
+            not psutil.pid_exists(pid)
+            or psutil.Process(pid).status() == psutil.STATUS_ZOMBIE
+        ):
             return True
         time.sleep(0.05)
     return False
@@ -92,11 +95,18 @@ def test_a_killed_driver_leaves_nothing_at_work(tmp_path: Path) -> None:
     assert all(_has_ended(tmp_path / name) for name in ("pid", "child"))
 
 
-RUNS = {"kill -KILL $$": process.TRIES, "exit 143": process.TRIES, "kill -SEGV $$": 1, "exit 1": 1}
+RUNS = {
+    "kill -KILL $$": process.TRIES,
+    "exit 143": process.TRIES,
+    "kill -SEGV $$": 1,
+    "exit 1": 1,
+}
 
 
 @pytest.mark.parametrize("script", RUNS)
-def test_a_program_that_is_killed_from_outside_runs_again(tmp_path: Path, script: str) -> None:
+def test_a_program_that_is_killed_from_outside_runs_again(
+    tmp_path: Path, script: str
+) -> None:
     _sh(tmp_path, f"echo >>runs; {script}", tries=process.TRIES)
     assert len((tmp_path / "runs").read_text()) == RUNS[script]
 
@@ -168,7 +178,9 @@ def test_the_home_of_another_openfoam(tmp_path: Path, monkeypatch: Patch) -> Non
     assert VERSIONS["simpleFoam"]() == openfoam.TRIED
 
 
-def test_the_doctor_names_a_solver_that_is_broken(put: Put, name: str, monkeypatch: Patch) -> None:
+def test_the_doctor_names_a_solver_that_is_broken(
+    put: Put, name: str, monkeypatch: Patch
+) -> None:
     path = put("exit 1")
     monkeypatch.setattr(doctor, "LIBRARIES", ("numpy",))
     uncached = {"OpenFOAM": VERSIONS["simpleFoam"], "LIGGGHTS": VERSIONS["liggghts"]}
@@ -179,4 +191,6 @@ def test_the_doctor_names_a_solver_that_is_broken(put: Put, name: str, monkeypat
     assert bad.what == solver
     assert str(path) in bad.text
     lines = doctor.text(findings).splitlines()
-    assert [line for line in lines if line.startswith("NOT")] == [f"NOT  {solver:<12} {bad.text}"]
+    assert [line for line in lines if line.startswith("NOT")] == [
+        f"NOT  {solver:<12} {bad.text}"
+    ]

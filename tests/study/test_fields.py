@@ -23,7 +23,13 @@ grain = { diameter = 1e-3 }
 bed = { kind = "pile", slope_deg = 15.0, packing = "disordered" }
 forces = { law = "high" }
 """
-UNCHANGEABLE = ("bed.kind", "protocol.fractions", "bed.profile", "bed.smoothing", "bed.obstacles")
+UNCHANGEABLE = (
+    "bed.kind",
+    "protocol.fractions",
+    "bed.profile",
+    "bed.smoothing",
+    "bed.obstacles",
+)
 NEEDED: dict[str, dict[str, Any]] = {
     "bed.windward": {"bed.shape": "dune"},
     "bed.brink_radius": {"bed.shape": "dune"},
@@ -76,16 +82,23 @@ def test_each_field_has_its_words_and_its_range(quantity: Quantity) -> None:
     assert quantity.info.label
     assert quantity.meaning
     declared = declaration(quantity)
-    if not {float, int}.intersection((declared.annotation, *get_args(declared.annotation))):
+    if not {float, int}.intersection(
+        (declared.annotation, *get_args(declared.annotation))
+    ):
         return
     low, high = REFERENCE["bounds"](declared)
     assert (low[0] in "[(", high[-1] in "])") == (True, True)
     part, _, name = quantity.name.partition(".")
-    base: dict[str, dict[str, Any]] = {"grain": {"diameter": 1e-3}, "bed": {"kind": "pile"}}
+    base: dict[str, dict[str, Any]] = {
+        "grain": {"diameter": 1e-3},
+        "bed": {"kind": "pile"},
+    }
     for value in (-1, 10**18) if declared.annotation is int else (-1e-320, 1e308):
         parts = {key: {**base.get(key, {})} for key in fields.PARTS}
         parts[part][name] = value
-        with pytest.raises(InputError, match=rf"test: {quantity.name}: .* is not accepted"):
+        with pytest.raises(
+            InputError, match=rf"test: {quantity.name}: .* is not accepted"
+        ):
             study.make_scene(parts, "test")
 
 
@@ -97,7 +110,9 @@ def test_scenes_that_differ_in_a_field_are_not_equal_in_all_else(
         return
     scene = changed(scene, NEEDED.get(quantity.name, {}))
     if quantity.info.scope == "single grains":
-        scene = study.parse("grain = { diameter = 1e-3 }", name="test", where="test").scenes[0]
+        scene = study.parse(
+            "grain = { diameter = 1e-3 }", name="test", where="test"
+        ).scenes[0]
     if quantity.info.scope == "poured beds":
         scene = changed(scene, {"bed.packing": "poured"})
     other = changed(scene, {quantity.name: other_value(quantity, scene)})
@@ -116,8 +131,12 @@ def test_levels_change_fields_of_the_answer_alone(scene: Scene) -> None:
         assert {about[name] for name in level.fields(scene)} == {"answer"}
 
 
-def test_a_field_without_effect_is_empty_and_one_left_open_is_worked_out(scene: Scene) -> None:
-    row = fields.asked(changed(scene, {"flow.model": "flat", "protocol.method": "pivot"}))
+def test_a_field_without_effect_is_empty_and_one_left_open_is_worked_out(
+    scene: Scene,
+) -> None:
+    row = fields.asked(
+        changed(scene, {"flow.model": "flat", "protocol.method": "pivot"})
+    )
     for column in ("turbulence_model", "cells_per_face", "stiffness", "waiting_time"):
         assert row[column] is None
     assert (row["h_m"], row["flow_model"]) == (0.02, "flat")
@@ -131,7 +150,11 @@ def test_a_row_has_the_scene_that_was_asked_and_the_one_that_answered_it() -> No
     planned = plan.make(asked)
     (row,), (scene,) = rows.scenes(asked, planned), asked.scenes
     answer = fields.answered(planned.decisions[scene.id].scene)
-    assert {"scene_id": scene.id, **fields.asked(scene), **answer}.items() <= row.items()
+    assert {
+        "scene_id": scene.id,
+        **fields.asked(scene),
+        **answer,
+    }.items() <= row.items()
     assert (row["method"], row["answered_method"]) == ("auto", "pivot")
     assert {*fields.COLUMNS, *fields.ANSWERS} <= set(COLUMNS)
 

@@ -22,7 +22,9 @@ flow = { model = "flat" }
 
 
 def scene_of(folder: Path, content: str | bytes, text: str = STUDY) -> Scene:
-    (folder / "scan.csv").write_bytes(content if isinstance(content, bytes) else content.encode())
+    (folder / "scan.csv").write_bytes(
+        content if isinstance(content, bytes) else content.encode()
+    )
     return study.parse(text, name="scan", where=str(folder / "study.toml")).scenes[0]
 
 
@@ -39,14 +41,29 @@ def long(*changed: tuple[int, str]) -> str:
 
 BAD: dict[str, tuple[str | bytes, str]] = {
     "empty": ("", "line 1: not one column x_m"),
-    "missing column": ("x_m,y_m\n0,0\n1,1\n2,0\n", "line 1: not one column x_m and one z_m"),
+    "missing column": (
+        "x_m,y_m\n0,0\n1,1\n2,0\n",
+        "line 1: not one column x_m and one z_m",
+    ),
     "two columns of a name": ("x_m,z_m,x_m\n0,0,0\n", "line 1: not one column x_m"),
-    "unsorted": (points("0,0", "2,0.1", "1,0.2", "3,0"), "line 4: x does not rise to 1 m"),
+    "unsorted": (
+        points("0,0", "2,0.1", "1,0.2", "3,0"),
+        "line 4: x does not rise to 1 m",
+    ),
     "overhang": (long((30, "0.14,0.02")), "line 32: x does not rise to 0.14 m"),
-    "decimal commas": (points("0,0", "0,1,0,2", "2,0"), "line 3: 4 cells, .*decimal comma"),
-    "semicolons": ("x_m;z_m\n0;0\n", "line 1: .*no semicolons .the first line must be x_m,z_m"),
+    "decimal commas": (
+        points("0,0", "0,1,0,2", "2,0"),
+        "line 3: 4 cells, .*decimal comma",
+    ),
+    "semicolons": (
+        "x_m;z_m\n0;0\n",
+        "line 1: .*no semicolons .the first line must be x_m,z_m",
+    ),
     **{
-        f"not a number: {cell}": (points("0,0", f"1,{cell}", "2,0"), f"line 3: {message}")
+        f"not a number: {cell}": (
+            points("0,0", f"1,{cell}", "2,0"),
+            f"line 3: {message}",
+        )
         for cell, message in {
             "nan": "z_m: nan is not a number up to",
             "inf": "z_m: inf is not a number up to",
@@ -60,16 +77,28 @@ BAD: dict[str, tuple[str | bytes, str]] = {
         }.items()
     },
     "a missing cell": (points("0,0", "1", "2,0"), "line 3: the cell of z_m is empty"),
-    "a gap": (long((30, "0.9,0.0"), *((i, f"{0.9 + i / 200},0") for i in range(31, 60))), "a gap"),
-    "too steep": (points("0,0", "1,0.1", "1.01,0.9", "3,0"), "line 4: 89 deg at x = 1 m, above"),
+    "a gap": (
+        long((30, "0.9,0.0"), *((i, f"{0.9 + i / 200},0") for i in range(31, 60))),
+        "a gap",
+    ),
+    "too steep": (
+        points("0,0", "1,0.1", "1.01,0.9", "3,0"),
+        "line 4: 89 deg at x = 1 m, above",
+    ),
     "level": (points("0,0.3", "1,0.3", "2,0.3"), "level: it has no height"),
-    "too many points": (points(*(f"{i},{i % 2}" for i in range(4000))), "4000 points, more than"),
+    "too many points": (
+        points(*(f"{i},{i % 2}" for i in range(4000))),
+        "4000 points, more than",
+    ),
     "Latin 1": ("x_m,z_m,Höhe\n".encode("latin-1"), "not a readable text file"),
     "binary": (b"\x7fELF\0\0\x01\0", "binary, not text"),
     "too large": (b"x_m,z_m\n" + b"0,0\n" * 6_000_000, "larger than 20 MiB"),
 }
 UNFIT = [
-    ('"scan.csv", height = 0.1', r"bed.profile: it has its own height \(leave out bed.height"),
+    (
+        '"scan.csv", height = 0.1',
+        r"bed.profile: it has its own height \(leave out bed.height",
+    ),
     ('"scan.csv", shape = "dune"', "it has its own shape"),
     ('"scan.csv", smoothing = -1.0', "bed.smoothing: -1.0 is not accepted"),
     ('"scan.csv", smoothing = 0.1', r"smoothing over 0.1 m leaves nothing of 0.14 m"),
@@ -111,8 +140,12 @@ def test_a_scene_is_what_a_profile_holds_and_a_study_is_whole_without_the_file(
     tmp_path: Path,
 ) -> None:
     scene = scene_of(tmp_path, GOOD)
-    shifted = "\n".join(["note,x_m,z_m", "a,1,5", "b,1.05,5.01", "c,1.1,5.02", "d,1.14,5"])
-    np.testing.assert_allclose(of_bed(scene_of(tmp_path, shifted).bed).x, of_bed(scene.bed).x)
+    shifted = "\n".join(
+        ["note,x_m,z_m", "a,1,5", "b,1.05,5.01", "c,1.1,5.02", "d,1.14,5"]
+    )
+    np.testing.assert_allclose(
+        of_bed(scene_of(tmp_path, shifted).bed).x, of_bed(scene.bed).x
+    )
     assert scene_of(tmp_path, GOOD.replace("0.02", "0.021")).id != scene.id
     assert scene_of(tmp_path, GOOD.replace("\n", "\r\n")).id == scene.id
     asked = study.parse(STUDY, name="a", where=str(tmp_path / "a.toml"))
@@ -126,7 +159,9 @@ def test_noise_is_smoothed_and_the_ends_stay() -> None:
     x = np.linspace(0, 1, 10_000)
     hill = 0.02 * np.exp(-(((x - 0.5) / 0.1) ** 2))
     noisy = hill + 1e-4 * np.random.default_rng(1).standard_normal(len(x))
-    rows = points(*(f"{a!r},{b!r}" for a, b in zip(x.tolist(), noisy.tolist(), strict=True)))
+    rows = points(
+        *(f"{a!r},{b!r}" for a, b in zip(x.tolist(), noisy.tolist(), strict=True))
+    )
     smooth = profile.read_profile(rows, "scan", "scan", 0.02)
     assert len(smooth.x) < 300
     exact = np.interp(np.array(smooth.x), x, hill)
@@ -134,12 +169,20 @@ def test_noise_is_smoothed_and_the_ends_stay() -> None:
     assert smooth.x[-1] == pytest.approx(1.0)
 
 
-def test_points_nearer_than_mesh_or_grains_can_follow_are_refused(tmp_path: Path) -> None:
+def test_points_nearer_than_mesh_or_grains_can_follow_are_refused(
+    tmp_path: Path,
+) -> None:
     """A second point 1e-6 m from another once took a fifth of the stress away."""
-    for distance, flow, near in ((2e-5, "solve", 1), (2e-5, "flat", 1), (1e-4, "solve", 0)):
+    for distance, flow, near in (
+        (2e-5, "solve", 1),
+        (2e-5, "flat", 1),
+        (1e-4, "solve", 0),
+    ):
         second = f"{0.05 + distance!r},{0.01 + 0.2 * distance!r}"
         content = points("0,0", "0.05,0.01", second, "0.1,0.02", "0.14,0")
         text = STUDY.replace('"flat"', f'"{flow}"').replace("1e-3", "3e-4")
-        refused = pytest.raises(InputError, match=r"bed.profile: points at x = 0.05.* nearer")
+        refused = pytest.raises(
+            InputError, match=r"bed.profile: points at x = 0.05.* nearer"
+        )
         with refused if near else nullcontext():
             scene_of(tmp_path, content, text)

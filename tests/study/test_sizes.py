@@ -35,13 +35,21 @@ def test_the_median_of_a_sieve_table_is_the_diameter() -> None:
 
 
 def test_roughness_is_a_part_of_the_percentile_that_it_names() -> None:
-    roughness = _grain("diameter = 1e-3\nsizes = { sigma_g = 1.5 }", "d84/10").bed.roughness
-    assert roughness == pytest.approx(parts.percentile(LogNormal(sigma_g=1.5), 1e-3, 0.84) / 10)
+    roughness = _grain(
+        "diameter = 1e-3\nsizes = { sigma_g = 1.5 }", "d84/10"
+    ).bed.roughness
+    assert roughness == pytest.approx(
+        parts.percentile(LogNormal(sigma_g=1.5), 1e-3, 0.84) / 10
+    )
 
 
 @pytest.mark.parametrize("dimensions", [2, 3])
-@pytest.mark.parametrize("mixture", [SIEVE, LogNormal(sigma_g=1.4, smallest=0.5, largest=2.0)])
-def test_the_grains_that_are_drawn_have_the_mixtures_mass(mixture: Sizes, dimensions: int) -> None:
+@pytest.mark.parametrize(
+    "mixture", [SIEVE, LogNormal(sigma_g=1.4, smallest=0.5, largest=2.0)]
+)
+def test_the_grains_that_are_drawn_have_the_mixtures_mass(
+    mixture: Sizes, dimensions: int
+) -> None:
     drawn = poured.drawn(mixture, 1e-3, 100_000, 3, dimensions) * 1e-3
     mass = drawn**dimensions / (drawn**dimensions).sum()
     for part in (0.2, 0.45, 0.7):
@@ -102,7 +110,9 @@ def test_a_sieve_table_may_be_a_file_beside_the_study(tmp_path: Path) -> None:
     sieve.write_text("diameter_m,fraction\n5e-4,0.2\n1e-3,0.5\n\n2e-3,0.3\n")
     asked = study.load(str(source))
     assert asked.scenes[0].grain.sizes == SIEVE
-    again = study.parse(asked.text, name="m", where=str(tmp_path / "elsewhere" / "m.toml"))
+    again = study.parse(
+        asked.text, name="m", where=str(tmp_path / "elsewhere" / "m.toml")
+    )
     assert again.scenes[0].id == asked.scenes[0].id
 
 

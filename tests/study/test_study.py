@@ -35,7 +35,9 @@ def _parse(text: str) -> study.Study:
 
 
 def test_axes_span_a_grid_in_the_files_order() -> None:
-    axes = '[axes]\n"bed.slope_deg" = [0.0, 10.0]\n"grain.diameter" = [1e-3, 2e-3, 3e-3]\n'
+    axes = (
+        '[axes]\n"bed.slope_deg" = [0.0, 10.0]\n"grain.diameter" = [1e-3, 2e-3, 3e-3]\n'
+    )
     points = [(s.bed.slope_deg, s.grain.diameter) for s in _parse(axes).scenes]
     assert points == [*product((0.0, 10.0), (1e-3, 2e-3, 3e-3))]
     scenes = _parse(f'seeds = 3\n{PILE}packing = "poured"').scenes
@@ -43,7 +45,9 @@ def test_axes_span_a_grid_in_the_files_order() -> None:
 
 
 def test_a_group_overrides_the_tables_at_the_top_and_may_share_a_scene() -> None:
-    group = '[[group]]\nname = "one"\ngrain = { density = 3000.0 }\n[[group]]\n[[group]]\n'
+    group = (
+        '[[group]]\nname = "one"\ngrain = { density = 3000.0 }\n[[group]]\n[[group]]\n'
+    )
     asked = _parse(f"seeds = 0\n{GRAIN}density = 2650.0\n{group}")
     assert [group.name for group in asked.groups] == ["one", "group 2", "group 3"]
     assert [len(group.scenes) for group in asked.groups] == [1, 1, 1]
@@ -65,7 +69,9 @@ def test_the_id_follows_the_content_alone() -> None:
     same = Scene(grain=dense, bed=GrainBed(roughness=1e-4), forces=law)
     other = Scene(grain=Grain(diameter=1e-3), bed=GrainBed(roughness=1.1e-4))
     assert one.id == same.id != other.id
-    copy = Scene.model_validate_json(canonical_json(one.model_dump(mode="json")), strict=False)
+    copy = Scene.model_validate_json(
+        canonical_json(one.model_dump(mode="json")), strict=False
+    )
     assert copy == one
     (scene,) = _parse(f"{GRAIN}[bed]\nroughness = 'd/10'\n").scenes
     assert scene.id == one.id
@@ -74,7 +80,9 @@ def test_the_id_follows_the_content_alone() -> None:
     assert named.scenes[1].id == _parse(air + GRAIN).scenes[0].id
     level = PILE.replace("15.0", "0.0")
     asked = f"{level}shape = 'flat'\n[flow]\nmodel = 'flat'\n"
-    assert _parse(level.replace("pile", "flat")).scenes[0].id == _parse(asked).scenes[0].id
+    assert (
+        _parse(level.replace("pile", "flat")).scenes[0].id == _parse(asked).scenes[0].id
+    )
 
 
 FENCE = "obstacles = [{ kind = 'fence', x = -9.0, height = %g }]\n"
@@ -118,25 +126,56 @@ BAD = [
     (GRAIN + "[bed]\nkind = 'flatt'\n", "bed.kind", "write grain, pile, or a shape: "),
     ("fluid = { kind = 'air', density = 1.2 }\n", "fluid.density", "air has its own"),
     ("fluid.temperature_deg_c = 5\n", "fluid.kind", "choose water, seawater, air"),
-    ("fluid = { kind = 'air', temperature_deg_c = 288 }\n", "fluid.temperature_deg_c", "-80"),
+    (
+        "fluid = { kind = 'air', temperature_deg_c = 288 }\n",
+        "fluid.temperature_deg_c",
+        "-80",
+    ),
     (GRAIN + "[bed]\nheight = 0.02\n", "bed.height", 'kind = "pile"'),
     (GRAIN + "[forces]\nlaw = 'bridge'\n", "forces.law", "'bridged', "),
-    *((text + TURNED % law, where, "turns") for law in TURNING for text, where in TURNS_NOT),
+    *(
+        (text + TURNED % law, where, "turns")
+        for law in TURNING
+        for text, where in TURNS_NOT
+    ),
     ("[protocol]\ngravity = 3.7\n", "protocol.gravity", "did you mean fluid.gravity?"),
     (f"name = 'one'\n{GRAIN}", "name", "known keys"),
     ("gravity = 3.7\n", "gravity", "did you mean fluid.gravity?"),
-    ("[fluid]\ntolerance = 0.1\n", "fluid.tolerance", "tolerance, above the first table"),
+    (
+        "[fluid]\ntolerance = 0.1\n",
+        "fluid.tolerance",
+        "tolerance, above the first table",
+    ),
     ("[grain]\nviscosity = 1e-6\n", "grain.viscosity", "did you mean fluid.viscosity?"),
     (f"{PILE}[flow]\nnodes = true\n", "flow.nodes", "flow.roughness"),
     (f"{PILE}[flow]\nnodes = false\n", "flow.nodes", "leave it out"),
     (f'{PILE}[axes]\n"flow.model" = ["hill"]\n', "flow.model", 'write "waves"'),
     (PILE + "height = 2e-3\n", "bed.height", "at least 0.005 m"),
-    (PILE + FENCE % 0.1 + "[flow]\ntop = 'open water'\ndepth = 0.2\n", "flow.depth", "obstacles"),
-    (PILE + FENCE % 1.0, "flow.lid", "2 m is less than 3 heights of the forms or obstacles"),
+    (
+        PILE + FENCE % 0.1 + "[flow]\ntop = 'open water'\ndepth = 0.2\n",
+        "flow.depth",
+        "obstacles",
+    ),
+    (
+        PILE + FENCE % 1.0,
+        "flow.lid",
+        "2 m is less than 3 heights of the forms or obstacles",
+    ),
     (GRAIN + "[flow]\ngusts = { intensity = 0.4 }\n", "flow.gusts.events", "missing"),
-    (GRAIN + "[flow]\ngusts = { intensity = 2.0, events = 9 }\n", "flow.gusts.intensity", "1"),
-    *((BY_DEM + text, where, 'protocol.method = "auto"') for text, where in DEM_KNOWS_NOT),
-    (GRAIN + "[forces]\nsheltering = 'balanced'\n", "forces.sheltering", "no neighbours"),
+    (
+        GRAIN + "[flow]\ngusts = { intensity = 2.0, events = 9 }\n",
+        "flow.gusts.intensity",
+        "1",
+    ),
+    *(
+        (BY_DEM + text, where, 'protocol.method = "auto"')
+        for text, where in DEM_KNOWS_NOT
+    ),
+    (
+        GRAIN + "[forces]\nsheltering = 'balanced'\n",
+        "forces.sheltering",
+        "no neighbours",
+    ),
     (GRAIN + "sizes = { sigma_g = 1.3 }\n", "grain.sizes", "it is of poured beds"),
     ("[axes]\ndiameter = [1e-3]\n", "axes.diameter", "grain.diameter"),
     ("[axes]\n'grain.diameter' = 1e-3\n", "axes.grain.diameter", "list"),
@@ -145,12 +184,17 @@ BAD = [
     ("group = []\n", "group", "at least 1"),
     ("[[group]]\ncolour = 1\n", "group 1: colour", "known keys"),
     ("[[group]]\n[group.grain]\ndiametre = 1\n", "group 1: grain.diametre", "diameter"),
-    *((f"seeds = {seeds}\n{PILE}", "seeds", "should be") for seeds in ("-1", "true", "2000")),
+    *(
+        (f"seeds = {seeds}\n{PILE}", "seeds", "should be")
+        for seeds in ("-1", "true", "2000")
+    ),
 ]
 
 
 @pytest.mark.parametrize(("text", "where", "word"), BAD)
-def test_bad_files_are_refused_with_place_and_reason(text: str, where: str, word: str) -> None:
+def test_bad_files_are_refused_with_place_and_reason(
+    text: str, where: str, word: str
+) -> None:
     with pytest.raises(InputError) as caught:
         _parse(text)
     assert caught.value.where == (f"test.toml: {where}" if where else "test.toml")
@@ -177,7 +221,9 @@ def test_a_law_that_turns_the_grain_is_answered_on_a_long_bed() -> None:
 def test_the_scenes_of_all_groups_together_are_limited() -> None:
     few = "[[group]]\ngrain = { diameter = 1e-3 }\n"
     many = f"[[group]]\n[group.axes]\n'grain.diameter' = [{', '.join(['1e-3'] * 99_999)}]\n"
-    with pytest.raises(InputError, match="group 3: axes: more than 100000 scenes in the study"):
+    with pytest.raises(
+        InputError, match="group 3: axes: more than 100000 scenes in the study"
+    ):
         _parse(few + few + many)
 
 
@@ -199,7 +245,9 @@ def test_the_closed_form_bears_the_ends_of_all_ranges_together() -> None:
     assert len(scenes) >= 2 ** len(ENDS)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert all(closed_form.closed_form(scene).friction_velocity > 0 for scene in scenes)
+        assert all(
+            closed_form.closed_form(scene).friction_velocity > 0 for scene in scenes
+        )
 
 
 GRAVEL = """
@@ -211,7 +259,10 @@ flow = {{ top = "open water", depth = {depth} }}
 LEVEL = {
     "lattice": ("", ""),
     "poured in a plane": (', packing = "poured"', ", sizes = { sigma_g = 1.3 }"),
-    "poured strip": (', packing = "poured", width = 6.0', ", sizes = { sigma_g = 1.3 }"),
+    "poured strip": (
+        ', packing = "poured", width = 6.0',
+        ", sizes = { sigma_g = 1.3 }",
+    ),
 }
 
 
@@ -221,13 +272,17 @@ def test_a_level_bed_has_no_height(bed: str) -> None:
     fields, sizes = LEVEL[bed]
     asked = _parse(GRAVEL.format(bed=fields, sizes=sizes, depth=0.4))
     limits.check_study(asked)
-    given = _parse(GRAVEL.format(bed=f"{fields}, height = 0.15", sizes=sizes, depth=0.4))
+    given = _parse(
+        GRAVEL.format(bed=f"{fields}, height = 0.15", sizes=sizes, depth=0.4)
+    )
     assert [scene.id for scene in asked.scenes] == [scene.id for scene in given.scenes]
     (gravel,) = asked.scenes
     small = GRAVEL.replace("0.03", "3e-4").format(bed=fields, sizes=sizes, depth=0.4)
     pourings = [Geometry(scene).pouring for scene in (gravel, _parse(small).scenes[0])]
     assert pourings[0] == pourings[1]  # in diameters
     least = 3 * 0.03 * parts.extremes(gravel.grain.sizes, 0.03)[1]
-    with pytest.raises(InputError, match=rf"flow.depth: 0.08 m .* \(at least {least:.4g} m\)"):
+    with pytest.raises(
+        InputError, match=rf"flow.depth: 0.08 m .* \(at least {least:.4g} m\)"
+    ):
         _parse(GRAVEL.format(bed=fields, sizes=sizes, depth=0.08))
     _parse(GRAVEL.format(bed=fields, sizes=sizes, depth=round(least, 4)))

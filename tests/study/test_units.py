@@ -125,8 +125,12 @@ def test_a_profile_in_millimetres_is_asked_about(tmp_path: Path) -> None:
     assert questions[0].startswith(what)
 
 
-@pytest.mark.parametrize("sizes", ["[[12.0, 0.5], [64.0, 0.5]]", "[[0.6, 0.5], [2.0, 0.5]]"])
-def test_a_sieve_table_in_millimetres_is_asked_about(sizes: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "sizes", ["[[12.0, 0.5], [64.0, 0.5]]", "[[0.6, 0.5], [2.0, 0.5]]"]
+)
+def test_a_sieve_table_in_millimetres_is_asked_about(
+    sizes: str, tmp_path: Path
+) -> None:
     bed = "bed = { kind = 'flat', packing = 'poured', length = 100.0 }\n"
     (tmp_path / "sieve.csv").write_text("diameter_m,fraction\n0.6,0.5\n64,0.5\n")
     for written, grain in ((sizes, sizes), ("sieve.csv", "'sieve.csv'")):

@@ -11,16 +11,29 @@ from orchestrator.errors import OrchestratorError
 from orchestrator.runs.files import Folder
 from orchestrator.tables import COLUMNS
 
-FORMULAS = ["=1+1", "+A1", "-A1", "@SUM(A1)", "\t=1", "\r=1", "=cmd|' /C calc'!A0", "-rf"]
+FORMULAS = [
+    "=1+1",
+    "+A1",
+    "-A1",
+    "@SUM(A1)",
+    "\t=1",
+    "\r=1",
+    "=cmd|' /C calc'!A0",
+    "-rf",
+]
 
 
 def test_no_name_is_a_formula_and_all_else_is_as_it_is() -> None:
     written = tables.csv(pd.DataFrame({"group": FORMULAS, "d_m": -1.5}))
     escaped = [f"'{name}".replace("\r", "\n") for name in FORMULAS]
     assert written == pd.DataFrame({"group": escaped, "d_m": -1.5}).to_csv(index=False)
-    table = pd.DataFrame({"name": ["sand", "", None, "1-A", "'x", "-3.5", "+1e-3", "-inf"]})
+    table = pd.DataFrame(
+        {"name": ["sand", "", None, "1-A", "'x", "-3.5", "+1e-3", "-inf"]}
+    )
     assert tables.csv(table) == table.to_csv(index=False)
-    assert "-1.0000," in tables.csv(pd.DataFrame({"number": [-1.0], "truth": True}), "%.4f")
+    assert "-1.0000," in tables.csv(
+        pd.DataFrame({"number": [-1.0], "truth": True}), "%.4f"
+    )
 
 
 def test_tables_come_back(tmp_path: Path) -> None:
@@ -44,8 +57,12 @@ def test_tables_come_back(tmp_path: Path) -> None:
     assert list(tables.read(folder, "tables")) == ["single_grain"]
     again = tables.read(folder, "tables")["single_grain"]
     pd.testing.assert_frame_equal(again, table)
-    meanings = pd.read_csv(tmp_path / "tables" / "columns.csv").set_index("column")["meaning"]
-    assert meanings.to_dict() == {column: COLUMNS[column] for column in sorted(map(str, table))}
+    meanings = pd.read_csv(tmp_path / "tables" / "columns.csv").set_index("column")[
+        "meaning"
+    ]
+    assert meanings.to_dict() == {
+        column: COLUMNS[column] for column in sorted(map(str, table))
+    }
     with pytest.raises(OrchestratorError, match="no tables"):
         tables.read(folder, "elsewhere")
 

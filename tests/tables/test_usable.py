@@ -14,14 +14,36 @@ from orchestrator.tables.usable import with_scatter, with_usable
 
 NAN = float("nan")
 SOUND = {
-    **{"scene_id": "a", "alpha_deg": 15.0, "d_m": 1e-3, "z0_over_d": 1 / 30, "nu_m2_s": 1e-5},
-    **{"force_law": "bridged", "reynolds": 60.0, "shields": 0.05, "fraction": 0.3, "count": 65},
-    **{"highest_fraction": 0.8, "share_carried_off": 0.0, "error_estimate": 0.03, "u_e_m_s": 10.0},
+    **{
+        "scene_id": "a",
+        "alpha_deg": 15.0,
+        "d_m": 1e-3,
+        "z0_over_d": 1 / 30,
+        "nu_m2_s": 1e-5,
+    },
+    **{
+        "force_law": "bridged",
+        "reynolds": 60.0,
+        "shields": 0.05,
+        "fraction": 0.3,
+        "count": 65,
+    },
+    **{
+        "highest_fraction": 0.8,
+        "share_carried_off": 0.0,
+        "error_estimate": 0.03,
+        "u_e_m_s": 10.0,
+    },
     **{"shields_low": 0.048, "shields_high": 0.052, "ustar0_m_s": 0.6},
 }
 SCENE = {
     **{"scene_id": "a", "rho_f_kg_m3": 1.0, "alpha_s": 1.0, "h_m": 0.02},
-    **{"flow_top": "boundary layer", "depth_m": None, "relative_size": 1.0, "beta_deg": 60.0},
+    **{
+        "flow_top": "boundary layer",
+        "depth_m": None,
+        "relative_size": 1.0,
+        "beta_deg": 60.0,
+    },
     **{"rho_sol_kg_m3": 2500.0, "g_m_s2": 9.81, "z0_m": 3e-5},
 }
 STOPPED = {"answered_final_fraction": 0.8}
@@ -41,15 +63,35 @@ UNREACHED = {"reynolds": NAN, "shields": NAN, "share_carried_off": NAN}
         (None, {"reynolds": 1.0}, []),  # a hydraulically smooth bed
         (None, {"count": 3}, ["0.3 of 3 grains is less than one"]),
         (None, {"row_hold": 2.3}, ["hold the first grain up to 2.3 times"]),
-        (None, {"share_carried_off": 0.76}, ["lift carried off 76% of the moved grains"]),
+        (
+            None,
+            {"share_carried_off": 0.76},
+            ["lift carried off 76% of the moved grains"],
+        ),
         (None, {"error_estimate": NAN}, ["is not known"]),
         (0.02, {}, ["known error 3.0% is above the tolerance of 0.02"]),
         (None, UNREACHED, ["not reached: at most 80% of 65 grains moved"]),
-        (None, {**UNREACHED, **STOPPED}, ["moved, since the run ends at protocol.final_fraction"]),
-        (None, {"shields_high": NAN}, ["interval open above: at most 80% of 65 grains moved"]),
+        (
+            None,
+            {**UNREACHED, **STOPPED},
+            ["moved, since the run ends at protocol.final_fraction"],
+        ),
+        (
+            None,
+            {"shields_high": NAN},
+            ["interval open above: at most 80% of 65 grains moved"],
+        ),
         (None, {"shields_high": NAN, **STOPPED}, ["final_fraction = 0.8 (raise it)"]),
-        (None, {"shields_high": NAN, "error_estimate": 3.75}, ["above: the known error is 375%"]),
-        (None, {"shields_high": NAN, "scatter": 1.2}, ["above: the scatter over seeds is 120%"]),
+        (
+            None,
+            {"shields_high": NAN, "error_estimate": 3.75},
+            ["above: the known error is 375%"],
+        ),
+        (
+            None,
+            {"shields_high": NAN, "scatter": 1.2},
+            ["above: the scatter over seeds is 120%"],
+        ),
     ],
 )
 def test_reasons_against_a_sound_threshold_with_some_changes(
@@ -92,11 +134,15 @@ def grain(bed: str, forces: str = "") -> str:
         (grain("roughness = 1e-12").replace("2e-4", "1e-3"), "smooth wall", True),
     ],
 )
-def test_thresholds_beyond_the_model(tmp_path: Path, text: str, reason: str, applies: bool) -> None:
+def test_thresholds_beyond_the_model(
+    tmp_path: Path, text: str, reason: str, applies: bool
+) -> None:
     text += 'grain.density = 2650.0\nprotocol.method = "pivot"\n'
     asked = study.parse(text, name="t", where="t")
     made = tables.make(asked, plan.make(asked), tmp_path, ())
-    why_not = made["pile_threshold" if text.startswith(PILE) else "single_grain"]["why_not"]
+    why_not = made["pile_threshold" if text.startswith(PILE) else "single_grain"][
+        "why_not"
+    ]
     has_reason = why_not.str.contains(reason) if reason else why_not != ""
     assert has_reason.eq(applies).all()
 
@@ -109,22 +155,40 @@ def test_a_channel_is_laminar_by_its_flow_where_it_has_no_mean_velocity(
     """However much larger the stress on the grains that have moved is than that of the flow."""
     nu, depth, z0 = 1e-5, 0.04, 3e-5
     ustar0 = np.geomspace(0.005, 0.1, 40)
-    channel = {"flow_top": "closed channel" if closed else "open water", "depth_m": depth}
+    channel = {
+        "flow_top": "closed channel" if closed else "open water",
+        "depth_m": depth,
+    }
     rows = [
-        {**SOUND, "scene_id": str(n), "nu_m2_s": nu, "ustar0_m_s": u, "reynolds": factor * u * 100}
+        {
+            **SOUND,
+            "scene_id": str(n),
+            "nu_m2_s": nu,
+            "ustar0_m_s": u,
+            "reynolds": factor * u * 100,
+        }
         for n, u in enumerate(ustar0)
     ]
-    scenes = [{**SCENE, **channel, "scene_id": str(n), "z0_m": z0} for n in range(len(rows))]
+    scenes = [
+        {**SCENE, **channel, "scene_id": str(n), "z0_m": z0} for n in range(len(rows))
+    ]
     made = with_usable(pd.DataFrame(rows), pd.DataFrame(scenes), None)
     speeds = measurable_speeds(
-        ustar0, roughness=1e-3 / 30, viscosity=nu, density=1.0, depth=depth, closed=closed
+        ustar0,
+        roughness=1e-3 / 30,
+        viscosity=nu,
+        density=1.0,
+        depth=depth,
+        closed=closed,
     )
     has_no_mean = np.isnan(speeds["mean_velocity_m_s"])
     assert 0 < has_no_mean.sum() < len(rows)
     assert made["why_not"].str.contains("laminar flow").tolist() == has_no_mean.tolist()
 
 
-def scattered(shields: list[float], chosen: slice = slice(None), **changes: Any) -> pd.DataFrame:
+def scattered(
+    shields: list[float], chosen: slice = slice(None), **changes: Any
+) -> pd.DataFrame:
     """Three seeds of one pile, one regular pile of its slope, one of another, two of level rows."""
     names, slope = list("abcdefg"), [15.0, 15.0, 15.0, 15.0, 30.0, 15.0, 15.0]
     columns = {
@@ -136,7 +200,13 @@ def scattered(shields: list[float], chosen: slice = slice(None), **changes: Any)
     }
     scenes = {
         **{"scene_id": names, "alpha_deg": slope, "stiffness": 1e3},
-        "packing": [*["disordered"] * 3, "aligned", "aligned", "horizontal", "horizontal"],
+        "packing": [
+            *["disordered"] * 3,
+            "aligned",
+            "aligned",
+            "horizontal",
+            "horizontal",
+        ],
         "seed": [0.0, 1.0, 2.0, NAN, NAN, NAN, 1.0],
         **changes,
     }
@@ -153,8 +223,12 @@ def test_half_the_range_over_seeds_widens_the_intervals_of_similar_piles() -> No
     expected = [0.05, 0.05, 0.05, 0.05, NAN, 0.1, 0.1]
     assert table["scatter"].tolist() == pytest.approx(expected, nan_ok=True)
     wider = table["scatter"].fillna(0.0)
-    assert table["shields_low"].tolist() == pytest.approx(table["shields"] * 0.98 / (1 + wider))
-    assert table["shields_high"].tolist() == pytest.approx(table["shields"] * 1.02 / (1 - wider))
+    assert table["shields_low"].tolist() == pytest.approx(
+        table["shields"] * 0.98 / (1 + wider)
+    )
+    assert table["shields_high"].tolist() == pytest.approx(
+        table["shields"] * 1.02 / (1 - wider)
+    )
     # lift that carries grains off, another parameter that differs, a seed alone: no scatter
     lifted = scattered(SHIELDS, share_carried_off=[1.0] * 3 + [0.0] * 4)
     assert lifted["scatter"].isna()["d"]
@@ -170,10 +244,17 @@ def test_half_the_range_over_seeds_widens_the_intervals_of_similar_piles() -> No
 
 def test_the_scatter_of_poured_beds_is_of_beds_that_are_poured_alike() -> None:
     names = list("abcdefg")
-    columns = {"scene_id": names, "alpha_deg": 15.0, "force_law": "high", "fraction": 0.5}
+    columns = {
+        "scene_id": names,
+        "alpha_deg": 15.0,
+        "force_law": "high",
+        "fraction": 0.5,
+    }
     ends = {"shields_low": 0.98, "shields_high": 1.02}
     shields = [0.9, 1.1, 0.5, 1.5, 1.0, 1.0, 1.0]
-    thresholds = pd.DataFrame({**columns, **ends, "share_carried_off": 0.0, "shields": shields})
+    thresholds = pd.DataFrame(
+        {**columns, **ends, "share_carried_off": 0.0, "shields": shields}
+    )
     # strips and beds in one plane with two seeds each; another mixture, a lattice, level rows
     scenes = pd.DataFrame(
         {
@@ -185,4 +266,6 @@ def test_the_scatter_of_poured_beds_is_of_beds_that_are_poured_alike() -> None:
         }
     )
     scatter = with_scatter(thresholds, scenes)["scatter"]
-    assert scatter.tolist() == pytest.approx([0.1, 0.1, 0.5, 0.5, NAN, NAN, NAN], nan_ok=True)
+    assert scatter.tolist() == pytest.approx(
+        [0.1, 0.1, 0.5, 0.5, NAN, NAN, NAN], nan_ok=True
+    )
