@@ -12,7 +12,8 @@ import pandas as pd
 
 from orchestrator import paper, pipeline, report, tables
 from orchestrator.calculator import PARAMETERS
-from orchestrator.calculator.cli import OPTIONS, answered
+from orchestrator.calculator.asked import thresholds_and_questions
+from orchestrator.calculator.cli import OPTIONS
 from orchestrator.errors import InputError, OrchestratorError, SolverError
 from orchestrator.report.results import Results
 from orchestrator.runs.workspace import Workspace
@@ -123,7 +124,9 @@ def threshold(
         raise InputError("the arrays have no point", "threshold", remedy)
     names = {name: name for name in OPTIONS}
     form = "{} {:.4g}"
-    table, asked = answered(points, law or "auto", fluid, temperature, names, form)
+    table, asked = thresholds_and_questions(
+        points, law or "auto", fluid, temperature, names, form
+    )
     if asked:
         warnings.warn("; ".join(asked), stacklevel=2)
     rows = pd.DataFrame(table)

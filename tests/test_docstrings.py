@@ -26,6 +26,11 @@ PHYSICS = (
 """Modules whose public functions have an example each."""
 DESCRIBED = (
     *PHYSICS,
+    "orchestrator.calculator",
+    "orchestrator.calculator.asked",
+    "orchestrator.calculator.cli",
+    "orchestrator.calculator.printed",
+    "orchestrator.calculator.table",
     "orchestrator.digits",
     "orchestrator.errors",
     "orchestrator.experiments.budget",

@@ -1,4 +1,4 @@
-"""The command `threshold`: closed-form thresholds of single grains, for one or for ranges.
+"""The command `threshold`: closed-form thresholds of single grains.
 
 Here are its parameters and results, by every name that they have.
 """
@@ -10,42 +10,67 @@ from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
 
 
 class Parameter(NamedTuple):
-    """A number that the closed form depends on."""
+    """A number that the closed form depends on.
 
-    field: str  # of a study file; the depth has none
-    column: str  # of the table, with the unit
-    label: str  # symbol and unit, for people
-    ordinary: tuple[float, float]  # range in which no limit of a scene can be exceeded
+    Attributes
+    ----------
+    field
+        Its name in a study file; the depth is in none.
+    column
+        Its column of the table, with the unit.
+    label
+        Its symbol and unit, for people.
+    ordinary
+        The range in which no limit of a scene can be exceeded.
+    default
+        Its default: a number, or a part of the diameter.
+    note
+        What the help of the command adds.
+    """
+
+    field: str
+    column: str
+    label: str
+    ordinary: tuple[float, float]
     default: float | str | None = None
-    note: str = ""  # for the help
+    note: str = ""
 
 
 MOST_POINTS = 100_000
-_Z0 = Parameter(
-    "bed.roughness", "z0_m", "z0, m", (1e-12, 1), "d/30", 'or such a part: "d/10"'
-)
-_RHO = Parameter(
-    "fluid.density", "rho_f_kg_m3", "rho_f, kg/m3", (1e-6, 2e4), fluids.PAPER[0]
-)
-_NU = Parameter("fluid.viscosity", "nu_m2_s", "nu, m2/s", (1e-8, 1e3), fluids.PAPER[1])
-_ALPHA = Parameter(
-    "bed.slope_deg", "alpha_deg", "alpha, deg", (0, 30), 0.0, "the flow goes up it"
-)
-_BETA = Parameter("bed.entrainment_angle_deg", "beta_deg", "beta, deg", (30, 60), 60.0)
-_LIFT = Parameter(
-    "forces.lift_coefficient", "alpha_s", "alpha_s", (0, 100), LIFT_COEFFICIENT
-)
+"""Largest number of points of a table."""
 PARAMETERS = {
     "diameter": Parameter("grain.diameter", "d_m", "d, m", (1e-7, 10)),
     "density": Parameter(
         "grain.density", "rho_sol_kg_m3", "rho_sol, kg/m3", (1, 2e4), 2500.0
     ),
-    "fluid_density": _RHO,
-    "viscosity": _NU,
-    "slope_deg": _ALPHA,
-    "entrainment_angle_deg": _BETA,
-    "roughness": _Z0,
-    "lift_coefficient": _LIFT,
+    "fluid_density": Parameter(
+        "fluid.density", "rho_f_kg_m3", "rho_f, kg/m3", (1e-6, 2e4), fluids.PAPER[0]
+    ),
+    "viscosity": Parameter(
+        "fluid.viscosity", "nu_m2_s", "nu, m2/s", (1e-8, 1e3), fluids.PAPER[1]
+    ),
+    "slope_deg": Parameter(
+        "bed.slope_deg",
+        "alpha_deg",
+        "alpha, deg",
+        (0, 30),
+        0.0,
+        note="the flow goes up it",
+    ),
+    "entrainment_angle_deg": Parameter(
+        "bed.entrainment_angle_deg", "beta_deg", "beta, deg", (30, 60), 60.0
+    ),
+    "roughness": Parameter(
+        "bed.roughness",
+        "z0_m",
+        "z0, m",
+        (1e-12, 1),
+        "d/30",
+        note='or such a part: "d/10"',
+    ),
+    "lift_coefficient": Parameter(
+        "forces.lift_coefficient", "alpha_s", "alpha_s", (0, 100), LIFT_COEFFICIENT
+    ),
     "gravity": Parameter("fluid.gravity", "g_m_s2", "g, m/s2", (1e-5, 1e4), GRAVITY),
     "cohesion": Parameter(
         "grain.cohesion",
@@ -53,19 +78,19 @@ PARAMETERS = {
         "cohesion, N/m",
         (0, 1e3),
         0.0,
-        "pull of a contact over d",
+        note="pull of a contact over d",
     ),
     "depth": Parameter(
-        "depth", "depth_m", "depth, m", (0, 0), None, "of a liquid: its mean speed"
+        "depth",
+        "depth_m",
+        "depth, m",
+        (0, 0),
+        note="of a liquid: its mean speed",
     ),
 }
 """By keyword, which is also the name in JSON. The paper's values are the defaults."""
-GEOMETRIC = (
-    "diameter",
-    "viscosity",
-    "roughness",
-    "depth",
-)  # their ranges are geometric
+GEOMETRIC = ("diameter", "viscosity", "roughness", "depth")
+"""Parameters whose ranges are geometric; all others are spaced evenly."""
 QUANTITIES = {
     "ustar_m_s": ("friction_velocity", "u*, m/s"),
     "wind_1m_m_s": ("wind_speed_1_m", "wind at 1 m, m/s"),
@@ -78,4 +103,4 @@ QUANTITIES = {
     "drag_n": ("drag", "drag, N"),
     "lift_n": ("lift", "lift, N"),
 }
-"""Columns of a threshold, each with its name in JSON and its symbol and unit for people."""
+"""Columns of a threshold, each with its name in JSON, and its symbol and unit."""

@@ -17,6 +17,8 @@ from orchestrator.physics.threshold import (
     AUTO,
     LAWS_OF,
     PAPER,
+    SingleGrain,
+    Threshold,
     default_laws,
     regime,
     threshold,
@@ -25,161 +27,216 @@ from orchestrator.physics.threshold import (
 from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.types import FloatArray, Row
 
-Table = dict[str, NDArray[Any]]  # columns of equal length by name
+Table = dict[str, NDArray[Any]]
+"""Columns of equal length by their names."""
 
 
-def thresholds(points: Mapping[str, Any], answer: str = AUTO) -> Table:
-    """Thresholds of single grains under every force law.
+def thresholds(points: Mapping[str, Any], asked: str = AUTO) -> Table:
+    """Find the thresholds of single grains under every force law.
 
     Parameters
     ----------
     points
-        Sequences of equal length by keys of `PARAMETERS`. A parameter that is left out has
-        its default, and the depth none.
-    answer
-        The law that is asked for, ``auto`` for the default law, or the paper's rule.
+        Sequences of equal length by keys of `PARAMETERS`. A parameter that is left out
+        has its default, and the depth none.
+    asked
+        The law that is asked for, ``auto`` for the default law, or ``paper`` for the
+        paper's rule.
 
     Returns
     -------
-    A row for each point and law, point by point. A gas has winds, a liquid of a given depth
-    a mean velocity where its flow is turbulent; the others are NaN. ``answer`` is whether
-    the law is one of those asked for.
+    dict of str to ndarray
+        A row for each point and law, point by point. A gas has winds, a liquid of a
+        given depth a mean velocity where its flow is turbulent; the others are NaN. The
+        column ``answer`` is whether the law is one of those asked for.
 
     Raises
     ------
     InputError
         For a law or a depth that is none, a point that is no scene, or if no law holds
         anywhere.
+
+    Examples
+    --------
+    >>> table = thresholds({"diameter": [1e-3]}, asked="bridged")
+    >>> is_asked = table["answer"]
+    >>> print(table["law"][is_asked], table["ustar_m_s"][is_asked].round(3))
+    ['bridged'] [0.89]
     """
-    if answer not in (AUTO, PAPER):
-        try:
-            law(answer)
-        except InputError as error:
-            remedy = f"{error.remedy}, {AUTO}, {PAPER}"
-            raise InputError(error.what, "threshold: law", remedy) from None
-    count = len(points["diameter"])
-    grains = _grains(points, count)
-    d, density = grains["diameter"], grains["fluid_density"]
-    depth = grains["depth"]
+    _check_law(asked)
+    grains = _grains(points)
     if "depth" in points:
-        _check_depth(depth, d, density)
+        _check_depth(grains)
     exposure = Exposure(
-        d,
+        grains["diameter"],
         grains["roughness"],
-        density,
+        grains["fluid_density"],
         grains["viscosity"],
         grains["lift_coefficient"],
     )
-    rest = {name: grains[name] for name in ("density", "slope_deg", "gravity")}
-    pivot = {
-        "entrainment_angle_deg": grains["entrainment_angle_deg"],
-        "cohesion": grains["cohesion"],
-    }
-    known = {each.column: grains[name] for name, each in PARAMETERS.items()}
-    liquid_depth = np.where(density < GAS_BELOW, np.nan, depth)
-    blocks = []
-    with np.errstate(
-        all="ignore"
-    ):  # numbers beyond all floats end as laws that do not hold
-        by_law = {
-            n: threshold(each, exposure, **rest, **pivot) for n, each in LAWS.items()
-        }
+    inputs = {each.column: grains[name] for name, each in PARAMETERS.items()}
+    # numbers beyond all floats end as laws that do not hold
+    with np.errstate(all="ignore"):
+        by_law = {name: _threshold(name, exposure, grains) for name in LAWS}
         regimes = regime(by_law["low"], by_law["high"]).astype(object)
-        picked = _picked(answer, regimes, by_law["bridged"].friction_velocity, exposure)
+        picked = _picked(asked, regimes, by_law["bridged"].friction_velocity, exposure)
+        blocks = []
         for name, at in by_law.items():
-            ustar = at.friction_velocity
-            block: Table = {"law": np.full(count, name, object)}
-            # columns that are no attribute of a threshold follow below
-            block |= {
-                c: getattr(at, key, density) for c, (key, _) in QUANTITIES.items()
-            }
-            block |= measurable_speeds(
-                ustar,
-                roughness=grains["roughness"],
-                density=density,
-                viscosity=grains["viscosity"],
-                depth=liquid_depth,
-            )
-            block["stress_pa"] = density * ustar**2
-            block["valid"] = at.valid
-            reasons = why_not(LAWS[name], ustar, exposure, **rest)
-            block["why_not"] = np.array(reasons, object)
+            block = _block(name, at, exposure, grains)
             block["regime"] = regimes
-            block |= beside({**known, **block, "force_law": block["law"]})
+            block |= beside({**inputs, **block, "force_law": block["law"]})
             block["answer"] = np.array([name in laws for laws in picked])
             blocks.append(block)
-    table = {column: np.repeat(values, len(LAWS)) for column, values in known.items()}
-    for column in blocks[0]:
-        table[column] = np.stack([block[column] for block in blocks], axis=1).ravel()
+    table = {name: np.repeat(column, len(LAWS)) for name, column in inputs.items()}
+    for name in blocks[0]:
+        of_laws = [block[name] for block in blocks]
+        table[name] = np.stack(of_laws, axis=1).ravel()
     if not table["valid"].any():
         remedy = "are all numbers in SI units?"
         raise InputError("no force law holds", "threshold", remedy)
     return table
 
 
-def _check_depth(depth: FloatArray, d: FloatArray, density: FloatArray) -> None:
+def _check_law(asked: str) -> None:
+    """Refuse a law that is none."""
+    if asked in (AUTO, PAPER):
+        return
+    try:
+        law(asked)
+    except InputError as error:
+        remedy = f"{error.remedy}, {AUTO}, {PAPER}"
+        raise InputError(error.what, "threshold: law", remedy) from None
+
+
+def _check_depth(grains: Table) -> None:
     """Refuse a depth that does not cover the grains, or that of a gas."""
+    depth = grains["depth"]
+    diameter = grains["diameter"]
+    density = grains["fluid_density"]
     remedy = "give the depth of a liquid, in m; of water: fluid.kind water"
-    if not (depth > d).all():
-        what = f"a depth of {depth.min():g} m does not cover a grain of {d.max():g} m"
+    if not (depth > diameter).all():
+        grain = f"a grain of {diameter.max():g} m"
+        what = f"a depth of {depth.min():g} m does not cover {grain}"
         raise InputError(what, "threshold: depth", remedy)
     if (density < GAS_BELOW).all():
-        raise InputError(f"{density[0]:g} kg/m3 is a gas", "threshold: depth", remedy)
+        what = f"{density[0]:g} kg/m3 is a gas"
+        raise InputError(what, "threshold: depth", remedy)
+
+
+def _threshold(name: str, exposure: Exposure, grains: Table) -> Threshold:
+    """The thresholds of the grains under one force law."""
+    return threshold(
+        LAWS[name],
+        exposure,
+        density=grains["density"],
+        slope_deg=grains["slope_deg"],
+        gravity=grains["gravity"],
+        entrainment_angle_deg=grains["entrainment_angle_deg"],
+        cohesion=grains["cohesion"],
+    )
+
+
+def _block(name: str, at: Threshold, exposure: Exposure, grains: Table) -> Table:
+    """The columns that the threshold under one force law has by itself."""
+    ustar = at.friction_velocity
+    density = grains["fluid_density"]
+    block: Table = {"law": np.full(len(density), name, object)}
+    for column, (attribute, _) in QUANTITIES.items():
+        # the speeds and the stress are no attributes: they follow below
+        block[column] = getattr(at, attribute, density)
+    block |= measurable_speeds(
+        ustar,
+        roughness=grains["roughness"],
+        density=density,
+        viscosity=grains["viscosity"],
+        depth=np.where(density < GAS_BELOW, np.nan, grains["depth"]),
+    )
+    block["stress_pa"] = density * ustar**2
+    block["valid"] = at.valid
+    reasons = why_not(
+        LAWS[name],
+        ustar,
+        exposure,
+        density=grains["density"],
+        slope_deg=grains["slope_deg"],
+        gravity=grains["gravity"],
+    )
+    block["why_not"] = np.array(reasons, object)
+    return block
 
 
 def _picked(
-    answer: str, regimes: NDArray[Any], ustar: FloatArray, exposure: Exposure
+    asked: str,
+    regimes: NDArray[Any],
+    ustar: FloatArray,
+    exposure: Exposure,
 ) -> list[tuple[str, ...]]:
-    """The laws that answer each point; `ustar` is that of its threshold under `bridged`."""
-    if answer == PAPER:
+    """The laws that answer each point; `ustar` is its threshold under `bridged`."""
+    if asked == PAPER:
         return [LAWS_OF[regime] for regime in regimes]
-    if answer == AUTO:
-        names = default_laws(ustar, exposure)
-        return [(name,) for name in np.broadcast_to(names, len(regimes)).tolist()]
-    return [(answer,)] * len(regimes)
+    if asked == AUTO:
+        names = np.broadcast_to(default_laws(ustar, exposure), len(regimes))
+        return [(name,) for name in names.tolist()]
+    return [(asked,)] * len(regimes)
 
 
-def _grains(points: Mapping[str, Any], count: int) -> Table:
-    """All parameters as numbers.
+def _grains(points: Mapping[str, Any]) -> Table:
+    """All parameters of some points as numbers.
 
-    A point that may be beyond a limit is made a scene, which refuses it or warns; no other point.
+    Only a point that may be beyond a limit is made a scene, which refuses it or warns.
     """
-    given = {
-        name: points.get(name, [each.default] * count)
-        for name, each in PARAMETERS.items()
-    }
-    lengths = [*map(_length, given["roughness"], given["diameter"])]
-    grains = {
-        name: np.array(x, float) for name, x in {**given, "roughness": lengths}.items()
-    }
-    is_safe = grains["density"] > grains["fluid_density"]
-    is_safe &= grains["roughness"] <= 0.3 * grains["diameter"]
-    for name, each in PARAMETERS.items():
-        low, high = each.ordinary
-        is_safe &= (name == "depth") | (grains[name] >= low) & (grains[name] <= high)
-    for index in np.flatnonzero(~is_safe):
-        from orchestrator.fidelity import limits
-        from orchestrator.physics.threshold import SingleGrain
-        from orchestrator.study.closed_form import single_grain
-        from orchestrator.study.study import make_scene
-
-        parts: dict[str, Row] = defaultdict(dict)
-        for name in SingleGrain._fields:
-            part, _, field = PARAMETERS[name].field.partition(".")
-            value = given[name][index]
-            parts[part][field] = value if isinstance(value, str) else float(value)
-        scene = make_scene({**parts, "protocol": {"method": "pivot"}}, "threshold")
-        limits.check(scene, "threshold")
-        for name, number in single_grain(scene)._asdict().items():
-            grains[name][index] = number
+    count = len(points["diameter"])
+    given = {}
+    for name, parameter in PARAMETERS.items():
+        given[name] = points.get(name, [parameter.default] * count)
+    lengths = list(map(_length, given["roughness"], given["diameter"]))
+    grains = {}
+    for name, column in {**given, "roughness": lengths}.items():
+        grains[name] = np.array(column, float)
+    for index in np.flatnonzero(~_is_ordinary(grains)):
+        point = {name: column[index] for name, column in given.items()}
+        for name, value in _as_scene(point)._asdict().items():
+            grains[name][index] = value
     return grains
 
 
-def _length(z0: Any, diameter: float) -> float:
-    """A roughness length, m, of a number or a text such as ``d/30``; NaN of any other text."""
-    if not isinstance(z0, str):
-        return float(z0)
-    part = re.fullmatch(r"d/([1-9]\d*(?:\.\d+)?)", z0, re.ASCII)
-    return (
-        float(f"{diameter / float(part[1]):.12g}") if part else np.nan
-    )  # digits as in a scene
+def _is_ordinary(grains: Table) -> NDArray[np.bool_]:
+    """Whether no limit of a scene can be exceeded, by point."""
+    is_ordinary = grains["density"] > grains["fluid_density"]
+    is_ordinary &= grains["roughness"] <= 0.3 * grains["diameter"]
+    for name, parameter in PARAMETERS.items():
+        if name != "depth":
+            low, high = parameter.ordinary
+            is_ordinary &= (grains[name] >= low) & (grains[name] <= high)
+    return np.asarray(is_ordinary)
+
+
+def _as_scene(point: Mapping[str, Any]) -> SingleGrain:
+    """The grain of a point as its scene has it; an `InputError` if it is no scene."""
+    # most points need none of these modules, which load slowly
+    from orchestrator.fidelity import limits
+    from orchestrator.study.closed_form import single_grain
+    from orchestrator.study.study import make_scene
+
+    parts: dict[str, Row] = defaultdict(dict)
+    for name in SingleGrain._fields:
+        part, _, field = PARAMETERS[name].field.partition(".")
+        value = point[name]
+        parts[part][field] = value if isinstance(value, str) else float(value)
+    scene = make_scene({**parts, "protocol": {"method": "pivot"}}, "threshold")
+    limits.check(scene, "threshold")
+    return single_grain(scene)
+
+
+def _length(roughness: Any, diameter: float) -> float:
+    """A roughness length, m, of a number or of such a part of the diameter as ``d/30``.
+
+    NaN of any other text.
+    """
+    if not isinstance(roughness, str):
+        return float(roughness)
+    part = re.fullmatch(r"d/([1-9]\d*(?:\.\d+)?)", roughness, re.ASCII)
+    if part is None:
+        return np.nan
+    # digits as in a scene
+    return float(f"{diameter / float(part[1]):.12g}")

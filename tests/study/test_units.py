@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from orchestrator.calculator import PARAMETERS
-from orchestrator.calculator.cli import OPTIONS, answered
+from orchestrator.calculator.asked import thresholds_and_questions
+from orchestrator.calculator.cli import OPTIONS
 from orchestrator.errors import InputError
 from orchestrator.study import study, units
 from orchestrator.study.source import presets
@@ -102,7 +103,9 @@ def test_a_study_and_the_command_ask_alike() -> None:
     points = {name: [value] for name, value in parameters.items()}
     fields = {name: each.field for name, each in PARAMETERS.items()}
     names = {**dict.fromkeys(OPTIONS, ""), **fields, "fluid": "fluid.kind"}
-    asked = answered(points, "auto", None, None, names, "{} = {:.4g}")[1]
+    asked = thresholds_and_questions(points, "auto", None, None, names, "{} = {:.4g}")[
+        1
+    ]
     text = "\n".join(f"{fields[name]} = {value}" for name, value in parameters.items())
     assert list(study.parse(text, name="t", where="t").questions) == asked
     assert len(asked) == 5

@@ -1,0 +1,119 @@
+"""Thresholds of points that users give, with questions and refusals in their words."""
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from orchestrator.calculator import PARAMETERS
+from orchestrator.errors import InputError
+from orchestrator.physics.fluids import TEMPERATURE, numbers_of
+from orchestrator.study.units import first, questions
+
+if TYPE_CHECKING:  # this loads numpy
+    from orchestrator.calculator.table import Table
+
+Value = float | str
+"""A number, or a part of the diameter such as ``d/30``."""
+OF_FLUID = {"fluid_density": "density", "viscosity": "viscosity"}
+"""Parameters that a fluid has by its name, as a table ``[fluid]`` calls them."""
+FIELD = re.compile(r"\b([a-z]+\.[a-z_]+|(?<=threshold: )(depth|law))\b")
+"""A field of a study file in a message, or the depth or law that is refused."""
+
+
+def thresholds_and_questions(
+    points: Mapping[str, Sequence[Value]],
+    law: str,
+    fluid: str | None,
+    temperature: float | None,
+    names: Mapping[str, str],
+    form: str,
+) -> tuple["Table", list[str]]:
+    """Find the thresholds of some points, and ask about numbers that seem to be wrong.
+
+    Parameters
+    ----------
+    points
+        Columns of one length, by keys of `PARAMETERS`.
+    law
+        The force law that is asked for, ``auto`` or ``paper``.
+    fluid
+        Name of the fluid in place of density and viscosity.
+    temperature
+        Temperature of that fluid, deg C.
+    names
+        What refusals and questions call the parameters, ``fluid``, ``temperature`` and
+        ``law``.
+    form
+        How a parameter is given a value: a format of its name and the value.
+
+    Returns
+    -------
+    table
+        That of `table.thresholds`.
+    asked
+        The questions of `units.questions`.
+
+    Raises
+    ------
+    InputError
+        What is asked first, then what is wrong.
+    """
+    from orchestrator.calculator.table import thresholds
+
+    fields = {each.field: names[name] for name, each in PARAMETERS.items()}
+    fields["fluid.kind"] = names["fluid"]
+    fields[f"fluid.{TEMPERATURE}"] = names["temperature"]
+    fields["law"] = names["law"]
+    asked: list[str] = []
+    try:
+        points = _of_fluid(points, fluid, temperature)
+        asked = questions(_by_field(points), fields, form)
+        return thresholds(points, law), asked
+    except InputError as error:
+        renamed = InputError(
+            _renamed(error.what, fields),
+            _renamed(error.where, fields),
+            _renamed(error.remedy, fields),
+        )
+        raise first(asked, renamed, "threshold", fields.values()) from None
+
+
+def _of_fluid(
+    points: Mapping[str, Sequence[Value]],
+    fluid: str | None,
+    temperature: float | None,
+) -> Mapping[str, Sequence[Value]]:
+    """The points with the numbers of a fluid; refuses what is given twice."""
+    given: dict[str, Any] = {}
+    if fluid is not None:
+        given["kind"] = fluid
+    if temperature is not None:
+        given[TEMPERATURE] = temperature
+    for name, field in OF_FLUID.items():
+        if name in points:
+            given[field] = points[name]
+    of_fluid = numbers_of(given)
+    if fluid is None:
+        return points
+    count = len(points["diameter"])
+    columns = {name: [of_fluid[field]] * count for name, field in OF_FLUID.items()}
+    return {**points, **columns}
+
+
+def _by_field(points: Mapping[str, Sequence[Value]]) -> dict[str, list[float]]:
+    """The numbers of some points by the fields of a study file, defaults included."""
+    count = len(points["diameter"])
+    numbers = {}
+    for name, parameter in PARAMETERS.items():
+        column = points.get(name, [parameter.default] * count)
+        numbers[parameter.field] = [x for x in column if isinstance(x, int | float)]
+    return numbers
+
+
+def _renamed(text: str, fields: Mapping[str, str]) -> str:
+    """A message on fields of a study file with the names that these have here.
+
+    The rules of a scene refuse the points of the calculator, too, and know its fields
+    alone.
+    """
+    return FIELD.sub(lambda found: fields.get(found[0], found[0]), text)

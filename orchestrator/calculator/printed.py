@@ -1,0 +1,212 @@
+"""What the command `threshold` prints: lines for people, JSON, or CSV."""
+
+import csv
+import json
+import math
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from orchestrator.calculator import PARAMETERS, QUANTITIES
+from orchestrator.physics.constants import GAS_BELOW
+from orchestrator.physics.fluids import PAPER
+
+if TYPE_CHECKING:  # this loads numpy
+    from orchestrator.types import Row
+
+TOO_MANY = ("drag_n", "lift_n")
+"""Quantities that a table for people leaves out."""
+
+
+def print_csv(rows: Sequence["Row"]) -> None:
+    """Print a row for each point and law.
+
+    Parameters
+    ----------
+    rows
+        The rows of `table.thresholds`; a NaN is an empty cell.
+    """
+    writer = csv.writer(sys.stdout, lineterminator="\n")
+    writer.writerow(rows[0])
+    for row in rows:
+        writer.writerow([None if _is_nan(value) else value for value in row.values()])
+
+
+def as_json(rows: Sequence["Row"]) -> str:
+    """Write a record for one point, or a list of records, as JSON.
+
+    Parameters
+    ----------
+    rows
+        The rows of `table.thresholds`.
+
+    Returns
+    -------
+    str
+        A record has the parameters, the laws of the rules, and an object for each law.
+    """
+    from orchestrator.physics.beside import MEASURED, TESTED
+
+    names = {column: name for column, (name, _) in QUANTITIES.items()}
+    for column in ("valid", "why_not", *MEASURED, *TESTED):
+        names[column] = column
+    law_count = len({row["law"] for row in rows})
+    records = []
+    for start in range(0, len(rows), law_count):
+        records.append(_record(rows[start : start + law_count], names))
+    text = json.dumps(records if len(records) > 1 else records[0])
+    # JSON has neither NaN nor Infinity
+    return json.dumps(json.loads(text, parse_constant=lambda _: None), indent=2)
+
+
+def _record(of_laws: Sequence["Row"], names: Mapping[str, str]) -> "Row":
+    """The record of one point, with the rows of its laws."""
+    from orchestrator.physics.threshold import LAWS_OF
+
+    first = of_laws[0]
+    record: Row = {}
+    record["input"] = {n: first[each.column] for n, each in PARAMETERS.items()}
+    record["regime"] = first["regime"]
+    record["paper"] = list(LAWS_OF[first["regime"]])
+    record["answer"] = [row["law"] for row in of_laws if row["answer"]]
+    for row in of_laws:
+        record[row["law"]] = {name: row[column] for column, name in names.items()}
+    return record
+
+
+def as_text(
+    rows: Sequence["Row"],
+    asked: str,
+    varied: Sequence[str],
+    fluid: str | None,
+) -> Iterator[str]:
+    """Write lines for people.
+
+    Parameters
+    ----------
+    rows
+        A row for each point and law, as `table.thresholds` has them.
+    asked
+        The force law that was asked for, ``auto`` or ``paper``.
+    varied
+        The parameters that are ranges, keys of `PARAMETERS`.
+    fluid
+        Name of the fluid, if one was given.
+
+    Yields
+    ------
+    str
+        Of one point the answer and every law, of many points the rows of the answer.
+    """
+    if varied:
+        yield from _of_many(rows, asked, varied)
+    else:
+        yield from _of_one(rows, asked)
+    fluids = {(row["rho_f_kg_m3"], row["nu_m2_s"]) for row in rows}
+    if fluid or fluids == {PAPER}:
+        ((density, viscosity),) = fluids
+        name = fluid or "the paper's fluid (real air: --fluid air)"
+        yield f"{name}: {density:g} kg/m3, {viscosity:.5g} m2/s"
+    liquid = [row for row in rows if row["rho_f_kg_m3"] >= GAS_BELOW]
+    if any(_is_nan(row["depth_m"]) for row in liquid):
+        yield "for the mean velocity of the liquid give its depth, --depth in m"
+    elif any(row["valid"] and _is_nan(row["mean_velocity_m_s"]) for row in liquid):
+        yield "no mean velocity: U D/nu is below 2000, where the flow may be laminar"
+
+
+def _of_one(rows: Sequence["Row"], asked: str) -> Iterator[str]:
+    """The answer for one point, what was measured beside it, and a table of laws."""
+    from orchestrator.physics.beside import sentences
+    from orchestrator.physics.threshold import LAWS_OF
+
+    quantities = _quantities(rows)
+    chosen = [row for row in rows if row["answer"]]
+    grain = f"a grain of {rows[0]['d_m'] * 1000:.4g} mm"
+    yield f"{_subject(rows, asked)} {grain} starts to move at"
+    width = max(map(len, quantities.values()))
+    listed = quantities
+    if len(chosen) > 1:
+        listed = {"law": "", **quantities}
+    for column, label in listed.items():
+        cells = [label.ljust(width)]
+        for row in chosen:
+            cells.append(f"{_cell(row[column]):10}")
+        yield f"  {'  '.join(cells)}".rstrip()
+    yield ""
+    for row in chosen:
+        of_law = f"{row['law']}: " if len(chosen) > 1 else ""
+        for sentence in sentences(row):
+            yield of_law + sentence
+    yield ""
+    quantities.pop("wind_1m_m_s", None)
+    ordered = sorted(rows, key=lambda row: not row["answer"])
+    yield from _as_table(ordered, {"law": "force law", **quantities})
+    laws = " and ".join(LAWS_OF[rows[0]["regime"]])
+    yield f"\nlaws of the paper's rule: {laws}"
+
+
+def _subject(rows: Sequence["Row"], asked: str) -> str:
+    """The law that answers one point, and whether it holds: how its sentence begins."""
+    if asked == "paper":  # which gives both of its laws where neither holds
+        return "The paper's rule:"
+    chosen = next(row for row in rows if row["answer"])
+    if chosen["valid"]:
+        return f"Force law {chosen['law']}:"
+    holding = ", ".join(f"--law {row['law']}" for row in rows if row["valid"])
+    reason = f"Force law {chosen['law']} does not hold here: {chosen['why_not']}"
+    return f"{reason} (choose {holding}). By it"
+
+
+def _of_many(rows: Sequence["Row"], asked: str, varied: Sequence[str]) -> Iterator[str]:
+    """The rows of the answer for many points."""
+    chosen = [row for row in rows if row["answer"]]
+    laws = list(dict.fromkeys(row["law"] for row in chosen))
+    if asked == "paper":
+        yield "The paper's rule"
+    else:
+        yield f"Force law {' and '.join(sorted(laws, key=len))}"
+    heads = {PARAMETERS[name].column: PARAMETERS[name].label for name in varied}
+    if asked == "paper" or len(laws) > 1:
+        heads["law"] = "force law"
+    heads |= _quantities(rows)
+    heads["measured_median"] = "measured"
+    heads["measured_curve"] = "curve"
+    yield from _as_table(chosen, heads)
+
+
+def _quantities(rows: Sequence["Row"]) -> dict[str, str]:
+    """The labels of the quantities that some row has, by column."""
+    labels = {}
+    for column, (_, label) in QUANTITIES.items():
+        if not all(_is_nan(row[column]) for row in rows):
+            labels[column] = label
+    if "mean_velocity_m_s" in labels:
+        labels.pop("current_1m_m_s", None)
+    return labels
+
+
+def _as_table(rows: Sequence["Row"], heads: Mapping[str, str]) -> Iterator[str]:
+    """Lines of a table, with a last column that says whether the law holds."""
+    holds = ["holds"]
+    for row in rows:
+        holds.append(f"no: {row['why_not']}" if row["why_not"] else "yes")
+    columns = []
+    for column, head in heads.items():
+        if column in TOO_MANY:
+            continue
+        cells = [head, *(_cell(row[column]) for row in rows)]
+        width = max(map(len, cells))
+        columns.append([cell.ljust(width) for cell in cells])
+    for *cells, last in zip(*columns, holds, strict=True):
+        yield "  ".join([*cells, last])
+
+
+def _cell(value: float | str) -> str:
+    """A number of four digits, a dash for NaN, or a text as it is."""
+    if isinstance(value, str):
+        return value
+    return "-" if _is_nan(value) else f"{value:.4g}"
+
+
+def _is_nan(value: object) -> bool:
+    return isinstance(value, float) and math.isnan(value)
