@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from orchestrator.grains.cells import GrainCase
 from orchestrator.grains.peeling import ForceTable, Loading
 from orchestrator.physics.laws import LAWS, Exposure, ForceLaw
 from tests.grains.test_motion import copied
@@ -61,12 +62,15 @@ def _solve(copy: Path) -> "tuple[list[str], list[bytes]]":
 def test_processes_that_share_the_grains_find_the_same(tmp_path: Path) -> None:
     for name, ranks in (("one", 1), ("two", 2), ("again", 2)):
         copied(tmp_path / name, ranks=ranks)
+    before = set(os.listdir(tmp_path / "one"))
     untouched = os.stat(tmp_path).st_mtime_ns
     # MPI's directory would be made here, and removed while another run starts
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("TMPDIR", str(tmp_path))
         alone, _ = _solve(tmp_path / "one")
     assert os.stat(tmp_path).st_mtime_ns == untouched
+    made = set(os.listdir(tmp_path / "one")) - before
+    assert made == {*GrainCase.results, "log.liggghts", "load_steps.csv"}
     assert alone[-1] == "0"
     shared, results = _solve(tmp_path / "two")
     assert (

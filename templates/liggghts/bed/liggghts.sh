@@ -14,17 +14,19 @@ solve() {
     if [ "${ranks:-1}" -eq 1 ]; then
         # one process needs no MPI daemon: where the machine's own name resolves nowhere, it would
         # wait 5 s; nor a directory that it shares with others, one of which may remove it while
-        # this one starts
+        # this one starts. Open MPI 5 makes that directory in any case: here, for this run alone
         export OMPI_MCA_ess_singleton_isolated=1 OMPI_MCA_orte_create_session_dirs=0
-        $run
-        return
+        TMPDIR=$PWD $run
+        ended=$?
+        rm -rf ompi.*
+        return $ended
     fi
     # all on this machine, in a container too, as root too
     export OMPI_MCA_plm=isolated OMPI_MCA_btl_vader_single_copy_mechanism=none
     export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
-    # a directory that no other run may remove
+    # a directory that no other run may remove, with a short path: there are sockets in it
     own=$(mktemp -d) || return
-    OMPI_MCA_orte_tmpdir_base=$own $bound mpirun --oversubscribe --bind-to none -np "$ranks" $run
+    TMPDIR=$own $bound mpirun --oversubscribe --bind-to none -np "$ranks" $run
     ended=$?
     rm -rf "$own"
     return $ended
