@@ -20,7 +20,7 @@ communicate     single vel yes
 read_data       grains.data
 group           fixed type 1
 group           mobile type 2
-include         ${contact}
+include         contact.liggghts
 fix             frozen fixed freeze
 fix             weight mobile gravity ${gravity} vector 0 0 -1
 fix             motion mobile nve/sphere

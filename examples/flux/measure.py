@@ -8,6 +8,7 @@ width, is the sum of the grains' speeds times their mass, over the length of the
 of the plane, d.
 """
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -15,7 +16,8 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
-CONTACT = HERE.parents[1] / "templates" / "liggghts" / "bed" / "contact.liggghts"
+BED = HERE.parents[1] / "templates" / "liggghts" / "bed"
+DECKS = (HERE / "in.flux", BED / "contact.liggghts")
 CRITERION = 0.41e-3
 """The practical flux of incipient motion that the paper quotes, kg/s/m."""
 D, RHO_SOL, RHO_F, G = 1e-3, 2650.0, 1000.0, 9.81
@@ -86,7 +88,6 @@ def _run(folder, x, z, size, length, **told):
     lines = [
         f"variable {name} equal {value!r}" for name, value in {**WATER, **told}.items()
     ]
-    lines.append(f'variable contact string "{CONTACT}"')
     (folder / "parameters.liggghts").write_text("\n".join(lines) + "\n")
     kinds = np.where(np.arange(len(x)) < length, 1, 2)
     sides = (
@@ -98,15 +99,10 @@ def _run(folder, x, z, size, length, **told):
     )
     head = f"id type diameter density x y z\n\n{len(x)} atoms\n4 atom types\n\n{sides}\nAtoms\n\n"
     (folder / "grains.data").write_text(head + rows)
-    command = [
-        "liggghts",
-        "-in",
-        str(HERE / "in.flux"),
-        "-log",
-        "log.flux",
-        "-screen",
-        "none",
-    ]
+    # beside its inputs: in the path of a file LIGGGHTS takes no quotes
+    for deck in DECKS:
+        shutil.copy(deck, folder)
+    command = ["liggghts", "-in", "in.flux", "-log", "log.flux", "-screen", "none"]
     subprocess.run(command, cwd=folder, check=True)
 
 
