@@ -32,6 +32,7 @@ LEE_DEPTH = 1.5  # thickness of the fixed lee side, layers: no grain falls throu
 SHARP_DEG = 8.0  # bend from which on rows do not follow the bed round a corner
 SLIT = 0.15
 """Between neighbours of a row that goes round a bend a gap is at most this wide, diameters."""
+ELSEWHERE = 'choose another part of the bed, or "all"'
 BARE = 1.0  # grains this near to an obstacle are fixed under its foot, diameters
 LOWER = 0.1  # a neighbour bears a grain that stands so much over it, diameters
 UNDER = 2  # rows of fixed grains where none is counted: none falls through them
@@ -189,9 +190,7 @@ def along(line: BedLine, counts: str | Range) -> Packing:
         chosen &= (middle < start) | (middle > end)
     sums = np.concatenate([[0.0], np.cumsum(np.where(chosen, finer.lengths, 0.0))])
     if not sums[-1]:
-        raise UnfitError(
-            "bed.counted", "no bed is counted", "choose another part of the bed"
-        )
+        raise UnfitError("bed.counted", "no bed is counted", ELSEWHERE)
     ways = (np.arange(PLACES) + 0.5) / PLACES * sums[-1]
     piece = np.searchsorted(sums, ways, side="right") - 1
     arc_length = s[piece] + ways - sums[piece]
@@ -360,9 +359,7 @@ def cover(
     mobile = chosen & near & _rests(centres)
     counted = mobile & seen
     if not counted.any():
-        raise UnfitError(
-            "bed.counted", "no grain is counted", "choose another part of the bed"
-        )
+        raise UnfitError("bed.counted", "no grain is counted", ELSEWHERE)
     needed = mobile | seen | _touching(centres, mobile)
     kinds = (mobile, counted, seen & ~counted)
     return lattice.packed(line, centres[needed], (kind[needed] for kind in kinds))

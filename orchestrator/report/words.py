@@ -21,6 +21,7 @@ from orchestrator.report.page import Guest, caption, versions
 from orchestrator.report.results import Results, measured_hills, split, valid
 from orchestrator.runs import case
 from orchestrator.study import fields
+from orchestrator.study.parts import PileBed
 
 SPEEDS = {
     "wind_1m_m_s": "wind at 1 m",
@@ -96,7 +97,8 @@ def _piles(results: Results) -> list[str]:
 
 def _pile(row: pd.Series, results: Results, telling: Sequence[str]) -> str:
     """Where and at which flow the first grain of a pile moves, and when a fraction of it has."""
-    line = results.plan.piles[str(row["scene_id"])].model.line
+    pile = results.plan.piles[str(row["scene_id"])]
+    line = pile.model.line
     x, z = line.crest
     told = labels.told(row, ["alpha_deg", "d_m", *telling])
     facts = {"name": ", ".join(told if z > 0 else ["Level bed", *told[1:]])}
@@ -110,7 +112,18 @@ def _pile(row: pd.Series, results: Results, telling: Sequence[str]) -> str:
         facts["top"] = "obstacle" if any(a <= x <= b for a, b in line.bare) else "bed"
         facts |= {"first": flow_at(row, row["first_ustar0_m_s"])}
     flow = flow_at(row, row["ustar0_m_s"])
+    facts["counted"] = _counted(pile.bed)
     return f"{caption('pile', row=row, flow=flow, **facts)} {_measured(row)}"
+
+
+def _counted(bed: PileBed) -> str:
+    """Which part of a bed is counted, where that is not plain from its shape; else empty."""
+    counts = bed.counts
+    if not isinstance(counts, str):
+        return f"between x = {counts[0]:g} and {counts[1]:g} m"
+    if bed.profile or bed.counted:
+        return {"windward": "of windward sides", "all": "of the whole bed"}[counts]
+    return ""
 
 
 def _grains(results: Results) -> list[str]:

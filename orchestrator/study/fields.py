@@ -32,8 +32,15 @@ class Quantity:
     read: Callable[[Scene], Any]  # its value in a scene, None where that leaves it open
 
     def asked(self, scene: Scene) -> Any:
-        """Its value as a scene asks for it; None where it is left open or has no effect."""
-        return plain(self.read(scene)) if APPLIES[self.info.scope](scene) else None
+        """Its value as a scene asks for it; None where it has no effect.
+
+        What a scene leaves open of the question is its default, of the way to answer it None.
+        """
+        if not APPLIES[self.info.scope](scene):
+            return None
+        if self.info.about == "question" and self.info.read:
+            return plain(getattr(scene, self.info.read))
+        return plain(self.read(scene))
 
     def used(self, scene: Scene) -> Any:
         """Its value as a scene uses it; None where it has no effect."""

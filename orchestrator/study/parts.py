@@ -492,11 +492,11 @@ class PileBed(Bed):
     """fences, blocks and half-cylinders, which carry no grains: tables with `kind`, `x`, `height`
     and, of a block, `length`"""
     counted: Literal["windward", "all"] | Range | None = _pile(
-        None, label="counted grains", since=True
+        None, label="counted grains", since=True, read="counts"
     )
-    """exposed grains that are counted, or their range of x, which on a bed of more than 5000 grains
-    is packed alone; by default those of windward sides, all of a flat bed, a step down and a
-    profile without a slip face
+    """exposed grains that are counted, or their range of x, which on a bed of more than
+    5000 grains is packed alone; by default those of windward sides, of a flat bed and a
+    step down all
     - windward: on sides that rise, of a profile where the flow goes up them
     - all: all"""
     packing: Packing = _pile("aligned")
@@ -545,13 +545,14 @@ class PileBed(Bed):
 
     @property
     def counts(self) -> str | Range:
-        """Which exposed grains are counted."""
-        if self.counted or not self.profile:
-            return self.counted or self.form.counted
-        falls = -np.degrees(
-            np.arctan(np.diff(self.profile.z) / np.diff(self.profile.x)).min()
-        )
-        return "windward" if falls > 90 - self.entrainment_angle_deg + 1e-6 else "all"
+        """Which exposed grains are counted.
+
+        Of a profile the default depends on no slope of its points, which smoothing
+        changes.
+        """
+        if self.counted:
+            return self.counted
+        return "windward" if self.profile else self.form.counted
 
     @property
     def is_level(self) -> bool:

@@ -28,6 +28,9 @@ GAP, DENSE = 20.0, 20
 """A step along x this many times the middle one is a gap, in a profile of so many points."""
 STEEPEST_DEG = 60.0  # slope beyond which no mesh of vertical grid lines follows the bed
 RESOLVED = 4  # corners of a smoothed line in its smoothing length
+OVER = (
+    0.5  # each of the two lengths whose means give the slope of a line, over its height
+)
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,45 @@ class Profile:
 
     def __str__(self) -> str:
         return f"{self.name} ({self.digest[:12]})"
+
+
+def steepest_deg(profile: Profile, height: float) -> float:
+    """The steepest slope up which a bed line goes for as far as it is high.
+
+    It is that of the line's means over two stretches of `OVER` heights, one behind the other.
+    The noise of single points does not count in it, nor does a face shorter than the two.
+
+    Parameters
+    ----------
+    profile
+        The bed line, m.
+    height
+        From its lowest to its highest point, m.
+
+    Returns
+    -------
+    float
+        The slope, degrees; 0 of a line that rises nowhere.
+    """
+    x, z = np.array(profile.x), np.array(profile.z)
+    length = min(OVER * height, (x[-1] - x[0]) / 4)
+    areas = np.concatenate([[0.0], np.cumsum((z[1:] + z[:-1]) / 2 * np.diff(x))])
+    slopes = np.diff(z) / np.diff(x)
+
+    def area(places: FloatArray) -> FloatArray:
+        first = np.clip(
+            np.searchsorted(x, places, side="right") - 1, 0, len(slopes) - 1
+        )
+        into = places - x[first]
+        return np.asarray(areas[first] + into * (z[first] + slopes[first] * into / 2))
+
+    steps = length * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
+    middles = np.unique(x[:, None] + steps)
+    middles = np.clip(middles, x[0] + length, x[-1] - length)
+    ahead = area(middles + length) - area(middles)
+    behind = area(middles) - area(middles - length)
+    steepest = float(((ahead - behind) / length**2).max())
+    return float(np.degrees(np.arctan(max(steepest, 0.0))))
 
 
 @dataclass
@@ -97,9 +139,8 @@ class Files:
         place = self._place(name, where)
         text = self._text(name, where)
         profile = read_profile(text, Path(name).name, place, smoothing)
-        steepest = np.degrees(np.arctan(np.diff(profile.z) / np.diff(profile.x))).max()
         height = max(profile.z) - min(profile.z)
-        slope = round(max(float(steepest), 0.0), 2)
+        slope = round(steepest_deg(profile, height), 2)
         return {"profile": profile, "height": height, "slope_deg": slope}
 
     def sieve(self, name: str, where: str) -> list[list[float]]:

@@ -369,6 +369,11 @@ class Scene(parts.Part):
         return isinstance(self.bed, PileBed) and self.bed.packing == "poured"
 
     @property
+    def counts(self) -> str | parts.Range | None:
+        """Which exposed grains of a pile are counted; None on a bed of one grain."""
+        return self.bed.counts if isinstance(self.bed, PileBed) else None
+
+    @property
     def is_turned(self) -> bool:
         """Whether its force law turns the grain about its centre."""
         law = self.forces.law

@@ -1,5 +1,6 @@
 """Profiles that users measure: read, smoothed, refused in one line, and whole in a study's text."""
 
+import math
 import os
 from contextlib import nullcontext
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 from orchestrator.bed.line import of_bed
 from orchestrator.errors import InputError
 from orchestrator.study import profile, study
+from orchestrator.study.fields import asked
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 
@@ -186,3 +188,43 @@ def test_points_nearer_than_mesh_or_grains_can_follow_are_refused(
         )
         with refused if near else nullcontext():
             scene_of(tmp_path, content, text)
+
+
+def dune(noise: float = 0.0, lee_deg: float = 30.0) -> str:
+    """A dune of 60 m, 3 m high and at most 6.9 degrees steep, with noise of some metres."""
+    x = np.linspace(0, 60, 301)
+    side = 1.5 * (1 - np.cos(np.pi * np.clip((x - 5) / 38.73, 0, 1)))
+    z = np.minimum(side, np.maximum(3 - (x - 43.73) * np.tan(np.radians(lee_deg)), 0))
+    z += noise * np.random.default_rng(4).standard_normal(len(x))
+    rows = zip(x.tolist(), z.tolist(), strict=True)
+    return points(*(f"{a:.3f},{b:.5f}" for a, b in rows))
+
+
+def test_what_is_counted_on_a_profile_never_depends_on_its_slopes(
+    tmp_path: Path,
+) -> None:
+    """Smoothing a little more once took the slip face below 30 degrees, and the lee was counted."""
+    for smoothing in (0.0, 1.2, 1.5, 3.0):
+        text = STUDY.replace('"scan.csv"', f'"scan.csv", smoothing = {smoothing}')
+        for lee_deg in (29.0, 31.0):
+            scene = scene_of(tmp_path, dune(0.015, lee_deg), text)
+            assert isinstance(scene.bed, PileBed)
+            assert scene.bed.counts == "windward"
+            assert asked(scene)["counted"] == "windward"
+
+
+def test_the_slope_of_a_profile_is_not_that_of_its_noise(tmp_path: Path) -> None:
+    """It was the steepest of two neighbouring points: 22 degrees of this dune."""
+    (low, high) = (6.9, 7.6)
+    for noise in (0.0, 0.015):
+        bed = scene_of(tmp_path, dune(noise)).bed
+        assert low < bed.slope_deg < high
+
+
+@pytest.mark.parametrize("slope_deg", [3.0, 15.0, 30.0, 45.0, 55.0])
+def test_the_slope_of_a_straight_side_is_its_own(
+    slope_deg: float, tmp_path: Path
+) -> None:
+    side = 0.02 / math.tan(math.radians(slope_deg))
+    bed = scene_of(tmp_path, points("0,0", f"{side!r},0.02", f"{2 * side!r},0")).bed
+    assert bed.slope_deg == slope_deg
