@@ -213,3 +213,15 @@ def test_no_grain_falls_down_a_steep_lee_side(slope: float, lee: float) -> None:
         bed = pile(line, _lattice(pattern))
         _check(bed)
         assert bed.mobile[bed.centres[:, 1].argmax()]
+
+
+@pytest.mark.parametrize("name", ["curved dune", "cosine", "gaussian", "flat", "train"])
+def test_exposed_grains_follow_the_bed_one_by_one(name: str) -> None:
+    """They lie z0 under the bed line, and a diameter apart along it."""
+    covered = _covered(name)
+    line = of_bed(bed(**BEDS[name])).scaled(1 / D)
+    centres = covered.centres[covered.windward]
+    segment, along = line.nearest(centres)
+    np.testing.assert_allclose(line.over(centres, segment), 0.5 + GAP, atol=0.1)
+    apart = np.diff(np.sort(along))
+    assert np.median(apart) == pytest.approx(1.0, abs=0.02)

@@ -2,6 +2,7 @@
 
 import shutil
 import subprocess
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -169,3 +170,30 @@ def test_a_bed_that_was_poured_again_is_read_again(tmp_path: Path) -> None:
     rows.to_csv(file, index=False)
     after = Geometry(scene, tmp_path)
     assert after.packing.sizes.max() == pytest.approx(0.9 * before.packing.sizes.max())
+
+
+class Lattice(PouredBed):
+    """Equal grains that rain row by row, each above its pocket."""
+
+    @cached_property
+    def grains(self) -> tuple[FloatArray, FloatArray]:
+        """Centres, the fixed ones first, and diameters, d."""
+        floor = self.floor
+        rows = []
+        for number in range(5):
+            above = np.array([number / 2, 0.0, 1.1 * number])
+            rows.append(floor[: len(floor) - number] + above)
+        centres = np.vstack(rows)
+        return centres, np.ones(len(centres))
+
+
+def test_equal_grains_that_rain_onto_a_lattice_reproduce_it(tmp_path: Path) -> None:
+    """The one exact answer for pouring: rows of a close packing, sin(60 deg) apart."""
+    lattice = Lattice(_plane().line, 3.0, SURFACE, None, 1.0, 35.0, 0)
+    places, _, _ = _grains(_run(lattice, tmp_path))
+    x, _, z = places.xyz.T
+    row = np.rint((z + 3) / np.sin(np.pi / 3))
+    np.testing.assert_allclose(z + 3, row * np.sin(np.pi / 3), atol=2e-3)
+    place = x - row / 2 - lattice.floor[0, 0]
+    np.testing.assert_allclose(place, np.rint(place), atol=5e-3)
+    assert row.max() == 4

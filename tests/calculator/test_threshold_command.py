@@ -71,6 +71,20 @@ def test_json_has_an_object_for_each_law_that_agrees_with_itself(
     assert sorted(ends) == ends
 
 
+def test_ranges_give_the_same_numbers_as_points(run: Run) -> None:
+    records = _json(run("--diameter", RANGE, "--slope", "0:20:3", "--json"))
+    assert len(records) == 15
+    assert [record["input"]["slope_deg"] for record in records[:4]] == [0, 10, 20, 0]
+    diameters = [record["input"]["diameter"] for record in records[::3]]
+    assert diameters == pytest.approx([1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3])
+    given = [str(records[7]["input"][name]) for name in ("diameter", "slope_deg")]
+    point = _json(run("--diameter", given[0], "--slope", given[1], "--json"))
+    names = "friction_velocity", "wind_speed_10_m", "stress", "shields", "drag", "lift"
+    for law in LAWS:
+        for name in names:
+            assert records[7][law][name] == pytest.approx(point[law][name], rel=1e-9)
+
+
 def test_a_liquid_of_a_depth_has_a_mean_velocity_and_no_winds(run: Run) -> None:
     one = _json(run(*QUARTZ_IN_WATER, "--depth", "1", "--json"))["bridged"]
     assert one["wind_speed_10_m"] is None

@@ -6,7 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from orchestrator.errors import InputError
 from orchestrator.fidelity.levels import changed
+from orchestrator.grains.loads import Loads
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile, flows
 from orchestrator.grains.threshold import sampled, within
@@ -324,3 +326,13 @@ def test_the_deck_has_the_grains_as_they_lie(
     assert 0 <= y.min() < y.max() < 3e-3
     assert (force[exposed] > 0).all()
     assert results.tables["pile_grain"]["y_m"].between(0, 0.003).all()
+
+
+def test_a_bed_none_of_whose_grains_is_held_is_refused(
+    mixed: Results, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pile = _pile(mixed, "dem")
+    for name in ("alone", "leaving"):
+        monkeypatch.setattr(Loads, name, lambda loads: np.zeros(pile.packing.count))
+    with pytest.raises(InputError, match="lets it go"):
+        flows(pile.loads(mixed.cases))

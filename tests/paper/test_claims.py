@@ -11,7 +11,14 @@ import pytest
 from orchestrator import paper, report
 from orchestrator.paper import PRESETS, claims
 from orchestrator.paper.claims import CLAIMS, Judged
-from orchestrator.paper.evidence import Comparison, Verdict, combined, pairs
+from orchestrator.paper.evidence import (
+    BRIDGED,
+    Comparison,
+    Verdict,
+    combined,
+    pairs,
+)
+from orchestrator.physics import curves
 from orchestrator.report.results import Results
 from orchestrator.runs.files import Folder
 from orchestrator.study import fields, study
@@ -195,3 +202,39 @@ def test_a_study_of_the_paper_alone_gets_a_report_card(
         table = pd.read_csv(tmp_path / paper.CLAIMS)
         assert len(table) == len(CLAIMS)
         assert set(table["verdict"]) > {"no data"}
+
+
+def test_every_pile_in_air_has_an_answer_of_a_law_that_holds() -> None:
+    """The paper's own range: 56 piles, for 34 of which neither of its equations holds."""
+    holding: dict[tuple[float, ...], set[str]] = {}
+    for scene in study.load("paper").scenes:
+        if scene.bed.kind != "pile" or scene.fluid.viscosity != 1e-5:
+            continue
+        key = (scene.bed.slope_deg, scene.grain.diameter, scene.bed.roughness)
+        laws = holding.setdefault(key, set())
+        if law_holds(scene):
+            laws.add(scene.forces.law)
+    assert len(holding) == 56
+    assert all(BRIDGED in laws for laws in holding.values())
+    assert sum(laws == {BRIDGED} for laws in holding.values()) == 34
+
+
+def test_grains_on_the_curves_fit_them(exact: Tables) -> None:
+    """The claim of the best fit can come out as reproduced."""
+    grains = exact["single_grain"].copy()
+    own = exact["scenes"].set_index("scene_id").loc[grains["scene_id"]]
+    is_wide = grains["reynolds"].to_numpy() > 0.01
+    is_named = (
+        (own["beta_deg"] == 50) & (own["z0_over_d"] < 0.05)
+    ).to_numpy() & is_wide
+    at = np.log(grains.loc[is_named, "reynolds"])
+    logs = []
+    for curve in curves.WATER:
+        x, y = curve.points(2000)
+        logs.append(np.interp(at, np.log(x), np.log(y), left=np.nan, right=np.nan))
+    grains.loc[is_named, "shields_dem"] = np.exp(np.nanmean(logs, axis=0))
+    fit = judge(exact, single_grain=grains)["best_fit"]
+    assert fit.verdict == "reproduced"
+    decisive = [one for one in fit.comparisons if one.is_decisive]
+    factors = [one.numbers for one in decisive if not one.has_bools]
+    assert np.concatenate(factors) == pytest.approx(1.0, abs=0.06)

@@ -215,3 +215,19 @@ def test_a_threshold_without_a_place_on_a_logarithmic_axis_costs_no_figure(
     assert len(drawn([*shields.draw(heap), *pile_figures(heap)])) == (
         3 if rows == 1 else 1
     )
+
+
+def test_flows_by_two_models_have_a_panel_each(results: Results) -> None:
+    two = copies(results, {}, {"turbulence_model": "RNGkEpsilon"})
+    pile = two.plan.piles["copy 0"]
+    flow = pile.scene.flow.model_copy(update={"turbulence_model": "RNGkEpsilon"})
+    other = replace(pile, scene=pile.scene.model_copy(update={"flow": flow}))
+    stress = two.tables["wall_stress"]
+    theirs = stress.assign(flow_case=other.flow.name)
+    both = changed(two, wall_stress=pd.concat([stress, theirs], ignore_index=True))
+    plan = replace(two.plan, piles={"copy 0": pile, "copy 1": other})
+    (figure,) = flows.stress(replace(both, plan=plan))
+    titles = [ax.get_title(loc="left") for ax in axes_of(figure)]
+    models = [title.rpartition(", ")[2] for title in titles if title]
+    assert models == ["RNG k-ε", "k-ε"]
+    assert len(figure.cases) == 2

@@ -1,5 +1,7 @@
 """Lines beside thresholds: published curves, the closed form, and how it meets measurements."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -7,7 +9,7 @@ import pytest
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import BUFFINGTON_MONTGOMERY
 from orchestrator.physics.threshold import shields_at
-from orchestrator.report import theory
+from orchestrator.report import shields, theory
 from orchestrator.report.results import Results
 from orchestrator.report.theory import Bed, Line
 
@@ -89,3 +91,31 @@ def test_grains_of_every_law_lie_on_its_line(law: str, bed: pd.DataFrame) -> Non
         assert line.tau(exact.reynolds) == pytest.approx(exact.shields, rel=1e-6)
         assert line.holds(exact.reynolds) == exact.valid
         assert line.first <= exact.reynolds <= line.last
+
+
+@pytest.fixture
+def several(results: Results, bed: pd.DataFrame) -> Results:
+    """A study of the grains of one flat bed by four laws, and of piles."""
+    grains = []
+    for name in ("low", "bridged", "profile", "zeng-torque"):
+        ids = bed["scene_id"] + name
+        grains.append(bed.assign(force_law=name, scene_id=ids, law_holds=True))
+    scenes = pd.concat([*grains, results.beds("pile")], ignore_index=True)
+    kept = {name: results.tables[name] for name in ("pile_threshold", "wall_stress")}
+    return replace(results, tables={**kept, "scenes": scenes})
+
+
+def test_many_laws_have_colours_of_their_own(several: Results) -> None:
+    (figure,) = shields.draw(several)
+    assert figure.canvas is not None
+    (ax,) = figure.canvas.axes
+    lines = [line for line in ax.lines if line.get_gid() == shields.RESULT[0]]
+    colours = {line.get_color() for line in lines}
+    met = [fit.law for fit in theory.best(theory.ranked(several)) if fit.decades > 0]
+    assert len(met) > 1
+    assert len(colours) == len(set(met))
+    assert colours == {theory.look(name)[0] for name in met}
+    (medians,) = (
+        line for line in ax.lines if str(line.get_label()).startswith("measured")
+    )
+    assert np.asarray(medians.get_ydata()).tolist() == theory.MEDIANS.tolist()

@@ -165,3 +165,11 @@ def test_the_reference_of_study_files_is_written_from_the_registry() -> None:
     assert "[0, 90) | `0.0` |" in rows["| `slope_deg`"]
     assert "[1e-07, 10] | required |" in rows["| `diameter`"]
     assert "[1e-06, 1] | `[0.1, 0.3, 0.5, 0.7]` |" in rows["| `fractions`"]
+
+
+def test_columns_are_distinct_and_explained() -> None:
+    without = sum(quantity.column == "-" for quantity in fields.FIELDS)
+    assert without == 1
+    quantities = (*fields.FIELDS, *fields.DERIVED)
+    assert len(fields.COLUMNS) == len(quantities) - without
+    assert {*fields.COLUMNS, *fields.ANSWERS} <= set(COLUMNS)

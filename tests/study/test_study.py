@@ -1,5 +1,7 @@
 """Study files: what they mean, and the refusal of each way in which they can be wrong."""
 
+import subprocess
+import sys
 import warnings
 from itertools import product
 from pathlib import Path
@@ -286,3 +288,18 @@ def test_a_level_bed_has_no_height(bed: str) -> None:
     ):
         _parse(GRAVEL.format(bed=fields, sizes=sizes, depth=0.08))
     _parse(GRAVEL.format(bed=fields, sizes=sizes, depth=round(least, 4)))
+
+
+SOLVERS = """
+import sys
+from orchestrator.study import study
+assert all(study.load(name).scenes for name in study.presets())
+print(*set(sys.modules) & {"orchestrator.flow", "orchestrator.solvers", "gmsh", "pyvista"})
+"""
+
+
+def test_presets_are_studies_and_are_read_without_what_solves_them() -> None:
+    command = [sys.executable, "-c", SOLVERS]
+    root = Path(__file__).parents[2]
+    ended = subprocess.run(command, cwd=root, capture_output=True, check=True)
+    assert ended.stdout.split() == []
