@@ -5,14 +5,14 @@ import timeit
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from orchestrator.fidelity import decision, limits
+from orchestrator.fidelity import decision, limits, smoothing
 from orchestrator.fidelity.decision import Decision, decide
 from orchestrator.grains.cells import SingleGrainCase, batches
 from orchestrator.grains.pile import Pile
@@ -39,9 +39,10 @@ BY_DEM = 'protocol.method = "dem", without a tolerance, answers its scenes as th
 class Plan:
     """How the scenes of a study are answered, and by which cases.
 
-    By the id of the scene that was asked for: `decisions`, `piles`, and `checks`, piles by DEM that
-    check an answer without DEM. Each of the `cells` answers its single grains. `cases` has every
-    run once, by name, after those whose results it needs.
+    By the id of the scene that was asked for: `decisions`, `piles`, `checks`, piles by DEM that
+    check an answer without DEM, and `smoothings`, noisy profiles with other smoothing, by its
+    factor. Each of the `cells` answers its single grains. `cases` has every run once, by name,
+    after those whose results it needs.
     """
 
     decisions: dict[str, Decision]
@@ -49,6 +50,7 @@ class Plan:
     cells: tuple[SingleGrainCase, ...]
     checks: dict[str, Pile]
     cases: dict[str, Case]
+    smoothings: dict[str, dict[float, Pile]] = field(default_factory=dict)
 
     @property
     def drawing_s(self) -> float:
@@ -66,6 +68,8 @@ class Plan:
             for asked, pile in self.piles.items()
             if not self.decisions[asked].is_chosen
         ]
+        for smoothed in self.smoothings.values():
+            piles += smoothed.values()
         needed = {
             run.name for pile in (*piles, *self.checks.values()) for run in pile.runs
         }
@@ -133,8 +137,18 @@ def of(
     scenes = [answer.scene for asked, answer in decisions.items() if asked not in piles]
     grains = {scene.id: scene for scene in scenes if scene.protocol.method == "dem"}
     cells = tuple(batches(grains.values()))
-    runs = [run for pile in (*piles.values(), *checking.values()) for run in pile.runs]
-    return Plan(dict(decisions), piles, cells, checking, listed((*runs, *cells)))
+    smoothings = {}
+    for asked, pile in piles.items():
+        scenes_of = smoothing.compared(pile.scene)
+        if scenes_of:
+            made = {factor: Pile(scene, cases) for factor, scene in scenes_of.items()}
+            smoothings[asked] = made
+    every = [*piles.values(), *checking.values()]
+    for smoothed in smoothings.values():
+        every += smoothed.values()
+    runs = [run for pile in every for run in pile.runs]
+    listing = listed((*runs, *cells))
+    return Plan(dict(decisions), piles, cells, checking, listing, smoothings)
 
 
 def _piles(decisions: Mapping[str, Decision], cases: Path | None) -> dict[str, Pile]:
@@ -172,6 +186,9 @@ def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
         answer.why for answer in plan.decisions.values()
     ).most_common():
         yield f"  {times} answered: {why}"
+    if plan.smoothings:
+        noisy = _number(len(plan.smoothings), "noisy profile")
+        yield f"  {noisy}: also with half and twice the smoothing, and with what it needs"
     yield from expected(plan, directory, workers)
 
 

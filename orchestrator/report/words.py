@@ -22,6 +22,7 @@ from orchestrator.report.results import Results, measured_hills, split, valid
 from orchestrator.runs import case
 from orchestrator.study import fields
 from orchestrator.study.parts import PileBed
+from orchestrator.tables.usable import ROW_HOLD
 
 SPEEDS = {
     "wind_1m_m_s": "wind at 1 m",
@@ -113,7 +114,11 @@ def _pile(row: pd.Series, results: Results, telling: Sequence[str]) -> str:
         facts |= {"first": flow_at(row, row["first_ustar0_m_s"])}
     flow = flow_at(row, row["ustar0_m_s"])
     facts["counted"] = _counted(pile.bed)
-    return f"{caption('pile', row=row, flow=flow, **facts)} {_measured(row)}"
+    facts["held"] = row["row_hold"] > ROW_HOLD
+    said = [caption("pile", row=row, flow=flow, **facts)]
+    if pile.bed.profile and row.get("smoothing_needed_m", np.nan) > 0:
+        said.append(caption("smoothing", row=row, name=pile.bed.profile.name))
+    return " ".join([*said, _measured(row)])
 
 
 def _counted(bed: PileBed) -> str:

@@ -16,6 +16,7 @@ import numpy as np
 from orchestrator.digits import on_grid
 from orchestrator.errors import InputError
 from orchestrator.runs.files import digest_text, opened
+from orchestrator.study.noise import needed_smoothing
 from orchestrator.study.shapes import SHAPES
 from orchestrator.study.units import number
 from orchestrator.types import FloatArray
@@ -42,9 +43,14 @@ class Profile:
     z: tuple[float, ...] = field(compare=False)
     text: str = field(compare=False, repr=False)  # the file itself
     digest: str  # of the corners: two profiles with one digest are one bed
+    needs: float = field(default=0.0, compare=False)  # smoothing for its noise, m
 
     def __str__(self) -> str:
         return f"{self.name} ({self.digest[:12]})"
+
+    def smoothed(self, length: float) -> dict[str, Any]:
+        """Fields of a bed with the points of this file smoothed over another length, m."""
+        return _fields(read_profile(self.text, self.name, self.name, length))
 
 
 def steepest_deg(profile: Profile, height: float) -> float:
@@ -84,6 +90,13 @@ def steepest_deg(profile: Profile, height: float) -> float:
     behind = area(middles) - area(middles - length)
     steepest = float(((ahead - behind) / length**2).max())
     return float(np.degrees(np.arctan(max(steepest, 0.0))))
+
+
+def _fields(profile: Profile) -> dict[str, Any]:
+    """The profile of a bed, and its height (m) and slope (degrees), which follow."""
+    height = max(profile.z) - min(profile.z)
+    slope = round(steepest_deg(profile, height), 2)
+    return {"profile": profile, "height": height, "slope_deg": slope}
 
 
 @dataclass
@@ -139,9 +152,7 @@ class Files:
         place = self._place(name, where)
         text = self._text(name, where)
         profile = read_profile(text, Path(name).name, place, smoothing)
-        height = max(profile.z) - min(profile.z)
-        slope = round(steepest_deg(profile, height), 2)
-        return {"profile": profile, "height": height, "slope_deg": slope}
+        return _fields(profile)
 
     def sieve(self, name: str, where: str) -> list[list[float]]:
         """The rows of a sieve table, diameter (m) and fraction of the mass."""
@@ -319,7 +330,12 @@ def read_profile(text: str, name: str, where: str, smoothing: float) -> Profile:
     if len(x) >= DENSE and steps[widest] > GAP * middle:
         what = f"a gap of {steps[widest]:g} m after x = {x[widest]:g} m; others are {middle:g} m"
         refuse(what, "fill it with points", widest + 1)
-    more = "raise bed.smoothing" if smoothing else "give bed.smoothing, a length in m"
+    needs = needed_smoothing(x, z)
+    more = "give bed.smoothing, a length in m"
+    if smoothing:
+        more = "raise bed.smoothing"
+    elif needs:
+        more = f"give bed.smoothing = {needs:g} m"
     if smoothing > length / 4:
         refuse(
             f"smoothing over {smoothing:g} m leaves nothing of {length:g} m",
@@ -347,7 +363,7 @@ def read_profile(text: str, name: str, where: str, smoothing: float) -> Profile:
         tuple(on_grid(values - values[0], np.ptp(x)).tolist()) for values in (x, z)
     )
     corners = "\n".join(f"{a!r},{b!r}" for a, b in zip(xs, zs, strict=True))
-    return Profile(name, xs, zs, text, digest_text(corners))
+    return Profile(name, xs, zs, text, digest_text(corners), needs)
 
 
 def _smoothed(

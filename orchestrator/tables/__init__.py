@@ -18,6 +18,7 @@ import pandas as pd
 
 from orchestrator import digits
 from orchestrator.errors import OrchestratorError
+from orchestrator.grains.pile import Pile
 from orchestrator.plan import Plan
 from orchestrator.runs.files import Folder
 from orchestrator.study import fields
@@ -55,7 +56,9 @@ def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
     }
     flows = {name: solve for name, solve in flows.items() if name in done}
     answers = [
-        rows.Answer(plan.decisions[scene_id], pile, cases)
+        rows.Answer(
+            plan.decisions[scene_id], pile, cases, _smoothed(plan, scene_id, done)
+        )
         for scene_id, pile in plan.piles.items()
         if pile.is_run(done)
     ]
@@ -87,6 +90,12 @@ def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
         "check": checks,
     }
     return {name: table for name, table in made.items() if not table.empty}
+
+
+def _smoothed(plan: Plan, scene_id: str, done: Container[str]) -> dict[float, Pile]:
+    """The beds of a scene with other smoothing that are done, by its factor."""
+    piles = plan.smoothings.get(scene_id, {})
+    return {factor: pile for factor, pile in piles.items() if pile.is_run(done)}
 
 
 def _stacked(parts: Iterable[Row]) -> pd.DataFrame:

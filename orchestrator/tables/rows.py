@@ -1,6 +1,6 @@
 """The rows of the tables: scenes, single grains, flows, and piles with their grains."""
 
-from collections.abc import Container, Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from math import ceil, log
 from pathlib import Path
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.errors import InputError
-from orchestrator.fidelity import levels, limits
+from orchestrator.fidelity import levels, limits, smoothing
 from orchestrator.fidelity.decision import Decision
 from orchestrator.fidelity.levels import changed
 from orchestrator.flow.stress import bubble
@@ -34,6 +34,12 @@ PER_E_FOLD = 0.06
 """Relative rise of tau_c with each e-fold of the flow's z0, at most: triangles of 15 and 30 deg
 under solved flows, z0/h from 2.5e-4 to 8e-3, at 10 to 70 % of the grains; 0.03 in the mean."""
 ENDS = ("", "_low", "_high")  # endings of a threshold's columns
+SMOOTHED = {
+    0.5: "first_half_smoothing_m_s",
+    1.0: "first_smoothing_m_s",
+    2.0: "first_twice_smoothing_m_s",
+}
+"""Columns of the flow at which motion starts, by the factor of `smoothing.compared`."""
 FEW = 10  # grains of a size class: the interval of its threshold is wide
 # u*/u*_0 at equal parts of the way along the bed from the foot to the top
 WAY_UP = (
@@ -203,8 +209,18 @@ def measured_hill(pile: Pile) -> measured.MeasuredHill | None:
 class Answer:
     """The answer to a scene: a pile with what its finished cases say, read once for all tables."""
 
-    def __init__(self, decision: Decision, pile: Pile, cases: Path) -> None:
+    def __init__(
+        self,
+        decision: Decision,
+        pile: Pile,
+        cases: Path,
+        smoothed: Mapping[float, Pile] | None = None,
+    ) -> None:
         self.decision, self.pile, self.scene_id = decision, pile, decision.asked.id
+        self.smoothed = {
+            factor: other.first(other.motion(cases))[1]
+            for factor, other in (smoothed or {}).items()
+        }
         self.motion, self.speed = pile.motion(cases), pile.speed(cases)
         self.row_hold = pile.row_hold(cases)
         self.first, self.checked = pile.first(self.motion), (np.nan, np.nan)
@@ -326,6 +342,7 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
             "share_carried_off": found.carried_off,
             "share_against_flow": found.against_the_flow,
             "row_hold": answer.row_hold,
+            **_smoothing(answer),
             **_levels(answer.decision),
             "error_estimate": error,
             "case": pile.runs[-1].name if pile.runs else None,
@@ -359,6 +376,21 @@ def _smooth_bed(scene: Scene, ustar0: float) -> float:
         return 0.0
     outer = float(outer_roughness(scene.bed.roughness, ustar0, scene.fluid.viscosity))
     return PER_E_FOLD * log(outer / scene.solve_roughness)
+
+
+def _smoothing(answer: Answer) -> Row:
+    """Columns of a noisy profile: the smoothing, and the first motion around it."""
+    length = smoothing.length_of(answer.pile.scene)
+    if not length:
+        return {}
+    assert answer.pile.bed.profile
+    row = {
+        "smoothing_needed_m": answer.pile.bed.profile.needs,
+        "smoothing_compared_m": length,
+    }
+    for factor, column in SMOOTHED.items():
+        row[column] = answer.smoothed.get(factor, np.nan)
+    return row
 
 
 def _levels(answer: Decision) -> Row:

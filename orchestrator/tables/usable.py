@@ -192,9 +192,25 @@ def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
     if row["fraction"] * row["count"] < 1 - 1e-9:
         yield f"{row['fraction']:.3g} of {row['count']:.0f} grains is less than one"
     yield from _open_ends(row)
-    if row.get("row_hold", 0.0) > ROW_HOLD:
-        times = f"{row['row_hold']:.2g} times the u* of a single one"
-        yield f"the row has no end: its neighbours hold the first grain up to {times}"
+    needed = row.get("smoothing_needed_m", 0.0)
+    if needed > (row.get("smoothing") or 0.0) * (1 + 1e-9):
+        what = "the profile is noise at the scale of the mesh"
+        yield f"{what}: bed.smoothing = {needed:g}"
+    yield from _held_row(row)
+
+
+def _held_row(row: Mapping[Any, Any]) -> Iterator[str]:
+    """Why a threshold is that of a row of touching grains; empty where it is not.
+
+    The closed form along the bed line packs no rows: it is of single exposed grains.
+    """
+    if row.get("answered_method") == "local" or not row.get("row_hold", 0.0) > ROW_HOLD:
+        return
+    times = f"{row['row_hold']:.2g} times the u* of a single one"
+    said = f"the row has no end: its neighbours hold the first grain up to {times}"
+    if row.get("packing") in ("aligned", "disordered"):
+        said += '; protocol.method = "local" is of single exposed grains'
+    yield said
 
 
 def _reached(row: Mapping[Any, Any]) -> str:

@@ -63,6 +63,7 @@ UNREACHED = {"reynolds": NAN, "shields": NAN, "share_carried_off": NAN}
         (None, {"reynolds": 1.0}, []),  # a hydraulically smooth bed
         (None, {"count": 3}, ["0.3 of 3 grains is less than one"]),
         (None, {"row_hold": 2.3}, ["hold the first grain up to 2.3 times"]),
+        (None, {"row_hold": 2.3, "answered_method": "local"}, []),
         (
             None,
             {"share_carried_off": 0.76},
