@@ -9,6 +9,7 @@ from orchestrator.runs import terminal
 if TYPE_CHECKING:
     from orchestrator.report.page import Guest
     from orchestrator.report.results import Results
+    from orchestrator.report.style import Figure
     from orchestrator.runs.case import Case
     from orchestrator.runs.files import Folder
 
@@ -40,21 +41,34 @@ def write(
 
     Returns
     -------
-    A line for each figure that could not be drawn, such as for want of memory. The page has
-    the line in its place.
+    list of str
+        A line for each figure that could not be drawn, such as for want of memory. The
+        page has the line in its place.
     """
-    from orchestrator.report import (
-        along,
-        bed,
-        flows,
-        page,
-        piles,
-        shields,
-        style,
-        words,
-    )
+    from orchestrator.report import page, words
 
-    drawing: list[Callable[[Results], Iterator[style.Figure]]] = [
+    figures, faults = _drawn(results, folder, every)
+    for guest in guests:
+        for name, text in guest.files.items():
+            folder.put(name, text)
+    names = [figure.name for figure in figures]
+    parts = words.contents(results, failures)
+    parts["faults"] = faults
+    parts["figures"] = figures
+    parts["guests"] = guests
+    parts["sections"] = [guest.section(names) for guest in guests]
+    terminal.check()
+    folder.put(PAGE, page.fill("page.html.j2", **parts))
+    return faults
+
+
+def _drawn(
+    results: "Results", folder: "Folder", every: bool
+) -> "tuple[list[Figure], list[str]]":
+    """The figures of a study, leading ones first, and a line for each that failed."""
+    from orchestrator.report import along, bed, flows, piles, poured, shields, style
+
+    drawing: list[Callable[[Results], Iterator[Figure]]] = [
         flows.hills,
         along.draw,
         bed.draw,
@@ -64,12 +78,12 @@ def write(
         piles.fractions,
         piles.wear,
         shields.accuracy,
-        piles.poured,
+        poured.draw,
         flows.stress,
         flows.flow,
         flows.mesh,
     ]
-    figures: list[style.Figure] = []
+    figures: list[Figure] = []
     faults: list[str] = []
     with style.settings():
         for draw in drawing:
@@ -81,24 +95,27 @@ def write(
                     figures.append(figure)
             except Exception as error:
                 name = f"{draw.__module__}.{draw.__name__}"
-                faults.append(f"{name}: {type(error).__name__}: {error}")
-                print(f"a figure could not be drawn: {faults[-1]}", file=sys.stderr)
+                fault = f"{name}: {type(error).__name__}: {error}"
+                faults.append(fault)
+                print(f"a figure could not be drawn: {fault}", file=sys.stderr)
             terminal.check()
     figures.sort(key=lambda figure: not figure.leads)
-    for guest in guests:
-        for name, text in guest.files.items():
-            folder.put(name, text)
-    names = [figure.name for figure in figures]
-    parts = words.contents(results, failures)
-    parts |= {"faults": faults, "figures": figures, "guests": guests}
-    parts["sections"] = [guest.section(names) for guest in guests]
-    terminal.check()
-    folder.put(PAGE, page.fill("page.html.j2", **parts))
-    return faults
+    return figures, faults
 
 
 def drawn_from(results: "Results") -> "list[Case]":
-    """The cases whose bulky files the page's pictures are drawn from."""
+    """Find the cases whose bulky files the page's pictures are drawn from.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Returns
+    -------
+    list of Case
+        The cases.
+    """
     from orchestrator.report import bed, flows
 
     if "pile_threshold" not in results.tables:
@@ -108,7 +125,20 @@ def drawn_from(results: "Results") -> "list[Case]":
 
 
 def said(results: "Results", guests: Sequence["Guest"] = ()) -> str:
-    """The answer of a study for a terminal, see `words.text`."""
+    """Write the answer of a study for a terminal, see `words.text`.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+    guests
+        Others that say a sentence before.
+
+    Returns
+    -------
+    str
+        The lines.
+    """
     from orchestrator.report import words
 
     return words.text(results, guests)

@@ -16,7 +16,8 @@ TAU_AXIS = r"threshold Shields number $τ_c$"
 WIDTH = 52
 """Letters of a line over a panel."""
 OTHERS = {
-    **{"fraction": Info("n/N", "n/N", "%"), "by": Info("by")},
+    "fraction": Info("n/N", "n/N", "%"),
+    "by": Info("by"),
     "answered_method": fields.ANSWERS["answered_method"].info,
 }
 """Words of columns of tables that are no fields."""
@@ -25,64 +26,195 @@ OF_METHODS = {"DEM", "DEM of piles", "DEM and peeling", "DEM and peeling of pile
 
 
 def words(column: str) -> Info:
-    """The words of a column."""
-    return OTHERS[column] if column in OTHERS else fields.COLUMNS[column].info
+    """Look up the words of a column.
+
+    Parameters
+    ----------
+    column
+        Name of a field's column, or one of `OTHERS`.
+
+    Returns
+    -------
+    Info
+        Its label, symbol, unit and choices.
+    """
+    if column in OTHERS:
+        return OTHERS[column]
+    return fields.COLUMNS[column].info
 
 
 def plain(column: str, value: Any) -> str:
-    """A value with its symbol or its label, such as ``d = 0.7 mm``."""
+    """Write a value with its symbol or its label.
+
+    Parameters
+    ----------
+    column
+        Name of the column.
+    value
+        A number in SI units, degrees or parts, one of the column's choices, or NaN.
+
+    Returns
+    -------
+    str
+        The text.
+
+    Examples
+    --------
+    >>> plain("d_m", 7e-4)
+    'd = 0.7 mm'
+    """
     info = words(column)
     if isinstance(value, str):
         return info.choices.get(value, f"{info.label} {value}")
     if pd.isna(value):
         return f"no {info.label}"
-    return f"{info.symbol.replace('_0', '₀') or info.label} = {amount(float(value), info.unit)}"
+    symbol = info.symbol.replace("_0", "₀") or info.label
+    return f"{symbol} = {amount(float(value), info.unit)}"
 
 
 def value(column: str, value: Any) -> str:
-    """A value without its symbol."""
+    """Write a value without its symbol.
+
+    Parameters
+    ----------
+    column
+        Name of the column.
+    value
+        A number in SI units, degrees or parts, one of the column's choices, or NaN.
+
+    Returns
+    -------
+    str
+        The text.
+
+    Examples
+    --------
+    >>> value("alpha_deg", 15.0)
+    '15°'
+    """
     info = words(column)
     if isinstance(value, str):
         return info.choices.get(value, value)
-    return "none" if pd.isna(value) else amount(value, info.unit)
+    if pd.isna(value):
+        return "none"
+    return amount(value, info.unit)
 
 
 def cells(rows: pd.DataFrame, columns: Sequence[str]) -> dict[str, list[str]]:
-    """Columns of a table with their values and heads as a reader sees them."""
-    return {
-        words(name).label: [value(name, item) for item in rows[name]]
-        for name in columns
-    }
+    """Write columns of a table as a reader sees them.
+
+    Parameters
+    ----------
+    rows
+        The table.
+    columns
+        Names of the columns.
+
+    Returns
+    -------
+    dict of str to list of str
+        The texts of the values, by the labels of the columns.
+    """
+    written = {}
+    for column in columns:
+        texts = [value(column, item) for item in rows[column]]
+        written[words(column).label] = texts
+    return written
 
 
 def told(row: pd.Series, columns: Sequence[str]) -> list[str]:
-    """The values of a row with their symbols, without those that the row does not have."""
-    shown = [
-        name for name in columns if pd.notna(row[name]) or name == "obstacles"
-    ]  # a list
-    return [plain(name, row[name]) for name in shown]
+    """Write the values of a row with their symbols.
+
+    Parameters
+    ----------
+    row
+        A row of a table.
+    columns
+        Names of the columns.
+
+    Returns
+    -------
+    list of str
+        The texts, without those of values that the row does not have.
+    """
+    texts = []
+    for column in columns:
+        is_list = column == "obstacles"
+        if is_list or pd.notna(row[column]):
+            texts.append(plain(column, row[column]))
+    return texts
 
 
 def panel(row: pd.Series, columns: Sequence[str]) -> str:
-    """The values of a row as a title, broken into lines that fit beside another panel."""
+    """Write the values of a row as the title of a panel.
+
+    Parameters
+    ----------
+    row
+        A row of a table.
+    columns
+        Names of the columns.
+
+    Returns
+    -------
+    str
+        Lines that fit beside another panel, with indices in mathematics.
+    """
     text = textwrap.fill(", ".join(told(row, columns)), WIDTH, break_long_words=False)
-    return re.sub(r"(\w)_(\w+) =", r"$\1_{\2}$ =", text)  # an index in mathematics
+    return re.sub(r"(\w)_(\w+) =", r"$\1_{\2}$ =", text)
 
 
 def amount(value: float, unit: str) -> str:
-    """A value with its unit; one in metres that is below 1 m is written in millimetres."""
+    """Write a value with its unit.
+
+    Parameters
+    ----------
+    value
+        A number of the unit; of ``%`` a part of 1.
+    unit
+        Its unit.
+
+    Returns
+    -------
+    str
+        The text; a length that is below 1 m is in millimetres.
+
+    Examples
+    --------
+    >>> amount(0.07464, "m"), amount(0.3, "%"), amount(1 / 30, "d")
+    ('74.64 mm', '30 %', 'd/30')
+    """
     if unit in ("d", "h"):
         return ratio_of(value, unit)
-    if unit == "m" and abs(value) >= 1:
-        return f"{value:.4g} m"
-    factor, written = {"m": (1e3, " mm"), "%": (100.0, " %"), "°": (1.0, "°")}.get(
-        unit, (0.0, "")
-    )
-    return f"{factor * value:.4g}{written}" if factor else f"{value:g} {unit}".rstrip()
+    if unit == "m":
+        return f"{value:.4g} m" if abs(value) >= 1 else f"{1e3 * value:.4g} mm"
+    if unit == "%":
+        return f"{100.0 * value:.4g} %"
+    if unit == "°":
+        return f"{value:.4g}°"
+    return f"{value:g} {unit}".rstrip()
 
 
 def interval(low: float, high: float, form: str = "#.3g") -> str:
-    """An interval as a text; one with an end that is not known (NaN, infinite) is open there."""
+    """Write an interval.
+
+    Parameters
+    ----------
+    low, high
+        Its ends; one that is not known (NaN, infinite) leaves it open there.
+    form
+        Format of a number.
+
+    Returns
+    -------
+    str
+        The text, one number where both ends are written alike.
+
+    Examples
+    --------
+    >>> interval(0.1, 0.2), interval(0.1, float("nan"))
+    ('0.100 … 0.200', 'above 0.100')
+    """
     ends = [format(float(end), form) for end in (low, high) if np.isfinite(end)]
     if len(ends) == 2:
         return " … ".join(dict.fromkeys(ends))
@@ -94,41 +226,87 @@ def interval(low: float, high: float, form: str = "#.3g") -> str:
 
 
 def ratio_of(ratio: float, length: str) -> str:
-    """A length over another, such as ``d/30``."""
+    """Write a length over another.
+
+    Parameters
+    ----------
+    ratio
+        The ratio.
+    length
+        Symbol of the other length.
+
+    Returns
+    -------
+    str
+        A part such as ``d/30`` where it is one, else a multiple.
+
+    Examples
+    --------
+    >>> ratio_of(1 / 30, "d"), ratio_of(2.5, "h")
+    ('d/30', '2.5 h')
+    """
     whole = round(1 / ratio)
-    is_whole = abs(1 - whole * ratio) < 1e-3 and whole <= 1000
-    return f"{length}/{whole}" if is_whole else f"{ratio:.3g} {length}"
+    is_part = abs(1 - whole * ratio) < 1e-3 and whole <= 1000
+    return f"{length}/{whole}" if is_part else f"{ratio:.3g} {length}"
 
 
 def methods(rows: pd.DataFrame) -> str:
-    """The methods that answered rows of a table."""
-    names = fields.ANSWERS["answered_method"].info.choices
-    return ", ".join(
-        name for key, name in names.items() if (rows["answered_method"] == key).any()
-    )
+    """Name the methods that answered rows of a table.
+
+    Parameters
+    ----------
+    rows
+        The rows, with a column ``answered_method``.
+
+    Returns
+    -------
+    str
+        The methods' labels, in the order in which they are declared.
+    """
+    used = set(rows["answered_method"])
+    choices = fields.ANSWERS["answered_method"].info.choices
+    return ", ".join(label for method, label in choices.items() if method in used)
 
 
 def varying(table: pd.DataFrame, *shown: str) -> list[str]:
-    """The fields in which rows differ that agree in all columns that are shown, seeds left out.
+    """Find the fields that tell rows apart which agree in all columns that are shown.
 
-    Of fields that vary together one is enough: questions, the method, fields of some methods.
+    Of fields that vary together one is enough: questions come before the method, and
+    that before the fields of some methods. Seeds are left out.
+
+    Parameters
+    ----------
+    table
+        The rows.
+    shown
+        Names of the columns that are shown anyway.
+
+    Returns
+    -------
+    list of str
+        Names of further columns.
     """
-
-    def rank(column: str) -> int:
-        info = fields.COLUMNS[column].info
-        of_answer = (
-            3 if info.about != "question" else 2 if info.scope in OF_METHODS else 0
-        )
-        return 1 if column == "method" else of_answer
-
-    columns = [name for name in fields.others(table, *shown) if name in fields.COLUMNS]
-    columns = [name for name in columns if fields.COLUMNS[name].info.about != "replica"]
+    columns = []
+    for column in fields.others(table, *shown):
+        field = fields.COLUMNS.get(column)
+        if field is not None and field.info.about != "replica":
+            columns.append(column)
     listed: list[str] = []
     groups = table.groupby(list(shown), dropna=False).ngroup().to_numpy()
-    for column in sorted(columns, key=rank):
+    for column in sorted(columns, key=_rank):
         codes, values = pd.factorize(table[column], use_na_sentinel=False)
         finer, names = pd.factorize(groups * len(values) + codes)
         if len(names) > groups.max(initial=-1) + 1:
             listed.append(column)
             groups = finer
     return listed
+
+
+def _rank(column: str) -> int:
+    """Place of a field among those that tell rows apart; the lowest comes first."""
+    info = fields.COLUMNS[column].info
+    if column == "method":
+        return 1
+    if info.about != "question":
+        return 3
+    return 2 if info.scope in OF_METHODS else 0

@@ -1,4 +1,4 @@
-"""Pages: templates, captions, values in HTML, and the page of an experiment in sections."""
+"""Pages: templates, captions, values in HTML, and the page of an experiment."""
 
 import base64
 import re
@@ -32,17 +32,31 @@ PACKAGES = (
     "scipy",
     "vtk",
 )
+"""Libraries whose versions a page names."""
 
 
 def fill(template: str, folder: Path = HERE, /, **values: Any) -> str:
-    """The text of a template, by default of one beside this file."""
-    css, script = (
-        Markup((HERE / name).read_text("utf-8")) for name in ("page.css", "page.js")
-    )
+    """Fill a template.
+
+    Parameters
+    ----------
+    template
+        Its file name.
+    folder
+        The directory that it is in, by default that of this file.
+    **values
+        Values by the names that the template has for them.
+
+    Returns
+    -------
+    str
+        The text.
+    """
+    script = (HERE / "page.js").read_text("utf-8")
     digest = base64.b64encode(sha256(script.encode()).digest()).decode("ascii")
     given = {
-        "css": css,
-        "script": script,
+        "css": Markup((HERE / "page.css").read_text("utf-8")),
+        "script": Markup(script),
         "script_digest": f"sha256-{digest}",
         **values,
     }
@@ -50,48 +64,100 @@ def fill(template: str, folder: Path = HERE, /, **values: Any) -> str:
 
 
 def caption(name: str, /, **values: Any) -> str:
-    """A caption or a sentence from its macro in ``captions.j2``, as plain text on one line."""
-    macro = getattr(
-        _templates(HERE, autoescape=False).get_template("captions.j2").module, name
-    )
+    """Write a caption or a sentence.
+
+    Parameters
+    ----------
+    name
+        Name of its macro in ``captions.j2``.
+    **values
+        Arguments of the macro.
+
+    Returns
+    -------
+    str
+        Plain text on one line.
+    """
+    template = _templates(HERE, autoescape=False).get_template("captions.j2")
+    macro = getattr(template.module, name)
     return " ".join(str(macro(**values)).split())
 
 
 @cache
 def _templates(folder: Path, autoescape: bool = True) -> Environment:
-    strict: dict[str, Any] = {"undefined": StrictUndefined, "trim_blocks": True}
+    """The templates of a directory, with the filters of all pages."""
     environment = Environment(
-        loader=FileSystemLoader(folder), autoescape=autoescape, **strict
+        loader=FileSystemLoader(folder),
+        autoescape=autoescape,
+        undefined=StrictUndefined,
+        trim_blocks=True,
     )
-    filters = {"typeset": typeset, "n": format, "address": address, "inline": _inline}
-    environment.filters.update({**filters, "cell": _cell})
-    short = {"separators": (",", ":"), "ensure_ascii": False, "allow_nan": False}
-    environment.policies["json.dumps_kwargs"] = short
+    environment.filters |= {
+        "typeset": typeset,
+        "n": format,
+        "address": address,
+        "inline": _inline,
+        "cell": _cell,
+    }
+    environment.policies["json.dumps_kwargs"] = {
+        "separators": (",", ":"),
+        "ensure_ascii": False,
+        "allow_nan": False,
+    }
     return environment
 
 
 @cache
 def typeset(text: str) -> Markup:
-    """HTML of a text: ``V_f`` has an index, ``why_not`` none; words in backticks are code."""
+    """Write a text as HTML: indices, and code.
+
+    Parameters
+    ----------
+    text
+        The text. A symbol such as ``V_f`` gets an index, a name such as ``why_not``
+        none; words in backticks are code.
+
+    Returns
+    -------
+    Markup
+        The HTML.
+
+    Examples
+    --------
+    >>> print(typeset("V_f < 1, see `why_not`"))
+    V<sub>f</sub> &lt; 1, see <code>why_not</code>
+    """
     index = r"\b([^\W\d_]|[^\W\d_a-z][^\W\d_]{1,2})_([A-Za-z]+)\b(?!_)"
     html = re.sub(index, r"\1<sub>\2</sub>", str(escape(text)))
     return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", html))
 
 
 def address(image: bytes) -> str:
-    """A PNG or SVG image as the address of a picture in a page."""
+    """Write an image as the address of a picture in a page.
+
+    Parameters
+    ----------
+    image
+        A PNG or an SVG file.
+
+    Returns
+    -------
+    str
+        A ``data:`` address.
+    """
     kind = "png" if image.startswith(b"\x89PNG") else "svg+xml"
     return f"data:image/{kind};base64,{base64.b64encode(image).decode('ascii')}"
 
 
 def _inline(figure: "Figure") -> Markup:
-    """The SVG of a figure as a part of the page: without prolog and metadata, with a title."""
-    svg = figure.image.decode("utf-8")
-    svg = re.sub(
-        r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL
-    )
-    label = f'<svg role="img" aria-label="{escape(figure.title)}"'
-    return Markup(svg if 'role="img"' in svg[:400] else svg.replace("<svg", label, 1))
+    """The SVG of a figure for a page: without prolog and metadata, with a title."""
+    text = figure.image.decode("utf-8")
+    svg = text[text.index("<svg") :]
+    svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
+    if 'role="img"' not in svg[:400]:
+        label = f'<svg role="img" aria-label="{escape(figure.title)}"'
+        svg = svg.replace("<svg", label, 1)
+    return Markup(svg)
 
 
 def _cell(value: Any) -> str:
@@ -105,9 +171,18 @@ def _cell(value: Any) -> str:
 
 @dataclass(frozen=True)
 class Guest:
-    """What another package adds to a page: a sentence at its head, a section, texts of files.
+    """What another package adds to a page.
 
-    `section`, of an anchor `name`, gets the names of the page's figures in their order.
+    Attributes
+    ----------
+    name
+        The anchor of its section.
+    said
+        A sentence at the head of the page.
+    section
+        Makes the section from the names of the page's figures in their order.
+    files
+        Texts of files beside the page, by name.
     """
 
     name: str
@@ -118,7 +193,19 @@ class Guest:
 
 @dataclass(frozen=True)
 class Section:
-    """A part of an experiment's page, its answer if untitled; `limits` is what not to conclude."""
+    """A part of the page of an experiment.
+
+    Attributes
+    ----------
+    title
+        Its title; the answer of the experiment has none.
+    text
+        What stands before its figures.
+    figures, tables
+        What it shows.
+    limits
+        What a reader should not conclude.
+    """
 
     title: str
     text: str = ""
@@ -128,13 +215,24 @@ class Section:
 
 
 def versions(solvers: Mapping[str, str]) -> pd.DataFrame:
-    """Solvers with their versions, this package, and the libraries that are not among them."""
-    rows = [
-        *sorted(solvers.items()),
-        ("orchestrator", __version__),
-        ("Python", python_version()),
-    ]
-    rows += [(name, metadata.version(name)) for name in PACKAGES if name not in solvers]
+    """List the programs that results come from.
+
+    Parameters
+    ----------
+    solvers
+        Versions of the solvers, by name.
+
+    Returns
+    -------
+    DataFrame
+        Programs and versions: solvers, this package, and `PACKAGES`.
+    """
+    rows = sorted(solvers.items())
+    rows.append(("orchestrator", __version__))
+    rows.append(("Python", python_version()))
+    for name in PACKAGES:
+        if name not in solvers:
+            rows.append((name, metadata.version(name)))
     return pd.DataFrame(rows, columns=["program", "version"])
 
 
@@ -145,15 +243,32 @@ def write(
     name: str,
     solvers: Mapping[str, str],
 ) -> None:
-    """Put the page of an experiment, a file `name`, with its figures as PNG and SVG beside it."""
+    """Write the page of an experiment, with its figures as PNG and SVG beside it.
+
+    Parameters
+    ----------
+    title
+        Its title.
+    sections
+        Its parts, the answer first.
+    folder
+        The directory of the experiment.
+    name
+        File name of the page.
+    solvers
+        Versions of the solvers, by name.
+    """
     from orchestrator.report import style  # it imports matplotlib
 
-    images = (
-        [style.saved(item, folder, png=True) for item in part.figures]
-        for part in sections
+    drawn = []
+    for section in sections:
+        figures = [style.saved(figure, folder, png=True) for figure in section.figures]
+        drawn.append(replace(section, figures=figures))
+    text = fill(
+        "document.html.j2",
+        title=title,
+        sections=drawn,
+        programs=versions(solvers),
+        links={},
     )
-    shown = [
-        replace(part, figures=each) for part, each in zip(sections, images, strict=True)
-    ]
-    values = {"sections": shown, "programs": versions(solvers), "links": {}}
-    folder.put(name, fill("document.html.j2", title=title, **values))
+    folder.put(name, text)

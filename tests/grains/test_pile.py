@@ -12,7 +12,7 @@ from orchestrator.grains.loads import Loads
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile, flows
 from orchestrator.grains.threshold import sampled, within
-from orchestrator.report import piles
+from orchestrator.report import poured
 from orchestrator.report.results import Results
 from orchestrator.study import study
 from orchestrator.study.closed_form import closed_form
@@ -263,7 +263,7 @@ def test_each_method_answers_on_one_shared_bed(
     assert early.between(0.003, 0.2).all()
     held = made["pile_grain"]["pivot_deg"].dropna()
     assert held.between(-90, 180).all()
-    drawn = piles.poured(results)
+    drawn = poured.draw(results)
     names = {f"poured-{method}" for method in early.index}
     assert {figure.name for figure in drawn} >= names | {"pivots"}
 

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.report import bed, labels, shields, words
+from orchestrator.report import bed, labels, sheets, shields, words
 from orchestrator.report.results import Results
 from orchestrator.report.shields import LABEL, SHAPE
 from orchestrator.study import fields
@@ -64,7 +64,7 @@ def test_what_is_asked_parts_panels_and_what_answers_has_markers(
 
 
 def test_page_lists_every_parameter(results: Results) -> None:
-    rows = {row[2]: row[3:] for row in words.parameters(results).to_numpy().tolist()}
+    rows = {row[2]: row[3:] for row in sheets.parameters(results).to_numpy().tolist()}
     used = [column for column in fields.COLUMNS if results.scenes[column].notna().any()]
     assert rows.keys() >= {fields.COLUMNS[column].name or column for column in used}
     assert rows["flow.first_cell_height"][0] == "default"
@@ -99,10 +99,10 @@ def test_each_fluid_has_a_row_and_a_sentence(results: Results) -> None:
     fluids: list[dict[str, Any]] = [
         {"rho_f_kg_m3": rho, "d_m": 1e-3 * (1 + n), "usable": True}
         for rho in (1.2, 1e3)
-        for n in range(words.FEW)
+        for n in range(sheets.MOST_LISTED)
     ]
     study = copies(results, *fluids)
-    sheet, said = words.short(study), " ".join(words.answer(study).sentences)
+    sheet, said = sheets.short(study), " ".join(words.answer(study).sentences)
     assert sheet is not None
     assert len(sheet) == 2
     assert "1.2 kg/m³" in said
@@ -115,7 +115,7 @@ def test_seeds_are_one_row_with_their_range(results: Results) -> None:
         {"seed": n, "packing": "disordered", "shields": t} for n, t in enumerate(thetas)
     )
     study = copies(results, *seeds)
-    sheet = words.short(study)
+    sheet = sheets.short(study)
     assert sheet is not None
     assert set(sheet["usable"]) == {"3 of 3 seeds"}
     assert set(sheet["τ_c"]) == {"0.0400 … 0.0900"}
@@ -131,7 +131,7 @@ def test_a_study_of_single_grains_has_an_answer_too(results: Results) -> None:
         answered_method="pivot", ustar_m_s=np.nan
     )
     exact = changed(grains, single_grain=without)
-    sheet = words.short(exact)
+    sheet = sheets.short(exact)
     assert sheet is not None
     assert set(sheet["by"]) == {"closed form"}
     assert "One grain" in words.answer(exact).sentences[0]
@@ -144,7 +144,7 @@ def test_a_threshold_that_is_not_usable_says_so(results: Results) -> None:
     study = changed(results, pile_threshold=bad)
     assert "(not usable: Re* 2 is below 30)." in words.answer(study).sentences[0]
     assert words.doubts(study)[0] == "Usable: 0 of 4 thresholds."
-    sheet = words.short(study)
+    sheet = sheets.short(study)
     assert sheet is not None
     assert set(sheet["usable"]) == {"no: Re* 2 is below 30"}
 
@@ -152,7 +152,7 @@ def test_a_threshold_that_is_not_usable_says_so(results: Results) -> None:
 def test_an_interval_without_an_end_is_written_so(results: Results) -> None:
     thresholds = results.tables["pile_threshold"]
     study = changed(results, pile_threshold=thresholds.assign(shields_high=np.nan))
-    sheet = words.short(study)
+    sheet = sheets.short(study)
     assert sheet is not None
     lows = [f"above {low:#.3g}" for low in thresholds["shields_low"]]
     assert sheet["interval"].tolist() == lows
@@ -163,7 +163,7 @@ def test_an_interval_without_an_end_is_written_so(results: Results) -> None:
     half = thresholds.assign(
         shields_high=thresholds["shields_high"].where(np.array([True, False] * 2))
     )
-    ranges = words.short(
+    ranges = sheets.short(
         copies(changed(results, pile_threshold=half), *({"seed": n} for n in (0, 1)))
     )
     assert ranges is not None
@@ -173,7 +173,7 @@ def test_an_interval_without_an_end_is_written_so(results: Results) -> None:
     ] * 2
     # where no error is known neither end is
     none = thresholds.assign(shields_low=np.nan, shields_high=np.nan)
-    sheet = words.short(changed(results, pile_threshold=none))
+    sheet = sheets.short(changed(results, pile_threshold=none))
     assert sheet is not None
     assert set(sheet["interval"]) == {"—"}
 

@@ -1,0 +1,382 @@
+"""The tables of a page: thresholds, force laws, parameters and fidelity levels."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from orchestrator.fidelity import levels as fidelity
+from orchestrator.grains.threshold import STEP
+from orchestrator.physics.laws import LAWS
+from orchestrator.report import labels
+from orchestrator.report.results import Results, split
+from orchestrator.study import fields
+
+SPEEDS = {
+    "wind_1m_m_s": "wind at 1 m",
+    "wind_10m_m_s": "wind at 10 m",
+    "mean_velocity_m_s": "mean velocity",
+}
+"""Speeds of a flow that are measured in the field, by their columns."""
+MIXED = 2.0
+"""Least ratio of sizes that are told apart."""
+MOST_LISTED = 12
+"""Piles, or values of a parameter, that are listed each; of more the range is told."""
+EACH = ("alpha_deg", "d_m", "force_law")
+"""Columns that each row of a table of single piles tells."""
+RANGES = ("alpha_deg", "force_law")
+"""Columns that each row of a table of ranges tells."""
+TAU = "τ_c"
+
+
+def short(results: Results) -> pd.DataFrame | None:
+    """List the thresholds in at most a screen: of few scenes each, of many their range.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Returns
+    -------
+    DataFrame or None
+        Of piles thresholds at every fraction if these are few, else at one; of single
+        grains those of the grains. None without thresholds.
+    """
+    every = results.joined("pile_threshold")
+    if len(every):
+        here = results.at_fraction
+        head = f"{TAU} at n/N = {here['fraction'].iloc[0]:.0%}"
+        keys = [*EACH, *labels.varying(here, *EACH)]
+        if _fits(every, [*keys, "fraction"]):
+            return _thresholds(every, [*keys, "fraction"], TAU)
+        return _thresholds(here, keys if _fits(here, keys) else RANGES, head)
+    grains = single_grains(results)
+    if grains.empty:
+        return None
+    keys = [*EACH, *labels.varying(grains, *EACH), "by"]
+    return _thresholds(grains, keys if _fits(grains, keys) else [*RANGES, "by"], TAU)
+
+
+def _fits(rows: pd.DataFrame, keys: Sequence[str]) -> bool:
+    """Whether a table with a row for each combination of some columns fits a screen."""
+    return len(rows[list(keys)].drop_duplicates()) <= MOST_LISTED
+
+
+def piles(results: Results) -> pd.DataFrame | None:
+    """List the thresholds of the piles at every fraction.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Returns
+    -------
+    DataFrame or None
+        The name of the case first; None without piles.
+    """
+    rows = results.joined("pile_threshold")
+    if rows.empty:
+        return None
+    keys = [*EACH, "z0_over_d", "nu_m2_s"]
+    keys += labels.varying(rows, *keys, "fraction")
+    if rows["seed"].nunique() > 1:
+        keys.append("seed")
+    keys.append("fraction")
+    return _thresholds(rows, keys, TAU, more=("case", "count"))
+
+
+def single_grains(results: Results) -> pd.DataFrame:
+    """List single grains with their thresholds: by DEM, or else by the closed form.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Returns
+    -------
+    DataFrame
+        The rows of ``single_grain`` with the columns of a pile's threshold, and ``by``.
+    """
+    rows = results.joined("single_grain")
+    if rows.empty:
+        return rows
+    is_dem = rows["answered_method"] == "dem"
+    exact = rows["shields_closed_form"]
+    re = rows["reynolds"].where(is_dem, rows["reynolds_closed_form"])
+    values = {}
+    for end in ("", "_low", "_high"):
+        values[f"shields{end}"] = rows[f"shields_dem{end}"].where(is_dem, exact)
+    ustar = rows["ustar_m_s"].where(is_dem, rows["ustar_closed_form_m_s"])
+    values["ustar0_m_s"] = ustar
+    values["by"] = is_dem.map({True: "DEM", False: "closed form"})
+    return pd.concat([rows.assign(reynolds=re), pd.DataFrame(values)], axis=1)
+
+
+def _thresholds(
+    rows: pd.DataFrame, keys: Sequence[str], head: str, more: Sequence[str] = ()
+) -> pd.DataFrame:
+    """A row for thresholds that agree in some columns, with the range of the usable.
+
+    `head` is that of the Shields number, and `more` are columns that come first, in
+    place of speeds and of what was measured.
+    """
+    is_range = "d_m" not in keys
+    if is_range:
+        # fluids are never merged
+        differ = [
+            name for name in ("rho_f_kg_m3", "nu_m2_s") if rows[name].nunique() > 1
+        ]
+        keys = [*differ, *keys]
+    order = list(keys) if is_range else ["alpha_deg", "d_m"]
+    rows = rows.sort_values(order, kind="stable")
+    rows = _open_ended(rows, "shields_low", "shields_high")
+    number = rows.groupby(list(keys), dropna=False, sort=False).ngroup()
+    usable = rows["usable"].groupby(number)
+    is_told = rows["usable"] | ~usable.transform("any")
+    shown = rows[is_told].groupby(number)
+    low = shown.min(numeric_only=True).astype(float)
+    high = shown.max(numeric_only=True).astype(float)
+    first = shown.first()
+    table: dict[str, Any] = {column: first[column] for column in more}
+    table |= labels.cells(first, keys)
+    if is_range:
+        low[~usable.any()] = np.nan
+        d_mm = 1e3 * rows["d_m"].groupby(number).agg(["min", "max"])
+        table["diameter, mm"] = _ranges(d_mm["min"], d_mm["max"], "g")
+    known = set() if more else set(rows.columns[rows.notna().any()])
+    spans = {"u*₀, m/s": ["ustar0_m_s"]}
+    for name, text in SPEEDS.items():
+        if name in known:
+            spans[f"{text}, m/s"] = [name]
+    spans[head] = ["shields"]
+    spans["interval"] = ["shields_low", "shields_high"]
+    if "shields_model_low" in known and not is_range:
+        share = ", ".join(first["model_share"].dropna().unique())
+        model = f"model's interval, most by {share}"
+        spans[model] = ["shields_model_low", "shields_model_high"]
+    if "measured_low" in known:
+        spans["measured"] = ["measured_low", "measured_high"]
+    table |= _spans(low, high, spans)
+    reasons = zip(usable.sum(), usable.size(), first["why_not"], strict=True)
+    table["usable"] = [_usable(*reason, is_range) for reason in reasons]
+    return pd.DataFrame(table)
+
+
+def _usable(count: int, of: int, why_not: str, is_range: bool) -> str:
+    """How many of the thresholds of a row are usable, or why one is not."""
+    if is_range:
+        return f"{count} of {of}"
+    if of > 1:
+        return f"{count} of {of} seeds"
+    return "yes" if count else f"no: {why_not}"
+
+
+def sizes(results: Results) -> pd.DataFrame | None:
+    """List the thresholds of the sizes of mixtures at one fraction.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Returns
+    -------
+    DataFrame or None
+        A row for each size, all seeds together. None where sizes hardly differ.
+    """
+    rows = results.joined("size_class")
+    if rows.empty or rows["size_over_d"].max() < MIXED * rows["size_over_d"].min():
+        return None
+    fraction = results.at_fraction["fraction"].iloc[0]
+    rows = rows[rows["fraction"] == fraction]
+    keys = labels.varying(rows, "fraction")
+    size = rows["size_over_d"]
+    number = np.rint(np.log(size) / np.log(STEP))
+    stress = rows[["hiding", "hiding_wilcock_crowe"]].mul(size, axis=0)
+    rows = rows.assign(size=1e3 * size * rows["d_m"], **stress)
+    rows = _open_ended(rows, "shields_own_low", "shields_own_high")
+    by = [*(rows[key] for key in keys), number]
+    groups = rows.groupby(by, dropna=False, sort=False)
+    low = groups.min(numeric_only=True)
+    high = groups.max(numeric_only=True)
+    told = pd.DataFrame(labels.cells(groups.first()[[]].reset_index(), keys))
+    spans = {
+        f"u*₀ at n/N = {fraction:.0%}, m/s": ["ustar0_m_s"],
+        "stress over that of d50": ["hiding"],
+        "measured (Wilcock & Crowe 2003)": ["hiding_wilcock_crowe"],
+        "θ of its own size": ["shields_own"],
+        "interval of θ": ["shields_own_low", "shields_own_high"],
+    }
+    moved = []
+    for least, most in zip(
+        low["class_moved_low"], high["class_moved_high"], strict=True
+    ):
+        moved.append(labels.interval(100 * least, 100 * most, ".0f"))
+    grains = []
+    counts = _ranges(low["count"], high["count"], "g")
+    for count, is_few in zip(counts, groups["few"].any(), strict=True):
+        grains.append(f"{count}: under ten" if is_few else count)
+    # a bed is named once
+    is_repeated = told.eq(told.shift()).all(axis=1)
+    return pd.DataFrame(
+        {
+            **told.mask(is_repeated, ""),
+            "size, mm": [f"{size:.3g}" for size in groups["size"].mean()],
+            **_spans(low, high, spans),
+            "part that had moved, %": moved,
+            "exposed grains of a bed": grains,
+        }
+    )
+
+
+def _open_ended(rows: pd.DataFrame, low: str, high: str) -> pd.DataFrame:
+    """Rows in which an end that only the other column of an interval has is infinite.
+
+    The least and the largest end of several intervals, of which one is open, are then
+    open as well.
+    """
+    has_no_low = rows[low].isna()
+    has_no_high = rows[high].isna()
+    ends = {
+        low: rows[low].mask(has_no_low & ~has_no_high, -np.inf),
+        high: rows[high].mask(has_no_high & ~has_no_low, np.inf),
+    }
+    return rows.assign(**ends)
+
+
+def _spans(
+    low: pd.DataFrame, high: pd.DataFrame, spans: Mapping[str, Sequence[str]]
+) -> dict[str, list[str]]:
+    """Columns of ranges by their heads: of one from its least to its largest value.
+
+    Of the two columns of an interval from the least of the first to the largest of the
+    second.
+    """
+    columns = {}
+    for head, names in spans.items():
+        if len(names) == 1:
+            columns[head] = _ranges(low[names[0]], high[names[0]])
+            continue
+        ends = zip(low[names[0]], high[names[1]], strict=True)
+        columns[head] = [labels.interval(least, most) for least, most in ends]
+    return columns
+
+
+def _ranges(
+    low: Iterable[float], high: Iterable[float], form: str = "#.3g"
+) -> list[str]:
+    """The range between each two values as a text, one number where they are alike."""
+    texts = []
+    for least, most in zip(low, high, strict=True):
+        ends = [format(float(least), form), format(float(most), form)]
+        texts.append("—" if "nan" in ends else " … ".join(dict.fromkeys(ends)))
+    return texts
+
+
+def force_laws(results: Results) -> pd.DataFrame:
+    """List the force laws of the scenes.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Returns
+    -------
+    DataFrame
+        Where each law holds, and where it was taken from.
+    """
+    used = set(results.scenes["force_law"])
+    rows = []
+    for name, law in LAWS.items():
+        if name not in used:
+            continue
+        low, high = law.reynolds
+        holds = f"{low:g} ≤ Re* < {high:g}".replace("inf", "∞")
+        if np.isfinite(law.drag_end):
+            holds += f", V d/ν < {law.drag_end:g} (drag: {law.drag_law})"
+        rows.append((law.label, holds, law.reference))
+    return pd.DataFrame(rows, columns=["force law", "holds for", "source"])
+
+
+def parameters(results: Results) -> pd.DataFrame:
+    """List the values that each parameter of the scenes takes.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Returns
+    -------
+    DataFrame
+        What is asked for, and what answers it if that is something else.
+    """
+    rows = []
+    for column, item in fields.COLUMNS.items():
+        asked = _values(results.scenes[column])
+        answered = asked
+        twin = fields.ANSWERED + column
+        if twin in fields.ANSWERS:
+            answered = _values(results.scenes[twin])
+        if not asked and not answered:
+            continue
+        name = item.info.label
+        symbol = item.info.symbol.replace("_0", "₀")
+        if symbol:
+            name = f"{name}, {symbol}" if name else symbol
+        other = "" if answered == asked else answered
+        field = item.name or column
+        rows.append((name, item.info.unit, field, asked or "default", other))
+    head = ("parameter", "unit", "in a study file", "asked for")
+    return pd.DataFrame(rows, columns=[*head, "answered with, if otherwise"])
+
+
+def _values(column: pd.Series) -> str:
+    """The different values of a column, of many the ends."""
+    values = column.dropna().unique()
+    # numbers before texts
+    ordered = sorted(values, key=lambda value: (isinstance(value, str), value))
+    texts: list[str] = []
+    for value in ordered:
+        text = value if isinstance(value, str) else f"{value:.6g}"
+        if text not in texts:
+            texts.append(text)
+    if len(texts) > MOST_LISTED:
+        texts = [*texts[:2], "…", texts[-1]]
+    return ", ".join(texts)
+
+
+def levels(results: Results) -> pd.DataFrame | None:
+    """List the fidelity levels that answered the piles.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Returns
+    -------
+    DataFrame or None
+        Why each was chosen, and what is known of it; None without piles.
+    """
+    meanings = {}
+    for part in fidelity.LEVELS.values():
+        for level in part:
+            meanings[level.name] = level.meaning
+    table = results.joined("pile_threshold")
+    rows = []
+    for (flow, grain, why), group in split(table, "flow_level", "grain_level", "why"):
+        names = (str(flow), str(grain))
+        meaning = "; ".join(meanings[name] for name in names if name in meanings)
+        error = 100 * group["error_estimate"].max()
+        beds = group["scene_id"].nunique()
+        rows.append((f"{flow} | {grain}", meaning, why, beds, error))
+    if not rows:
+        return None
+    head = ("flow | grains", "description", "reason", "beds")
+    return pd.DataFrame(rows, columns=[*head, "known error of τ_c, at most, %"])
