@@ -54,6 +54,10 @@ DESCRIBED = (
     "orchestrator.solvers.doctor",
     "orchestrator.solvers.liggghts",
     "orchestrator.solvers.openfoam",
+    "orchestrator.tables",
+    "orchestrator.tables.check",
+    "orchestrator.tables.rows",
+    "orchestrator.tables.usable",
 )
 """Modules whose docstrings have the sections of numpydoc."""
 

@@ -44,7 +44,7 @@ def fill(template: str, folder: Path = HERE, /, **values: Any) -> str:
         Its file name.
     folder
         The directory that it is in, by default that of this file.
-    **values
+    values
         Values by the names that the template has for them.
 
     Returns
@@ -70,7 +70,7 @@ def caption(name: str, /, **values: Any) -> str:
     ----------
     name
         Name of its macro in ``captions.j2``.
-    **values
+    values
         Arguments of the macro.
 
     Returns

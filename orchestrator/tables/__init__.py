@@ -1,15 +1,17 @@
-"""The tables of a study: what was asked, what was measured, with units in the columns' names.
+"""The tables of a study: what was asked, what was measured, with units in the names.
 
-Tables of results hold no time and no path of a machine, and numbers of nine digits: the same study
-gives the same bytes wherever and whenever it runs. The times of the runs are in `timings`.
+Tables of results hold no time and no path of a machine, and numbers of nine digits: the
+same study gives the same bytes wherever and whenever it runs. The times of the runs are
+in `timings`.
 """
 
 import re
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from csv import writer
 from fnmatch import fnmatchcase
 from functools import cache
 from io import BytesIO, StringIO
+from itertools import chain
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -29,64 +31,77 @@ from orchestrator.tables.usable import with_scatter, with_usable
 from orchestrator.types import Row
 
 Tables = dict[str, pd.DataFrame]
+"""Tables by their names."""
 
-COLUMNS: dict[str, str] = {
-    **pd.read_csv(Path(__file__).with_name("columns.csv"), index_col="column")[
-        "meaning"
-    ],
-    **{column: one.phrase for column, one in fields.COLUMNS.items()},
-    **{
-        column: f"{one.phrase}: as it was run" for column, one in fields.ANSWERS.items()
-    },
-}
+
+def _meanings() -> dict[str, str]:
+    """Every column of every table, with its meaning."""
+    file = Path(__file__).with_name("columns.csv")
+    of_others = pd.read_csv(file)
+    meanings = dict(zip(of_others["column"], of_others["meaning"], strict=True))
+    for column, field in fields.COLUMNS.items():
+        meanings[column] = field.phrase
+    for column, field in fields.ANSWERS.items():
+        meanings[column] = f"{field.phrase}: as it was run"
+    return meanings
+
+
+COLUMNS: dict[str, str] = _meanings()
 """Every column of every table, with its meaning; units are in the names."""
 FORMULA = r"(?='*(?:[=@\t\n]|[+-](?![\d.]+(?:e[+-]?\d+)?$|inf$)))"
-"""What follows the beginning of a text that spreadsheets run as a formula; no number is one. Such a
-text is written behind one more apostrophe."""
+"""What follows the beginning of a text that spreadsheets run as a formula; no number is
+one. Such a text is written behind one more apostrophe."""
 NAMES = ("scene_id", "group", "profile", "case", "flow_case", "why_not")
 """Columns of texts that may look like numbers, or be empty."""
 
 
 def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
-    """The tables of a study that have rows, from the cases that are done; in the study's order."""
-    flows = {
-        name: solve
-        for pile in plan.piles.values()
-        for name, solve in pile.solves.items()
-    }
-    flows = {name: solve for name, solve in flows.items() if name in done}
-    answers = [
-        rows.Answer(
-            plan.decisions[scene_id], pile, cases, _smoothed(plan, scene_id, done)
-        )
-        for scene_id, pile in plan.piles.items()
-        if pile.is_run(done)
-    ]
+    """Make the tables of a study from the cases that are done.
+
+    Parameters
+    ----------
+    study
+        The study.
+    plan
+        Its decisions and cases.
+    cases
+        The directory of the cases.
+    done
+        Names of the cases that are done.
+
+    Returns
+    -------
+    dict of str to DataFrame
+        The tables that have rows, in the study's order.
+    """
+    flows: dict[str, Pile] = {}
+    answers = []
+    for scene_id, pile in plan.piles.items():
+        for name, solve in pile.solves.items():
+            if name in done:
+                flows[name] = solve
+        if pile.is_run(done):
+            smoothed = _smoothed(plan, scene_id, done)
+            decision = plan.decisions[scene_id]
+            answers.append(rows.Answer(decision, pile, cases, smoothed))
     asked = pd.DataFrame(rows.scenes(study, plan))
     cells = [cell for cell in plan.cells if cell.name in done]
     grains = pd.DataFrame(rows.single_grain(plan, cells, cases))
-    thresholds = pd.DataFrame(
-        row for answer in answers for row in rows.pile_threshold(answer)
-    )
-    thresholds = with_scatter(thresholds, asked)
+    thresholds = with_scatter(_listed(rows.pile_threshold, answers), asked)
     checks = with_agreement(pd.DataFrame(rows.check(plan, cases, done)), thresholds)
+    against = contradictions(checks)
+    stress = [rows.wall_stress(pile, cases) for pile in flows.values()]
     made = {
         "scenes": asked,
         "single_grain": with_usable(grains, asked, study.tolerance),
-        "wall_stress": _stacked(
-            rows.wall_stress(pile, cases) for pile in flows.values()
-        ),
-        "flow": pd.DataFrame(rows.flow(pile, cases) for pile in flows.values()),
+        "wall_stress": _stacked(stress),
+        "flow": pd.DataFrame([rows.flow(pile, cases) for pile in flows.values()]),
         "pile_grain": _stacked(map(rows.pile_grain, answers)),
         "pile_curve": _stacked(map(rows.pile_curve, answers)),
-        "pile_threshold": with_usable(
-            thresholds, asked, study.tolerance, contradictions(checks)
-        ),
-        "size_class": pd.DataFrame(
-            row for one in answers for row in rows.size_class(one)
-        ),
+        "pile_threshold": with_usable(thresholds, asked, study.tolerance, against),
+        "size_class": _listed(rows.size_class, answers),
         "bed_change": _stacked(rows.bed_changes(answers)),
-        "form": pd.DataFrame(row for one in answers for row in rows.forms(one)),
+        "form": _listed(rows.forms, answers),
         "check": checks,
     }
     return {name: table for name, table in made.items() if not table.empty}
@@ -98,42 +113,69 @@ def _smoothed(plan: Plan, scene_id: str, done: Container[str]) -> dict[float, Pi
     return {factor: pile for factor, pile in piles.items() if pile.is_run(done)}
 
 
-def _stacked(parts: Iterable[Row]) -> pd.DataFrame:
-    """The columns of many parts one below the other; not a number where a part lacks a column.
+def _listed(
+    rows_of: Callable[[rows.Answer], Iterable[Row]], answers: Iterable[rows.Answer]
+) -> pd.DataFrame:
+    """The rows of all answers below each other."""
+    return pd.DataFrame(chain.from_iterable(map(rows_of, answers)))
 
-    Numbers and texts are repeated along the arrays of their part. `concat` takes ten times as long.
+
+def _stacked(parts: Iterable[Row]) -> pd.DataFrame:
+    """The columns of many parts one below the other; NaN where a part lacks a column.
+
+    Numbers and texts are repeated along the arrays of their part. `concat` takes ten
+    times as long.
     """
-    arrays = [
-        dict(zip(part, np.broadcast_arrays(*part.values()), strict=True))
-        for part in parts
-    ]
-    empty = [np.full(next(iter(part.values())).shape, np.nan) for part in arrays]
+    blocks = []
+    for part in parts:
+        arrays = np.broadcast_arrays(*part.values())
+        blocks.append(dict(zip(part, arrays, strict=True)))
+    names = dict.fromkeys(name for block in blocks for name in block)
     columns = {}
-    for name in dict.fromkeys(name for part in arrays for name in part):
-        values = [part.get(name, nan) for part, nan in zip(arrays, empty, strict=True)]
+    for name in names:
+        values = []
+        for block in blocks:
+            if name in block:
+                values.append(block[name])
+            else:
+                shape = next(iter(block.values())).shape
+                values.append(np.full(shape, np.nan))
         columns[name] = np.concatenate(values)
     return pd.DataFrame(columns)
 
 
 def timings(plan: Plan, states: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
-    """Wall times of the finished cases, from their states by name."""
-    rows = [
-        (
-            name,
-            plan.cases[name].kind,
-            it["solver_s"],
-            it["cpu_s"],
-            it["wall_s"] - it["solver_s"],
-        )
-        for name, it in states.items()
-    ]
-    return pd.DataFrame(
-        rows, columns=["case", "kind", "solver_s", "cpu_s", "outside_s"]
-    )
+    """List the times of the finished cases.
+
+    Parameters
+    ----------
+    plan
+        The plan of the study.
+    states
+        The states of the finished cases, by name.
+
+    Returns
+    -------
+    DataFrame
+        Wall and processor time of the solver, and the time outside of it, s.
+    """
+    times = []
+    for name, state in states.items():
+        solver_s = state["solver_s"]
+        row = {
+            "case": name,
+            "kind": plan.cases[name].kind,
+            "solver_s": solver_s,
+            "cpu_s": state["cpu_s"],
+            "outside_s": state["wall_s"] - solver_s,
+        }
+        times.append(row)
+    columns = ["case", "kind", "solver_s", "cpu_s", "outside_s"]
+    return pd.DataFrame(times, columns=columns)
 
 
 def csv(table: pd.DataFrame, form: str = "") -> str:
-    """A table as CSV, in which no text is one of `FORMULA`.
+    """Write a table as CSV, in which no text is one of `FORMULA`.
 
     Parameters
     ----------
@@ -146,8 +188,16 @@ def csv(table: pd.DataFrame, form: str = "") -> str:
     Returns
     -------
     str
-        A line for the names of the columns, and one for each row; nothing stands where a
-        number is NaN or a value is None.
+        A line for the names of the columns, and one for each row; nothing stands where
+        a number is NaN or a value is None.
+
+    Examples
+    --------
+    >>> table = pd.DataFrame({"d_m": [1e-3, float("nan")], "name": ["=1+1", "sand"]})
+    >>> print(csv(table), end="")
+    d_m,name
+    0.001,'=1+1
+    ,sand
     """
     # pandas takes twice as long: it writes equal numbers anew
     columns = [[_harmless(str(name)), *_written(table[name], form)] for name in table]
@@ -157,6 +207,7 @@ def csv(table: pd.DataFrame, form: str = "") -> str:
 
 
 def _written(column: "pd.Series[Any]", form: str) -> Iterable[str]:
+    """The values of a column as texts; each different number is written once."""
     values = column.to_numpy()
     if values.dtype.kind not in "biuf":
         return [_text(value, form) for value in column.tolist()]
@@ -166,7 +217,9 @@ def _written(column: "pd.Series[Any]", form: str) -> Iterable[str]:
 
 
 def _text(value: Any, form: str) -> str:
-    if value is None or value != value:
+    """A value as it stands in a file."""
+    is_missing = value is None or value != value
+    if is_missing:
         return ""
     if not isinstance(value, float):
         return _harmless(str(value))
@@ -175,6 +228,7 @@ def _text(value: Any, form: str) -> str:
 
 @cache
 def _harmless(text: str) -> str:
+    """A text that no spreadsheet runs as a formula."""
     # a reader takes \r without quotes for the end of the row
     lines = re.sub(r"\r\n?", "\n", text)
     return f"'{lines}" if re.match(FORMULA, lines) else lines
@@ -188,18 +242,40 @@ def _as_it_was(text: Any) -> Any:
 
 
 def write(tables: Mapping[str, pd.DataFrame], folder: Folder, place: str) -> None:
-    """Put each table into a sub-directory of a folder, and the meanings of the columns."""
+    """Write tables, and the meanings of their columns.
+
+    Parameters
+    ----------
+    tables
+        The tables, by name.
+    folder
+        The directory of the study.
+    place
+        Its sub-directory for the tables.
+    """
+    used: set[str] = set()
     for name, table in tables.items():
         folder.put(f"{place}/{name}.csv", csv(table))
-    used = sorted({str(column) for table in tables.values() for column in table})
-    meanings = pd.DataFrame(
-        {"column": used, "meaning": [COLUMNS[column] for column in used]}
-    )
-    folder.put(f"{place}/columns.csv", csv(meanings))
+        used.update(map(str, table))
+    meanings = [(column, COLUMNS[column]) for column in sorted(used)]
+    table = pd.DataFrame(meanings, columns=["column", "meaning"])
+    folder.put(f"{place}/columns.csv", csv(table))
 
 
 def read(folder: Folder, place: str) -> Tables:
     """Read the tables that `write` wrote.
+
+    Parameters
+    ----------
+    folder
+        The directory of the study.
+    place
+        Its sub-directory of the tables.
+
+    Returns
+    -------
+    dict of str to DataFrame
+        The tables, by name.
 
     Raises
     ------

@@ -18,14 +18,14 @@ def with_agreement(checks: pd.DataFrame, thresholds: pd.DataFrame) -> pd.DataFra
         A row for each pile and fraction that DEM checks, with ``shields_dem_low`` and
         ``shields_dem_high``.
     thresholds
-        The answers, with ``shields_low`` and ``shields_high``. They hold the known error of the
-        levels.
+        The answers, with ``shields_low`` and ``shields_high``. They hold the known error
+        of the levels.
 
     Returns
     -------
-    pandas.DataFrame
-        The checks with these two columns and with ``agree``. An end that is not known is open. Two
-        answers agree also where neither reaches the fraction.
+    DataFrame
+        The checks with these two columns and with ``agree``. An end that is not known is
+        open. Two answers agree also where neither reaches the fraction.
     """
     if checks.empty:
         return checks
@@ -34,23 +34,34 @@ def with_agreement(checks: pd.DataFrame, thresholds: pd.DataFrame) -> pd.DataFra
     table = checks.merge(answers, on=KEYS, how="left", validate="many_to_one")
     lower = table[["shields_low", "shields_dem_low"]].fillna(0.0).max(axis=1)
     upper = table[["shields_high", "shields_dem_high"]].fillna(float("inf")).min(axis=1)
-    reached, reached_by_dem = table["shields"].notna(), table["shields_dem"].notna()
-    overlap = (lower <= upper) & reached & reached_by_dem
-    neither = ~reached & ~reached_by_dem
+    is_reached = table["shields"].notna()
+    is_reached_by_dem = table["shields_dem"].notna()
+    overlap = (lower <= upper) & is_reached & is_reached_by_dem
+    neither = ~is_reached & ~is_reached_by_dem
     return table.assign(agree=overlap | neither)
 
 
 def contradictions(checks: pd.DataFrame) -> Contradictions:
-    """What DEM says against each answer that it contradicts."""
+    """Say what DEM has against each answer that it contradicts.
+
+    Parameters
+    ----------
+    checks
+        The checks, by `with_agreement`.
+
+    Returns
+    -------
+    dict
+        A sentence for each scene and fraction.
+    """
     if checks.empty:
         return {}
     found: Contradictions = {}
     for row in checks[~checks["agree"]].to_dict("records"):
         here = _told(row["shields"], row["shields_low"], row["shields_high"])
         dem = _told(row["shields_dem"], row["shields_dem_low"], row["shields_dem_high"])
-        found[row["scene_id"], row["fraction"]] = (
-            f"DEM of this bed contradicts it: it has {dem}, this has {here}"
-        )
+        sentence = f"DEM of this bed contradicts it: it has {dem}, this has {here}"
+        found[row["scene_id"], row["fraction"]] = sentence
     return found
 
 
@@ -58,5 +69,9 @@ def _told(value: float, low: float, high: float) -> str:
     """A Shields number with its interval, in words."""
     if math.isnan(value):
         return "not reached the fraction"
-    ends = ["open" if math.isnan(end) else f"{end:.3g}" for end in (low, high)]
-    return f"{value:.3g} ({ends[0]} … {ends[1]})"
+    return f"{value:.3g} ({_end(low)} … {_end(high)})"
+
+
+def _end(value: float) -> str:
+    """An end of an interval; NaN is open."""
+    return "open" if math.isnan(value) else f"{value:.3g}"

@@ -2,9 +2,9 @@
 
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from math import ceil, log
+from math import ceil, log, nan
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,22 +26,24 @@ from orchestrator.study.closed_form import closed_form, law_holds
 from orchestrator.study.parts import UnfitError
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
-from orchestrator.types import BoolArray, Row
+from orchestrator.types import BoolArray, FloatArray, Row
 
 POINT = ("alpha_deg", "beta_deg", "d_m", "z0_over_d", "nu_m2_s", "force_law", "regime")
 """Columns by which a scene is found in a figure; tables of results have them too."""
 PER_E_FOLD = 0.06
-"""Relative rise of tau_c with each e-fold of the flow's z0, at most: triangles of 15 and 30 deg
-under solved flows, z0/h from 2.5e-4 to 8e-3, at 10 to 70 % of the grains; 0.03 in the mean."""
-ENDS = ("", "_low", "_high")  # endings of a threshold's columns
+"""Relative rise of tau_c with each e-fold of the flow's z0, at most: triangles of 15 and
+30 deg under solved flows, z0/h from 2.5e-4 to 8e-3, at 10 to 70 % of the grains; 0.03 in
+the mean."""
+ENDS = ("", "_low", "_high")
+"""Endings of the columns of a threshold and of its interval."""
 SMOOTHED = {
     0.5: "first_half_smoothing_m_s",
     1.0: "first_smoothing_m_s",
     2.0: "first_twice_smoothing_m_s",
 }
 """Columns of the flow at which motion starts, by the factor of `smoothing.compared`."""
-FEW = 10  # grains of a size class: the interval of its threshold is wide
-# u*/u*_0 at equal parts of the way along the bed from the foot to the top
+FEW_GRAINS = 10
+"""Grains of a size class below which the interval of its threshold is wide."""
 WAY_UP = (
     "ustar_foot",
     "ustar_quarter",
@@ -49,23 +51,51 @@ WAY_UP = (
     "ustar_three_quarters",
     "ustar_top",
 )
+"""Columns of u*/u*_0 at equal parts of the way along the bed from the foot to the top."""
 
 
 def point(scene: Scene) -> Row:
-    """The columns by which a scene is found in a figure."""
+    """Make the columns by which a scene is found in a figure.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+
+    Returns
+    -------
+    dict
+        Its columns `POINT`.
+    """
     return {column: fields.COLUMNS[column].asked(scene) for column in POINT}
 
 
 def scenes(study: Study, plan: Plan) -> Iterator[Row]:
-    """A row for each scene of each group, in the study's order: as asked, and as answered."""
+    """List the scenes of each group, as asked, and as answered.
+
+    Parameters
+    ----------
+    study
+        The study.
+    plan
+        Its plan.
+
+    Yields
+    ------
+    dict
+        A row for each scene of each group, in the study's order.
+    """
     cell_of = {scene.id: cell.name for cell in plan.cells for scene in cell.scenes}
     for group in study.groups:
         for asked in group.scenes:
-            decision, pile = plan.decisions[asked.id], plan.piles.get(asked.id)
+            decision = plan.decisions[asked.id]
             scene = decision.scene
-            runs = (
-                [case.name for case in pile.runs] if pile else [cell_of.get(scene.id)]
-            )
+            case = cell_of.get(scene.id)
+            flow_case = None
+            pile = plan.piles.get(asked.id)
+            if pile:
+                case = pile.runs[-1].name if pile.runs else None
+                flow_case = pile.flow.name if pile.model.cases else None
             yield {
                 "scene_id": asked.id,
                 "group": group.name,
@@ -73,62 +103,94 @@ def scenes(study: Study, plan: Plan) -> Iterator[Row]:
                 **fields.answered(scene),
                 "law_holds": law_holds(asked),
                 "why": decision.why,
-                "case": runs[-1] if scene.protocol.method == "dem" else None,
-                "flow_case": pile.flow.name if pile and pile.model.cases else None,
+                "case": case if scene.protocol.method == "dem" else None,
+                "flow_case": flow_case,
             }
+
+
+class _ByDem(NamedTuple):
+    """The threshold of a single grain by DEM, relative to the closed form in u*."""
+
+    value: float = nan
+    low: float = nan
+    high: float = nan
+    fell_upstream: bool = False
+    case: str = ""
 
 
 def single_grain(
     plan: Plan, cells: Iterable[SingleGrainCase], cases: Path
 ) -> Iterator[Row]:
-    """A row for each single grain that a finished case or the closed form answers."""
-    # by DEM: u* over that of the closed form, with its interval; a fall upstream; the case
-    by_dem: dict[str, tuple[Any, ...]] = {}
-    for cell in cells:
-        motion = Motion.from_csv(cases / cell.name)
-        steps = threshold.of_grains(motion)
-        ratios = zip(
-            steps.value,
-            steps.low,
-            steps.high,
-            (motion.fallen > 0).tolist(),
-            strict=True,
-        )
-        for scene, numbers in zip(cell.scenes, ratios, strict=True):
-            by_dem[scene.id] = (*numbers, {"case": cell.name})
-    for asked, answer in plan.decisions.items():
-        scene = answer.scene
-        if asked in plan.piles or (
-            scene.id not in by_dem and scene.protocol.method == "dem"
-        ):
+    """List the single grains that a finished case or the closed form answers.
+
+    Parameters
+    ----------
+    plan
+        The plan of the study.
+    cells
+        The finished cases of single grains.
+    cases
+        The directory of the cases.
+
+    Yields
+    ------
+    dict
+        A row for each grain.
+    """
+    by_dem = _single_grains_by_dem(cells, cases)
+    for asked, decision in plan.decisions.items():
+        scene = decision.scene
+        is_missing = scene.protocol.method == "dem" and scene.id not in by_dem
+        if asked in plan.piles or is_missing:
             continue
-        value, low, high, fell, case = by_dem.get(scene.id, (*[np.nan] * 3, False, {}))
+        found = by_dem.get(scene.id, _ByDem())
         exact = closed_form(scene)
-        ustar, shields = float(exact.friction_velocity), float(exact.shields)
-        yield {
+        ustar = float(exact.friction_velocity)
+        shields = float(exact.shields)
+        row = {
             "scene_id": asked,
             **point(scene),
             "answered_method": scene.protocol.method,
-            "reynolds": float(exact.reynolds) * value,
+            "reynolds": float(exact.reynolds) * found.value,
             "reynolds_closed_form": float(exact.reynolds),
             "shields_closed_form": shields,
-            "shields_dem": shields * value**2,
-            "shields_dem_low": shields * low**2,
-            "shields_dem_high": shields * high**2,
+            "shields_dem": shields * found.value**2,
+            "shields_dem_low": shields * found.low**2,
+            "shields_dem_high": shields * found.high**2,
             "ustar_closed_form_m_s": ustar,
-            "ustar_m_s": ustar * value,
-            "ustar_low_m_s": ustar * low,
-            "ustar_high_m_s": ustar * high,
-            **_speeds(scene, ustar if np.isnan(value) else ustar * value),
+            "ustar_m_s": ustar * found.value,
+            "ustar_low_m_s": ustar * found.low,
+            "ustar_high_m_s": ustar * found.high,
+            **_speeds(scene, ustar if np.isnan(found.value) else ustar * found.value),
             "drag_over_weight": float(exact.drag) / scene.weight,
-            "fell_upstream": fell,
-            **case,
+            "fell_upstream": found.fell_upstream,
         }
+        if found.case:
+            row["case"] = found.case
+        yield row
+
+
+def _single_grains_by_dem(
+    cells: Iterable[SingleGrainCase], cases: Path
+) -> dict[str, _ByDem]:
+    """The thresholds of single grains by DEM, by the scene."""
+    by_dem = {}
+    for cell in cells:
+        motion = Motion.from_csv(cases / cell.name)
+        steps = threshold.of_grains(motion)
+        fell = (motion.fallen > 0).tolist()
+        numbers = zip(steps.value, steps.low, steps.high, fell, strict=True)
+        for scene, (value, low, high, fell_upstream) in zip(
+            cell.scenes, numbers, strict=True
+        ):
+            by_dem[scene.id] = _ByDem(value, low, high, fell_upstream, cell.name)
+    return by_dem
 
 
 def _speeds(scene: Scene, ustar: float) -> Row:
     """Columns of the speeds of an undisturbed flow that has a friction velocity (m/s)."""
-    flow, fluid = scene.flow, scene.fluid
+    flow = scene.flow
+    fluid = scene.fluid
     speeds = measurable_speeds(
         ustar,
         roughness=scene.bed.roughness,
@@ -137,18 +199,32 @@ def _speeds(scene: Scene, ustar: float) -> Row:
         depth=flow.depth or np.nan,
         closed=flow.top == "closed channel",
     )
-    row = {
-        column: float(speed) for column, speed in speeds.items() if np.isfinite(speed)
-    }
-    if mean := row.get("mean_velocity_m_s"):
+    row = {}
+    for column, speed in speeds.items():
+        if np.isfinite(speed):
+            row[column] = float(speed)
+    mean = row.get("mean_velocity_m_s")
+    if mean:
         row["discharge_m2_s"] = mean * (flow.depth or 0.0)
     return row
 
 
 def wall_stress(pile: Pile, cases: Path) -> Row:
-    """Columns of the friction velocity along the bed, for the solved flow of a pile."""
+    """List the friction velocity along the bed, for the solved flow of a pile.
+
+    Parameters
+    ----------
+    pile
+        The pile.
+    cases
+        The directory of the finished cases.
+
+    Returns
+    -------
+    dict
+        Numbers, and columns of shape (n,) for n places along the bed.
+    """
     stress = pile.stress(cases)
-    names = ("x_m", "z_m", *(f"ustar_over_ustar0_{kind}" for kind in ("wall", "eq10")))
     return {
         "flow_case": pile.flow.name,
         "alpha_deg": pile.bed.slope_deg,
@@ -156,26 +232,44 @@ def wall_stress(pile: Pile, cases: Path) -> Row:
         "z0_m": pile.flow.roughness_m,
         "s_m": stress.s_m,
         "s_over_h": stress.s_m / pile.bed.height,
-        **{
-            name: getattr(stress, name)
-            for name in (*names, "ustar_over_ustar0_eq10_printed")
-        },
+        "x_m": stress.x_m,
+        "z_m": stress.z_m,
+        "ustar_over_ustar0_wall": stress.ustar_over_ustar0_wall,
+        "ustar_over_ustar0_eq10": stress.ustar_over_ustar0_eq10,
+        "ustar_over_ustar0_eq10_printed": stress.ustar_over_ustar0_eq10_printed,
     }
 
 
 def flow(pile: Pile, cases: Path) -> Row:
-    """The solved flow of a pile: its settings, its separation and its speed-up."""
-    case, stress, line = pile.flow, pile.stress(cases), pile.model.line
+    """Make the row of the solved flow of a pile.
+
+    Parameters
+    ----------
+    pile
+        The pile.
+    cases
+        The directory of the finished cases.
+
+    Returns
+    -------
+    dict
+        The settings of the flow, its separation and its speed-up.
+    """
+    case = pile.flow
+    stress = pile.stress(cases)
+    line = pile.model.line
     separation, reattachment = bubble(stress, line.h) or (np.nan, np.nan)
-    ustar, way = (
-        stress.ustar_over_ustar0_wall,
-        np.linspace(0, line.crest_s, len(WAY_UP)),
-    )
+    ustar = stress.ustar_over_ustar0_wall
+    way = np.linspace(0, line.crest_s, len(WAY_UP))
+    on_the_way = np.interp(way, stress.s_m, ustar).tolist()
     windward = (stress.s_m > 0) & (stress.s_m < line.crest_s)
-    length, hill = stress.length_m[windward], measured_hill(pile)
+    length = stress.length_m[windward]
+    mean = np.nan
+    if length.size:
+        mean = float(np.average(ustar[windward], weights=length))
     row = {
         "flow_case": case.name,
-        "bed_shape": pile.bed.shape if not pile.bed.profile else "profile",
+        "bed_shape": "profile" if pile.bed.profile else pile.bed.shape,
         "alpha_deg": pile.bed.slope_deg,
         "h_m": case.height_m,
         "z0_m": case.roughness_m,
@@ -186,28 +280,52 @@ def flow(pile: Pile, cases: Path) -> Row:
         "downstream_over_h": case.settings.downstream,
         "separation_over_h": separation,
         "reattachment_over_h": reattachment,
-        **dict(zip(WAY_UP, np.interp(way, stress.s_m, ustar).tolist(), strict=True)),
-        "ustar_mean": float(np.average(ustar[windward], weights=length))
-        if length.size
-        else np.nan,
+        **dict(zip(WAY_UP, on_the_way, strict=True)),
+        "ustar_mean": mean,
         "ustar_largest": float(ustar.max()),
     }
+    hill = measured_hill(pile)
     if hill is not None:
         row["measured_reattachment_over_h"] = hill.reattachment or np.nan
-        row |= {"measured_verified": hill.verified, "measured_source": hill.source}
+        row["measured_verified"] = hill.verified
+        row["measured_source"] = hill.source
     return row
 
 
 def measured_hill(pile: Pile) -> measured.MeasuredHill | None:
-    """The hill of a wind tunnel that a pile is, if any."""
-    bed, case = pile.bed, pile.flow
+    """Find the hill of a wind tunnel that a pile is.
+
+    Parameters
+    ----------
+    pile
+        The pile.
+
+    Returns
+    -------
+    MeasuredHill or None
+        The hill, if it is one.
+    """
+    bed = pile.bed
+    case = pile.flow
     if bed.shape != "rushil" or bed.profile or bed.forms > 1 or bed.obstacles:
         return None
     return measured.rushil_hill(bed.slope_deg, case.height_m / case.roughness_m)
 
 
 class Answer:
-    """The answer to a scene: a pile with what its finished cases say, read once for all tables."""
+    """The answer to a scene: a pile with what its finished cases say, read once.
+
+    Parameters
+    ----------
+    decision
+        How the scene is answered.
+    pile
+        Its pile.
+    cases
+        The directory of the finished cases.
+    smoothed
+        The same bed with other smoothing, by the factor of its length.
+    """
 
     def __init__(
         self,
@@ -216,52 +334,89 @@ class Answer:
         cases: Path,
         smoothed: Mapping[float, Pile] | None = None,
     ) -> None:
-        self.decision, self.pile, self.scene_id = decision, pile, decision.asked.id
-        self.smoothed = {
-            factor: other.first(other.motion(cases))[1]
-            for factor, other in (smoothed or {}).items()
-        }
-        self.motion, self.speed = pile.motion(cases), pile.speed(cases)
+        self.decision = decision
+        self.pile = pile
+        self.scene_id = decision.asked.id
+        self.smoothed: dict[float, float] = {}
+        for factor, other in (smoothed or {}).items():
+            _, self.smoothed[factor] = other.first(other.motion(cases))
+        self.motion = pile.motion(cases)
+        self.speed = pile.speed(cases)
         self.row_hold = pile.row_hold(cases)
-        self.first, self.checked = pile.first(self.motion), (np.nan, np.nan)
+        self.first = pile.first(self.motion)
+        self.checked = (np.nan, np.nan)
         if decision.is_along:
-            with suppress(
-                InputError, UnfitError
-            ):  # where no grains can lie there is no check
+            # where no grains can lie there is no check
+            with suppress(InputError, UnfitError):
                 around = pile.around(self.first[0])
                 self.checked = around.first(around.motion(cases))
 
     def at(self, fraction: float, chosen: BoolArray | None = None) -> PileThreshold:
-        """The threshold of the pile, or of some of its counted grains, at a fraction.
+        """Find the threshold of the pile, or of some of its counted grains.
 
-        The interval of some holds how many of so few would have moved by chance.
+        Parameters
+        ----------
+        fraction
+            The fraction that has moved.
+        chosen
+            Which of the counted grains, shape (count,); by default all. The interval of
+            some holds how many of so few would have moved by chance.
+
+        Returns
+        -------
+        PileThreshold
+            The threshold.
         """
-        motion, speed, density = self.motion, self.speed, self.pile.scene.fluid.density
+        density = self.pile.scene.fluid.density
         if chosen is None:
-            return threshold.of_pile(motion, speed, fraction, density)
+            return threshold.of_pile(self.motion, self.speed, fraction, density)
         ends = threshold.sampled(fraction, int(chosen.sum()))
-        return threshold.of_pile(
-            motion.of(chosen), speed[chosen], fraction, density, ends
-        )
+        motion = self.motion.of(chosen)
+        return threshold.of_pile(motion, self.speed[chosen], fraction, density, ends)
 
 
 def shields(scene: Scene, tau: Any) -> Any:
-    """The Shields number of a stress, Pa."""
+    """Make a Shields number of a stress.
+
+    Parameters
+    ----------
+    scene
+        The scene with its grain.
+    tau
+        Stress, Pa, a number or an array.
+
+    Returns
+    -------
+    float or ndarray
+        The stress over (rho_sol - rho_f) g d.
+    """
     return tau * np.pi / 6 * scene.grain.diameter**2 / scene.weight
 
 
 def _reynolds(scene: Scene, tau: Any) -> Any:
-    return (
-        np.sqrt(tau / scene.fluid.density)
-        * scene.grain.diameter
-        / scene.fluid.viscosity
-    )
+    """The particle Reynolds number Re* of a stress, Pa."""
+    ustar = np.sqrt(tau / scene.fluid.density)
+    return ustar * scene.grain.diameter / scene.fluid.viscosity
 
 
 def pile_grain(answer: Answer) -> Row:
-    """Columns of the counted grains of a pile: the stress on each, when and how it moved."""
-    motion, pile, packing = answer.motion, answer.pile, answer.pile.packing
-    counted, d = packing.windward, pile.scene.grain.diameter
+    """List the counted grains of a pile: the stress on each, when and how it moved.
+
+    Parameters
+    ----------
+    answer
+        The pile with its results.
+
+    Returns
+    -------
+    dict
+        Numbers, and columns of shape (n,) for n counted grains.
+    """
+    pile = answer.pile
+    motion = answer.motion
+    packing = pile.packing
+    counted = packing.windward
+    d = pile.scene.grain.diameter
     columns = {
         "scene_id": answer.scene_id,
         "grain_id": np.flatnonzero(counted) + 1,
@@ -283,8 +438,20 @@ def pile_grain(answer: Answer) -> Row:
 
 
 def pile_curve(answer: Answer) -> Row:
-    """Columns of the fraction of a pile that had moved, and the stress, at each load step."""
-    scene, motion = answer.pile.scene, answer.motion
+    """List the fraction of a pile that had moved, and the stress, at each load step.
+
+    Parameters
+    ----------
+    answer
+        The pile with its results.
+
+    Returns
+    -------
+    dict
+        Numbers, and columns of shape (K + 1,) for K load steps.
+    """
+    scene = answer.pile.scene
+    motion = answer.motion
     tau = threshold.mean_tau(motion, answer.speed, scene.fluid.density)
     return {
         "scene_id": answer.scene_id,
@@ -304,15 +471,30 @@ def pile_curve(answer: Answer) -> Row:
 
 
 def pile_threshold(answer: Answer) -> Iterator[Row]:
-    """The threshold of a pile at each fraction that its scene asks for.
+    """Find the threshold of a pile at each fraction that its scene asks for.
 
-    The model's interval is of the choices that all levels share.
+    Parameters
+    ----------
+    answer
+        The pile with its results.
+
+    Yields
+    ------
+    dict
+        A row for each fraction. The model's interval is of the choices that all levels
+        share.
     """
-    pile, motion, asked = answer.pile, answer.motion, answer.decision.asked
-    scene, error = pile.scene, answer.decision.error_estimate
-    place, pivot = point(scene), pile.pivot_thresholds(answer.speed)
+    pile = answer.pile
+    motion = answer.motion
+    scene = pile.scene
+    error = answer.decision.error_estimate
+    place = point(scene)
+    pivots = pile.pivot_thresholds(answer.speed)
+    first_x, first_ustar0 = answer.first
+    checked_x, checked_ustar0 = answer.checked
     for fraction in scene.protocol.fractions:
-        found, model = answer.at(fraction), levels.spread(asked, fraction)
+        found = answer.at(fraction)
+        model = levels.spread(answer.decision.asked, fraction)
         value = shields(scene, found.tau)
         smooth = _smooth_bed(scene, found.ustar0)
         low, high = _interval(scene, found, error, smooth)
@@ -334,9 +516,11 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
             "ustar0_m_s": found.ustar0,
             "u_e_m_s": found.ustar0 * pile.model.lid_speed_ratio,
             **_speeds(scene, found.ustar0),
-            **dict(zip(("first_x_m", "first_ustar0_m_s"), answer.first, strict=True)),
-            **dict(zip(("pivot_x_m", "pivot_first_m_s"), answer.checked, strict=True)),
-            "pivot_ustar0_m_s": pivot[ceil(fraction * motion.count - 1e-9) - 1],
+            "first_x_m": first_x,
+            "first_ustar0_m_s": first_ustar0,
+            "pivot_x_m": checked_x,
+            "pivot_first_m_s": checked_ustar0,
+            "pivot_ustar0_m_s": pivots[_needed(fraction, motion.count) - 1],
             "count": motion.count,
             "highest_fraction": motion.fraction[-1],
             "share_carried_off": found.carried_off,
@@ -349,14 +533,19 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
         }
 
 
+def _needed(fraction: float, count: int) -> int:
+    """How many grains are a fraction of some, rounded up."""
+    return ceil(fraction * count - 1e-9)
+
+
 def _interval(
     scene: Scene, found: PileThreshold, error: float | None, smooth: float
 ) -> tuple[float, float]:
     """Ends of the interval of a Shields number; an end that is not known is NaN.
 
-    It holds load steps and count, at least what is within the known error of the level, and how far
-    the z0 of the flow is from that of a bed that is not rough (`smooth`). It is not known without
-    a known error.
+    It holds load steps and count, at least what is within the known error of the level,
+    and how far the z0 of the flow is from that of a bed that is not rough (`smooth`). It
+    is not known without a known error.
     """
     if error is None:
         return np.nan, np.nan
@@ -371,7 +560,7 @@ def _interval(
 
 
 def _smooth_bed(scene: Scene, ustar0: float) -> float:
-    """How far at most tau_c moves, relative, if the flow has the z0 of its bed at the threshold."""
+    """How far at most tau_c moves, relative, if the flow has the z0 of its bed."""
     if scene.flow.model == "flat":
         return 0.0
     outer = float(outer_roughness(scene.bed.roughness, ustar0, scene.fluid.viscosity))
@@ -383,76 +572,96 @@ def _smoothing(answer: Answer) -> Row:
     length = smoothing.length_of(answer.pile.scene)
     if not length:
         return {}
-    assert answer.pile.bed.profile
-    row = {
-        "smoothing_needed_m": answer.pile.bed.profile.needs,
-        "smoothing_compared_m": length,
-    }
+    profile = answer.pile.bed.profile
+    assert profile
+    row = {"smoothing_needed_m": profile.needs, "smoothing_compared_m": length}
     for factor, column in SMOOTHED.items():
         row[column] = answer.smoothed.get(factor, np.nan)
     return row
 
 
-def _levels(answer: Decision) -> Row:
-    assert answer.levels
+def _levels(decision: Decision) -> Row:
+    """The columns of the levels that answer a pile."""
+    assert decision.levels
     return {
-        "flow_level": answer.levels.flow.name,
-        "grain_level": answer.levels.grains.name,
+        "flow_level": decision.levels.flow.name,
+        "grain_level": decision.levels.grains.name,
     }
 
 
 def size_class(answer: Answer) -> Iterator[Row]:
-    """The threshold of each size class of a mixture, where a fraction of its grains has moved.
+    """Find the threshold of each size class of a mixture.
 
-    The stress at d50, over which those of the classes are, lies between the two classes beside it.
+    It is that at which a fraction of its grains has moved. The stress at d50, over which
+    those of the classes are, lies between the two classes beside it.
+
+    Parameters
+    ----------
+    answer
+        The pile with its results.
+
+    Yields
+    ------
+    dict
+        A row for each fraction and class; none of a pile that was not poured.
     """
-    pile, scene, motion = answer.pile, answer.pile.scene, answer.motion
+    pile = answer.pile
     if not pile.pouring:
         return
+    motion = answer.motion
     classes = list(threshold.classes(pile.packing.sizes[pile.packing.windward]))
     sizes = np.array([each.size for each in classes])
-    for fraction in scene.protocol.fractions:
+    for fraction in pile.scene.protocol.fractions:
         level = threshold.first_level(motion, fraction)
+        has_moved = None if level is None else motion.moved_by(level)
         found = [answer.at(fraction, each.chosen) for each in classes]
-        median = threshold.at_size(1.0, sizes, np.array([at.tau for at in found]))
+        taus = np.array([at.tau for at in found])
+        median = threshold.at_size(1.0, sizes, taus)
         for each, at in zip(classes, found, strict=True):
             count = int(each.chosen.sum())
             moved = (np.nan, np.nan, np.nan)
-            if level is not None:
-                of_class = int(motion.moved_by(level)[each.chosen].sum())
+            if has_moved is not None:
+                of_class = int(has_moved[each.chosen].sum())
                 moved = (of_class / count, *threshold.of_all(of_class, count))
-            taus = np.array([at.tau, at.tau_low, at.tau_high])
-            own = shields(scene, taus) / each.size
-            hiding = taus / median / each.size
+            tau = np.array([at.tau, at.tau_low, at.tau_high])
+            wilcock_crowe = measured.wilcock_crowe_hiding(each.size) / each.size
             yield {
                 "scene_id": answer.scene_id,
                 "fraction": fraction,
                 "size_over_d": each.size,
                 "count": count,
-                "few": count < FEW,
-                **{
-                    f"class_moved{end}": part
-                    for end, part in zip(ENDS, moved, strict=True)
-                },
+                "few": count < FEW_GRAINS,
+                **_with_ends("class_moved", moved),
                 "ustar0_m_s": at.ustar0,
-                **{
-                    f"shields_own{end}": value
-                    for end, value in zip(ENDS, own, strict=True)
-                },
-                **{
-                    f"hiding{end}": value
-                    for end, value in zip(ENDS, hiding, strict=True)
-                },
-                "hiding_wilcock_crowe": float(
-                    measured.wilcock_crowe_hiding(each.size) / each.size
-                ),
+                **_with_ends("shields_own", shields(pile.scene, tau) / each.size),
+                **_with_ends("hiding", tau / median / each.size),
+                "hiding_wilcock_crowe": float(wilcock_crowe),
                 "hiding_egiazaroff": float(measured.egiazaroff_hiding(each.size)),
             }
 
 
+def _with_ends(name: str, values: Iterable[float]) -> Row:
+    """The columns of a value and of both ends of its interval."""
+    names = [name + end for end in ENDS]
+    return dict(zip(names, values, strict=True))
+
+
 def forms(answer: Answer) -> Iterator[Row]:
-    """Of a train, a row for each form and each fraction of the counted grains of that form."""
-    pile, bed = answer.pile, answer.pile.bed
+    """Find the thresholds of the forms of a train.
+
+    Parameters
+    ----------
+    answer
+        The pile with its results.
+
+    Yields
+    ------
+    dict
+        A row for each fraction and form, of the counted grains of that form; none of a
+        bed of one form.
+    """
+    pile = answer.pile
+    bed = pile.bed
     if bed.forms == 1 or bed.profile:
         return
     period = bed.spacing or (pile.model.line.x[-2] - pile.model.line.x[1]) / bed.forms
@@ -463,43 +672,56 @@ def forms(answer: Answer) -> Iterator[Row]:
         first = np.nan
         for number in range(bed.forms):
             # a grain that has not moved is not a number, which sorts last
-            grains, speed = (
-                np.sort(ustar0[form == number]),
-                answer.speed[form == number],
-            )
-            needed = max(ceil(fraction * len(grains) - 1e-9), 1)
-            reached = float(grains[needed - 1]) if len(grains) else np.nan
-            first = reached if number == 0 else first
+            grains = np.sort(ustar0[form == number])
+            speed = answer.speed[form == number]
+            reached = np.nan
+            mean = np.nan
+            if len(grains):
+                needed = max(_needed(fraction, len(grains)), 1)
+                reached = float(grains[needed - 1])
+                mean = float(speed.mean())
+            if number == 0:
+                first = reached
             yield {
                 "scene_id": answer.scene_id,
                 "form": number + 1,
                 "count": len(grains),
                 "fraction": fraction,
-                "mean_ustar_over_ustar0": float(speed.mean()) if len(speed) else np.nan,
+                "mean_ustar_over_ustar0": mean,
                 "ustar0_m_s": reached,
-                # loose grains of the first form move in still fluid: nothing is a multiple of that
+                # loose grains of the first form move in still fluid: nothing is a
+                # multiple of that
                 "over_first_form": reached / first if first > 0 else np.nan,
             }
 
 
 def bed_changes(answers: Sequence[Answer]) -> Iterator[Row]:
-    """Columns of thresholds, by grain, of the piles answered on a changing and a frozen bed.
+    """Compare piles on a bed that changes with the same on a frozen bed.
 
     The two are answered alike in all else, by one method on one mesh.
+
+    Parameters
+    ----------
+    answers
+        The piles with their results.
+
+    Yields
+    ------
+    dict
+        Numbers, and columns of shape (n,): thresholds for the first to the n-th grain.
     """
     frozen = {each.pile.scene.id: each for each in answers}
     for answer in answers:
-        scene, count = answer.pile.scene, answer.motion.count
+        scene = answer.pile.scene
         if not scene.protocol.update:
             continue
         twin = frozen.get(changed(scene, {"protocol.update": 0.0}).id)
         if twin is None:
             continue
-        moved = np.arange(1, ceil(max(scene.protocol.fractions) * count - 1e-9) + 1)
-        at = ([each.at(n / count) for n in moved.tolist()] for each in (answer, twin))
-        (tau, ustar), (tau_frozen, ustar_frozen) = (
-            np.array([(each.tau, each.ustar0) for each in steps]).T for steps in at
-        )
+        count = answer.motion.count
+        moved = np.arange(1, _needed(max(scene.protocol.fractions), count) + 1)
+        tau, ustar = _thresholds_of(answer, moved / count)
+        tau_frozen, ustar_frozen = _thresholds_of(twin, moved / count)
         change = tau / tau_frozen - 1
         beyond = moved[np.abs(change) > limits.FROZEN_BED] / count
         yield {
@@ -517,16 +739,42 @@ def bed_changes(answers: Sequence[Answer]) -> Iterator[Row]:
         }
 
 
+def _thresholds_of(
+    answer: Answer, fractions: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """The stress (Pa) and the undisturbed u* (m/s) of a pile at some fractions."""
+    found = [answer.at(fraction) for fraction in fractions.tolist()]
+    tau = np.array([at.tau for at in found])
+    ustar0 = np.array([at.ustar0 for at in found])
+    return tau, ustar0
+
+
 def check(plan: Plan, cases: Path, done: Container[str]) -> Iterator[Row]:
-    """The piles that DEM checks, where both answers are run: both at each fraction."""
+    """Compare piles with DEM of the same, where both are run.
+
+    Parameters
+    ----------
+    plan
+        The plan of the study.
+    cases
+        The directory of the cases.
+    done
+        Names of the cases that are done.
+
+    Yields
+    ------
+    dict
+        A row for each pile and fraction.
+    """
     for asked, dem in plan.checks.items():
         pile = plan.piles[asked]
         if not (pile.is_run(done) and dem.is_run(done)):
             continue
-        scene, fractions = pile.scene, pile.scene.protocol.fractions
-        answers = pile.thresholds(cases, fractions)
+        scene = pile.scene
+        fractions = scene.protocol.fractions
+        found = pile.thresholds(cases, fractions)
         by_dem = dem.thresholds(cases, fractions)
-        for ours, theirs in zip(answers, by_dem, strict=True):
+        for ours, theirs in zip(found, by_dem, strict=True):
             yield {
                 "scene_id": asked,
                 **point(scene),

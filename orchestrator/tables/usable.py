@@ -1,4 +1,4 @@
-"""Intervals of thresholds widened by the scatter over seeds, and reasons not to use a threshold."""
+"""Whether thresholds are usable, and their scatter over seeds."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -19,26 +19,43 @@ from orchestrator.physics.velocity import (
 from orchestrator.study import fields
 from orchestrator.tables.check import Contradictions
 
-EXPOSED_FROM = 0.25  # part of a grain over the tops of its neighbours
-CARRIED_OFF = 0.1  # share of the moved grains from which a threshold is one of lift-off
-ROW_HOLD = 1.05  # u*_0 of the first grain in its row, over that of the grain alone
-KEPT_TO = 0.1  # n/N to which a balance of the whole bed does; at 0.3 theta is 2 to 3.5 times that
+EXPOSED_FROM = 0.25
+"""Part of a grain over the tops of its neighbours from which it is exposed."""
+CARRIED_OFF = 0.1
+"""Share of the moved grains from which a threshold is one of lift-off."""
+ROW_HOLD = 1.05
+"""u*_0 of the first grain in its row, over that of the grain alone, that is told."""
+KEPT_TO = 0.1
+"""n/N to which a balance of the whole bed holds; at 0.3 theta is 2 to 3.5 times that."""
 SIMILAR = ["layout", "lifted", "alpha_deg", "force_law", "fraction"]
-"""Piles that agree in these scatter alike: how their grains lie; whether lifted ones collide."""
+"""Piles that agree in these scatter alike: their grains lie alike, and lifted ones
+collide or do not."""
 LAYOUTS = {"aligned": "rows along the bed", "disordered": "rows along the bed"}
-"""Packings whose grains lie alike: a lattice scatters as one with small random gaps does."""
+"""Packings whose grains lie alike: a lattice scatters as one with small random gaps."""
 POURED = ["answered_width", "sizes", "poured_depth"]
 """Columns in which poured beds agree whose grains lie alike."""
 
 
 def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame:
-    """Add the scatter over seeds to the thresholds of piles, and widen their intervals by it.
+    """Add the scatter over seeds to thresholds of piles, and widen their intervals by it.
 
-    Half the range over the seeds, relative to their mean, is computed for each set of piles that
-    differ in the seed alone: random gaps, or perturbed replicas of a lattice. A pile gets the
-    largest of those that are `SIMILAR`; where the study ran no seeds, none, and its interval stays.
-    The interval then holds the mean, from which a pile may be off by that much; it is open above
-    from 100 %.
+    Half the range over the seeds, relative to their mean, is computed for each set of
+    piles that differ in the seed alone: random gaps, or perturbed replicas of a lattice.
+    A pile gets the largest of those that are `SIMILAR`; where the study ran no seeds,
+    none, and its interval stays. The interval then holds the mean, from which a pile may
+    be off by that much; it is open above from 100 %.
+
+    Parameters
+    ----------
+    thresholds
+        Thresholds of piles.
+    scenes
+        Their scenes.
+
+    Returns
+    -------
+    DataFrame
+        The thresholds with ``scatter``.
     """
     if thresholds.empty:
         return thresholds
@@ -79,21 +96,32 @@ def with_usable(
     tolerance: float | None,
     contradicted: Contradictions | None = None,
 ) -> pd.DataFrame:
-    """Add to thresholds of piles or of single grains whether to use them, and what was measured.
+    """Add to thresholds of piles or of single grains whether they are usable.
 
-    The columns are ``usable``, ``why_not`` and those of `beside`. Thresholds are judged at their
-    own Re*, by the columns of their `scenes`, and by the tolerance against which the known errors
-    are held, and by what DEM says against them, if it has `contradicted` them.
+    Parameters
+    ----------
+    table
+        The thresholds; each is judged at its own Re*.
+    scenes
+        Their scenes.
+    tolerance
+        The relative error that is allowed, if one was asked for.
+    contradicted
+        What DEM says against the thresholds.
+
+    Returns
+    -------
+    DataFrame
+        The table with ``usable``, ``why_not`` and what was measured, by `beside`.
     """
     if table.empty:
         return table
     columns = [name for name in scenes if name not in table or name == "scene_id"]
-    rows = table.merge(
-        scenes.drop_duplicates("scene_id")[columns], on="scene_id", how="left"
-    )
+    of_scene = scenes.drop_duplicates("scene_id")[columns]
+    rows = table.merge(of_scene, on="scene_id", how="left")
     if "reynolds_closed_form" in rows:
-        by_dem = rows["answered_method"] == "dem"
-        rows["reynolds"] = rows["reynolds"].where(by_dem, rows["reynolds_closed_form"])
+        is_dem = rows["answered_method"] == "dem"
+        rows["reynolds"] = rows["reynolds"].where(is_dem, rows["reynolds_closed_form"])
     ustar = rows["reynolds"] * rows["nu_m2_s"] / rows["d_m"]
     rows["law"] = ""
     for name, part in rows.groupby("force_law"):
@@ -103,9 +131,10 @@ def with_usable(
     against = contradicted or {}
     texts = []
     for row in rows.to_dict("records"):
-        reasons = [*_reasons(row, tolerance)]
-        if said := against.get((row["scene_id"], row.get("fraction", np.nan))):
-            reasons.append(said)
+        reasons = list(_reasons(row, tolerance))
+        key = (row["scene_id"], row.get("fraction", np.nan))
+        if key in against:
+            reasons.append(against[key])
         texts.append("; ".join(reasons))
     rows["shields"] = rows.get("shields", rows.get("shields_closed_form"))
     made = {"usable": [not text for text in texts], "why_not": texts, **beside(rows)}
@@ -115,76 +144,79 @@ def with_usable(
 def _flow_reynolds(rows: pd.DataFrame) -> "pd.Series[float]":
     """Speed times depth over nu of the undisturbed flow at the threshold of each row.
 
-    Of a channel its mean speed over its depth, of a boundary layer over a pile the speed at 10 h.
-    NaN for a single grain in a boundary layer, which has no depth.
+    Of a channel its mean speed over its depth, of a boundary layer over a pile the speed
+    at 10 h. NaN for a single grain in a boundary layer, which has no depth.
     """
-    nu, depth = rows["nu_m2_s"], rows["depth_m"].astype(float)
+    nu = rows["nu_m2_s"]
+    depth = rows["depth_m"].astype(float)
     layer: Any = np.nan
     if "ustar0_m_s" in rows:
         ustar0 = rows["ustar0_m_s"]
         layer = rows["u_e_m_s"] * SPEED_HEIGHT * rows["h_m"]
     else:
-        by_dem = rows["answered_method"] == "dem"
-        ustar0 = rows["ustar_m_s"].where(by_dem, rows["ustar_closed_form_m_s"])
+        is_dem = rows["answered_method"] == "dem"
+        ustar0 = rows["ustar_m_s"].where(is_dem, rows["ustar_closed_form_m_s"])
     z0 = outer_roughness(rows["z0_over_d"] * rows["d_m"], ustar0, nu)
-    closed = rows["flow_top"] == "closed channel"
-    channel = depth * depth_mean_speed(ustar0, depth, z0, closed=closed)
+    is_closed = rows["flow_top"] == "closed channel"
+    channel = depth * depth_mean_speed(ustar0, depth, z0, closed=is_closed)
     return channel.fillna(layer) / nu
 
 
 def _beyond_law(name: str, rows: pd.DataFrame, ustar: "pd.Series[float]") -> list[str]:
     """Reasons against a force law in some rows at their u*, m/s; empty if none."""
-    law, number = (
-        LAWS[name],
-        {str(c): rows[c].to_numpy() for c in rows.select_dtypes("number")},
+    law = LAWS[name]
+    d = rows["d_m"].to_numpy()
+    exposure = Exposure(
+        d,
+        rows["z0_over_d"].to_numpy() * d,
+        rows["rho_f_kg_m3"].to_numpy(),
+        rows["nu_m2_s"].to_numpy(),
+        rows["alpha_s"].to_numpy(),
     )
-    d, fluid = number["d_m"], (number[c] for c in ("rho_f_kg_m3", "nu_m2_s", "alpha_s"))
-    exposure = Exposure(d, number["z0_over_d"] * d, *fluid)
-    grain = {"density": "rho_sol_kg_m3", "slope_deg": "alpha_deg", "gravity": "g_m_s2"}
+    weights = {}
     # a pile has the share of grains that lift carried off
-    weights = (
-        {} if "share_carried_off" in rows else {k: number[c] for k, c in grain.items()}
-    )
+    if "share_carried_off" not in rows:
+        weights["density"] = rows["rho_sol_kg_m3"].to_numpy()
+        weights["slope_deg"] = rows["alpha_deg"].to_numpy()
+        weights["gravity"] = rows["g_m_s2"].to_numpy()
     speeds = np.asarray(ustar, float)
     texts = why_not(law, speeds, exposure, **weights)
     if law.goes_on:
         holds = LAWS[law.goes_on].valid(speeds, exposure)
         remedy = f'; choose forces.law = "{law.goes_on}"'
         for row in np.flatnonzero(holds).tolist():
-            texts[row] += remedy if texts[row] else ""
+            if texts[row]:
+                texts[row] += remedy
     return texts
 
 
 def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
+    """Reasons against the threshold of a row."""
     if np.isnan(row["reynolds"]):
         yield f"not reached: {_reached(row)}"
     elif row["law"]:
         yield row["law"]
-    if row["standing_out"] <= 0:
+    standing_out = row["standing_out"]
+    if standing_out <= 0:
         yield "hidden grain: it lies below the tops of its neighbours"
-    elif row["standing_out"] < EXPOSED_FROM:
-        yield f"hidden grain: {row['standing_out']:.0%} of it stands out of its neighbours"
-    if (flow := row["flow_reynolds"]) < LAMINAR_BELOW:
-        yield f"laminar flow: speed times depth over nu, {flow:.0f}, is below {LAMINAR_BELOW:g}"
-    if "share_carried_off" not in row:
-        if isinstance(row.get("gusts"), str):
-            yield "the error of the closed form under gusts is not known"
-        return
-    error = row["error_estimate"]
+    elif standing_out < EXPOSED_FROM:
+        yield f"hidden grain: {standing_out:.0%} of it stands out of its neighbours"
+    flow = row["flow_reynolds"]
+    if flow < LAMINAR_BELOW:
+        limit = f"{flow:.0f}, is below {LAMINAR_BELOW:g}"
+        yield f"laminar flow: speed times depth over nu, {limit}"
+    if "share_carried_off" in row:
+        yield from _reasons_of_pile(row, tolerance)
+    elif isinstance(row.get("gusts"), str):
+        yield "the error of the closed form under gusts is not known"
+
+
+def _reasons_of_pile(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
+    """Reasons against the threshold of a pile, beside those that a grain has, too."""
     if row["share_carried_off"] > CARRIED_OFF:
         yield f"lift carried off {row['share_carried_off']:.0%} of the moved grains"
-    is_plane = (
-        row.get("packing") == "poured" and not (row.get("answered_width") or 0) > 0
-    )
-    if is_plane and pd.isna(row.get("sizes")):
-        yield "equal spheres in one plane settle into a crystal: give sizes = { sigma_g = 1.2 }"
-    is_renewed = row.get("answered_method") == "peeling" or (row.get("update") or 0) > 0
-    if (
-        row.get("sheltering") == "balanced"
-        and not is_renewed
-        and row["fraction"] > KEPT_TO + 1e-9
-    ):
-        yield f"kept balance: beyond n/N = {KEPT_TO} grains that have gone still bear a part of it"
+    yield from _reasons_of_bed(row)
+    error = row["error_estimate"]
     if pd.isna(error):
         yield "the error of its levels on such a bed is not known"
     elif tolerance and error > tolerance * (1 + 1e-9):
@@ -213,6 +245,20 @@ def _held_row(row: Mapping[Any, Any]) -> Iterator[str]:
     yield said
 
 
+def _reasons_of_bed(row: Mapping[Any, Any]) -> Iterator[str]:
+    """Reasons against how the grains of a pile lie, and against a balance that is kept."""
+    is_strip = (row.get("answered_width") or 0) > 0
+    is_plane = row.get("packing") == "poured" and not is_strip
+    if is_plane and pd.isna(row.get("sizes")):
+        remedy = "give sizes = { sigma_g = 1.2 }"
+        yield f"equal spheres in one plane settle into a crystal: {remedy}"
+    is_renewed = row.get("answered_method") == "peeling" or (row.get("update") or 0) > 0
+    is_kept = row.get("sheltering") == "balanced" and not is_renewed
+    if is_kept and row["fraction"] > KEPT_TO + 1e-9:
+        beyond = f"beyond n/N = {KEPT_TO} grains that have gone still bear a part of it"
+        yield f"kept balance: {beyond}"
+
+
 def _reached(row: Mapping[Any, Any]) -> str:
     """How many grains of a pile have moved by the end, and whether the run was to end there."""
     if "count" not in row:
@@ -227,7 +273,8 @@ def _reached(row: Mapping[Any, Any]) -> str:
 
 def _open_ends(row: Mapping[Any, Any]) -> Iterator[str]:
     """Why the interval of a threshold that was reached has no upper end; empty if it has one."""
-    low, high = row.get("shields_low", np.nan), row.get("shields_high", np.nan)
+    low = row.get("shields_low", np.nan)
+    high = row.get("shields_high", np.nan)
     if np.isnan(low) or not np.isnan(high) or np.isnan(row["shields"]):
         return
     if row["error_estimate"] >= 1:
