@@ -110,8 +110,6 @@ def as_text(
     liquid = [row for row in rows if row["rho_f_kg_m3"] >= GAS_BELOW]
     if any(_is_nan(row["depth_m"]) for row in liquid):
         yield "for the mean velocity of the liquid give its depth, --depth in m"
-    elif any(row["valid"] and _is_nan(row["mean_velocity_m_s"]) for row in liquid):
-        yield "no mean velocity: U D/nu is below 2000, where the flow may be laminar"
 
 
 def _of_one(rows: Sequence["Row"], asked: str) -> Iterator[str]:
@@ -154,7 +152,8 @@ def _subject(rows: Sequence["Row"], asked: str) -> str:
         return f"Force law {chosen['law']}:"
     holding = ", ".join(f"--law {row['law']}" for row in rows if row["valid"])
     reason = f"Force law {chosen['law']} does not hold here: {chosen['why_not']}"
-    return f"{reason} (choose {holding}). By it"
+    choice = f" (choose {holding})" if holding else ""
+    return f"{reason}{choice}. By it"
 
 
 def _of_many(rows: Sequence["Row"], asked: str, varied: Sequence[str]) -> Iterator[str]:

@@ -24,7 +24,12 @@ from orchestrator.physics.threshold import (
     threshold,
     why_not,
 )
-from orchestrator.physics.velocity import measurable_speeds
+from orchestrator.physics.velocity import (
+    LAMINAR_BELOW,
+    laminar,
+    measurable_speeds,
+    open_water_reynolds,
+)
 from orchestrator.types import FloatArray, Row
 
 Table = dict[str, NDArray[Any]]
@@ -94,7 +99,25 @@ def thresholds(points: Mapping[str, Any], asked: str = AUTO) -> Table:
     if not table["valid"].any():
         remedy = "are all numbers in SI units?"
         raise InputError("no force law holds", "threshold", remedy)
+    _mark_laminar(table)
     return table
+
+
+def _mark_laminar(table: Table) -> None:
+    """Mark the thresholds in open water whose flow may be laminar as not valid."""
+    with np.errstate(all="ignore"):
+        reynolds = open_water_reynolds(
+            table["ustar_m_s"],
+            roughness=table["z0_m"],
+            viscosity=table["nu_m2_s"],
+            depth=table["depth_m"],
+        )
+        is_laminar = reynolds < LAMINAR_BELOW
+    is_laminar &= table["rho_f_kg_m3"] >= GAS_BELOW
+    for row in np.flatnonzero(is_laminar).tolist():
+        reasons = [table["why_not"][row], laminar(float(reynolds[row]))]
+        table["why_not"][row] = "; ".join(filter(None, reasons))
+    table["valid"] &= ~is_laminar
 
 
 def _check_law(asked: str) -> None:

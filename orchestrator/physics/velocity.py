@@ -228,6 +228,53 @@ def measurable_speeds(
     }
 
 
+def open_water_reynolds(
+    ustar: ArrayLike,
+    *,
+    roughness: ArrayLike,
+    viscosity: ArrayLike,
+    depth: ArrayLike,
+    closed: ArrayLike = False,
+) -> FloatArray:
+    """Compute the Reynolds number of a channel, its mean speed times its depth over nu.
+
+    Parameters
+    ----------
+    ustar
+        Friction velocity on the bed, m/s.
+    roughness
+        Roughness length z0 of the bed, m.
+    viscosity
+        Kinematic viscosity of the fluid, m2/s.
+    depth
+        Depth of the flow, m; NaN where it has none.
+    closed
+        Whether it is a closed channel.
+
+    Returns
+    -------
+    FloatArray
+        The number, of the broadcast shape; NaN without a depth. Below `LAMINAR_BELOW`
+        the flow may be laminar.
+
+    Examples
+    --------
+    >>> water = {"roughness": 1e-4, "viscosity": 1e-6, "depth": 0.5}
+    >>> print(open_water_reynolds(0.05, **water).round(-3))
+    459000.0
+    """
+    z0 = outer_roughness(roughness, ustar, viscosity)
+    mean = depth_mean_speed(ustar, depth, z0, closed=closed)
+    deep = np.asarray(depth, float)
+    return np.asarray(mean * deep / np.asarray(viscosity, float))
+
+
+def laminar(reynolds: float) -> str:
+    """Why a flow of a Reynolds number below `LAMINAR_BELOW` has no logarithmic law."""
+    said = f"speed times depth over nu, {reynolds:.0f}, is below {LAMINAR_BELOW:g}"
+    return f"laminar flow: {said}"
+
+
 def smooth_wall_roughness(ustar: ArrayLike, viscosity: ArrayLike) -> FloatArray:
     """Compute the roughness length of a smooth wall, nu/(9 u*).
 

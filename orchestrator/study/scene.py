@@ -59,6 +59,9 @@ BEYOND_ASKED = 0.05
 of ten."""
 LEAST_UPDATE = 0.02  # least part of the grains between two solves of the flow
 LARGEST_RATIO = 10.0  # of a mixture's grains: the time of DEM rises with its square
+OFF_SIEVE = 1e-5
+"""Relative difference of the d50 of a sieve table from the diameter: messages and tables
+print it with six digits."""
 OFF_MEDIAN = 0.01
 """Relative difference of a log-normal mixture's d50 from the diameter, of which Shields numbers and
 a roughness length of d/30 are made."""
@@ -210,7 +213,7 @@ class Scene(parts.Part):
     def _rules_of_sizes(self, mixture: parts.Sizes) -> Iterator[Rule]:
         d, slack = self.grain.diameter, OFF_MEDIAN
         if isinstance(mixture, tuple):
-            (diameters, fractions), slack = np.array(mixture).T, 1e-9
+            (diameters, fractions), slack = np.array(mixture).T, OFF_SIEVE
             for one, other in pairwise(diameters.tolist()):
                 what = f"diameters do not rise: {other:g} m comes behind {one:g} m"
                 yield other <= one, "grain.sizes", what, "sort the rows, each size once"

@@ -296,7 +296,7 @@ def parse(text: str, *, name: str, where: str, files: Files | None = None) -> St
     listed: list[list[Scene]] = []
     count = 0
     for table, place in zip(tables, places, strict=True):
-        axes = _axes(file, table)
+        axes = _axes(file, table, place)
         count += math.prod(map(len, axes.values()))
         if count > MOST_SCENES:
             what = f"more than {MOST_SCENES} scenes in the study"
@@ -322,12 +322,16 @@ def parse(text: str, *, name: str, where: str, files: Files | None = None) -> St
     )
 
 
-def _axes(file: "_File", table: "_Group") -> dict[str, list[Any]]:
+def _axes(file: "_File", table: "_Group", where: str) -> dict[str, list[Any]]:
     """The axes of a group, with the seeds that it asks for."""
     axes = {**file.axes, **table.axes}
     seeds = file.seeds if table.seeds is None else table.seeds
-    if seeds:
-        axes["bed.seed"] = [*range(seeds)]
+    if not seeds:
+        return axes
+    if "bed.seed" in {**axes, **{f"bed.{key}": 0 for key in {**file.bed, **table.bed}}}:
+        what = f"it asks for the seeds 0 to {seeds - 1}, and bed.seed for others"
+        raise InputError(what, f"{where}: seeds", "leave out one of the two")
+    axes["bed.seed"] = [*range(seeds)]
     return axes
 
 

@@ -13,8 +13,8 @@ from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import standing_out, why_not
 from orchestrator.physics.velocity import (
     LAMINAR_BELOW,
-    depth_mean_speed,
-    outer_roughness,
+    laminar,
+    open_water_reynolds,
 )
 from orchestrator.study import fields
 from orchestrator.tables.check import Contradictions
@@ -156,10 +156,14 @@ def _flow_reynolds(rows: pd.DataFrame) -> "pd.Series[float]":
     else:
         is_dem = rows["answered_method"] == "dem"
         ustar0 = rows["ustar_m_s"].where(is_dem, rows["ustar_closed_form_m_s"])
-    z0 = outer_roughness(rows["z0_over_d"] * rows["d_m"], ustar0, nu)
-    is_closed = rows["flow_top"] == "closed channel"
-    channel = depth * depth_mean_speed(ustar0, depth, z0, closed=is_closed)
-    return channel.fillna(layer) / nu
+    channel = open_water_reynolds(
+        ustar0,
+        roughness=rows["z0_over_d"] * rows["d_m"],
+        viscosity=nu,
+        depth=depth,
+        closed=rows["flow_top"] == "closed channel",
+    )
+    return pd.Series(channel, rows.index).fillna(layer / nu)
 
 
 def _beyond_law(name: str, rows: pd.DataFrame, ustar: "pd.Series[float]") -> list[str]:
@@ -203,8 +207,7 @@ def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
         yield f"hidden grain: {standing_out:.0%} of it stands out of its neighbours"
     flow = row["flow_reynolds"]
     if flow < LAMINAR_BELOW:
-        limit = f"{flow:.0f}, is below {LAMINAR_BELOW:g}"
-        yield f"laminar flow: speed times depth over nu, {limit}"
+        yield laminar(flow)
     if "share_carried_off" in row:
         yield from _reasons_of_pile(row, tolerance)
     elif isinstance(row.get("gusts"), str):

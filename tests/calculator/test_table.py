@@ -32,6 +32,19 @@ def test_every_point_and_law_is_the_closed_form_of_it() -> None:
         assert rows["why_not"].tolist() == why
 
 
+def test_a_laminar_channel_is_not_valid() -> None:
+    """The column said that the law holds, and a line below that the flow is laminar."""
+    water = {"fluid_density": [999.1] * 3, "viscosity": [1.1e-6] * 3}
+    grains = {"diameter": [5e-5] * 3, "density": [2650.0] * 3}
+    table = thresholds({**water, **grains, "depth": [0.02, 0.06, 1.0]}, "bridged")
+    asked = table["answer"]
+    has_mean = np.isfinite(table["mean_velocity_m_s"][asked])
+    assert has_mean.tolist() == [False, True, True]
+    assert table["valid"][asked].tolist() == has_mean.tolist()
+    is_laminar = ["laminar flow" in text for text in table["why_not"][asked]]
+    assert is_laminar == [True, False, False]
+
+
 def test_parameters_are_fields_of_a_scene_with_their_columns_and_defaults() -> None:
     fields = {one.name: one for one in FIELDS}
     for name, parameter in PARAMETERS.items():

@@ -95,7 +95,7 @@ def test_a_liquid_of_a_depth_has_a_mean_velocity_and_no_winds(run: Run) -> None:
     assert "--depth in m" in run(*QUARTZ_IN_WATER)[1]
     oil = ["--fluid-density", "870", "--viscosity", "5e-5", "--depth", "0.02"]
     assert (
-        "no mean velocity: U D/nu is below 2000"
+        "laminar flow: speed times depth over nu, 117, is below"
         in run(*D, "--density", "2650", *oil)[1]
     )
 

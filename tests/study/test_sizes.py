@@ -34,6 +34,14 @@ def test_the_median_of_a_sieve_table_is_the_diameter() -> None:
     assert parts.percentile(classes, 1.0, 0.5) == 1e-3
 
 
+def test_the_diameter_may_be_written_as_messages_print_it() -> None:
+    """Six digits of the d50 of a sieve table, which are 4e-6 of it off."""
+    scene = _grain("diameter = 0.00141421\nsizes = [[1e-3, 0.5], [2e-3, 0.5]]")
+    assert scene.grain.diameter == 0.00141421
+    with pytest.raises(InputError, match=r"grain\.sizes is 0\.00141421 m"):
+        _grain("diameter = 0.0014143\nsizes = [[1e-3, 0.5], [2e-3, 0.5]]")
+
+
 def test_roughness_is_a_part_of_the_percentile_that_it_names() -> None:
     roughness = _grain(
         "diameter = 1e-3\nsizes = { sigma_g = 1.5 }", "d84/10"

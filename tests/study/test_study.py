@@ -220,6 +220,20 @@ def test_a_law_that_turns_the_grain_is_answered_on_a_long_bed() -> None:
         assert decision.scene.protocol.method == "local"
 
 
+@pytest.mark.parametrize(
+    "asked",
+    [
+        f'seeds = 2\n{PILE}packing = "poured"\n[axes]\n"bed.seed" = [11, 12]\n',
+        f'seeds = 2\n{PILE}packing = "poured"\nseed = 11\n',
+        f'{PILE}packing = "poured"\nseed = 11\n[[group]]\nseeds = 2\n',
+    ],
+)
+def test_seeds_do_not_replace_a_seed_that_is_written(asked: str) -> None:
+    """The seeds 0 and 1 were run, and nothing was said."""
+    with pytest.raises(InputError, match="asks for the seeds 0 to 1, and"):
+        _parse(asked)
+
+
 def test_the_scenes_of_all_groups_together_are_limited() -> None:
     few = "[[group]]\ngrain = { diameter = 1e-3 }\n"
     many = f"[[group]]\n[group.axes]\n'grain.diameter' = [{', '.join(['1e-3'] * 99_999)}]\n"
