@@ -20,6 +20,7 @@ PHYSICS = (
     "orchestrator.physics.curves",
     "orchestrator.physics.laws",
     "orchestrator.physics.measured",
+    "orchestrator.physics.saltation",
     "orchestrator.physics.threshold",
     "orchestrator.physics.velocity",
 )

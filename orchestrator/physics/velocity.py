@@ -467,6 +467,41 @@ def bridge(ustar: FloatArray, viscous: FloatArray, rough: FloatArray) -> FloatAr
     return np.asarray(2 * ustar**2 / (viscous + root))
 
 
+def law_of_the_wall(height: FloatArray, roughness: FloatArray) -> FloatArray:
+    """Compute the mean speed over a smooth, rough or transitional wall, in closed form.
+
+    On a smooth wall it is H. Reichardt's profile (Z. Angew. Math. Mech. 31, 1951,
+    doi:10.1002/zamm.19510310704), from the sublayer ``U = y`` to the logarithm. The
+    roughness lowers the speed by ``ln(1 + 0.3 k (1 - exp(-k/26)))/kappa``, as T. Pahtz
+    and O. Duran have it (arXiv 1602.07079): nothing on a smooth wall, and on a rough
+    one so much that the profile is that over ``z0 = k_s/33``. It lies within 0.45 ustar
+    of Nikuradse's sand in between, where Colebrook's sum (`outer_roughness`) is up to 2
+    ustar lower.
+
+    Parameters
+    ----------
+    height
+        Height above the zero level, y = z ustar/nu.
+    roughness
+        Equivalent sand-grain roughness, k = k_s ustar/nu.
+
+    Returns
+    -------
+    FloatArray
+        Speed over ustar, of the broadcast shape; not negative.
+
+    Examples
+    --------
+    >>> y = np.array([0.1, 10.0, 1000.0])
+    >>> print(law_of_the_wall(y, np.array(0.0)).round(2))
+    [ 0.1   8.38 22.48]
+    """
+    log_layer = np.log1p(KARMAN * height) / KARMAN
+    buffer = 1 - np.exp(-height / 11) - height / 11 * np.exp(-height / 3)
+    lowered = np.log1p(0.3 * roughness * -np.expm1(-roughness / 26)) / KARMAN
+    return np.asarray(np.maximum(log_layer + 7.8 * buffer - lowered, 0))
+
+
 def shift(roughness: FloatArray) -> FloatArray:
     """Compute the shift D of the wall by its roughness, in wall units.
 

@@ -13,6 +13,7 @@ from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.velocity import (
     bridge,
     depth_mean_speed,
+    law_of_the_wall,
     layer,
     log_law_speed,
     log_law_ustar,
@@ -139,3 +140,46 @@ def test_a_threshold_of_sand_is_a_wind_of_known_strength() -> None:
     wind = log_law_speed(0.22, np.array([1.0, 10.0]), 2.5e-4 / 30)
     np.testing.assert_allclose(wind, 0.22 / 0.41 * np.log([120001, 1200001]))
     assert np.all((wind > 6) & (wind < 8))
+
+
+def test_law_of_the_wall_is_linear_at_a_smooth_wall_and_logarithmic_far_from_it() -> (
+    None
+):
+    smooth = np.array(0.0)
+    np.testing.assert_allclose(
+        law_of_the_wall(np.array([1e-4, 1e-2, 0.1]), smooth),
+        [1e-4, 1e-2, 0.1],
+        rtol=0.02,
+    )
+    y = np.array([200.0, 1e4, 1e6])
+    np.testing.assert_allclose(
+        law_of_the_wall(y, smooth), np.log(y) / KARMAN + 5.6, rtol=0.01
+    )
+
+
+def test_law_of_the_wall_is_near_van_driests_profile() -> None:
+    # of thin layers about each height
+    y = np.geomspace(0.5, 1e4, 30)
+    van_driest, _ = layer(0.99 * y, 1.01 * y, np.array(0.0))
+    np.testing.assert_allclose(law_of_the_wall(y, np.array(0.0)), van_driest, rtol=0.07)
+
+
+@pytest.mark.parametrize(
+    ("k", "level"),
+    [
+        (0.1, -0.25),
+        (1.0, 5.5),
+        (3.0, 8.24),
+        (10.0, 9.58),
+        (30.0, 9.11),
+        (100.0, 8.48),
+        (1e4, 8.48),
+    ],
+)
+def test_roughness_lowers_the_law_of_the_wall_as_nikuradse_has_it(
+    k: float, level: float
+) -> None:
+    # J. Nikuradse, VDI-Forschungsheft 361, 1933: u/u* = 2.5 ln(z/k_s) + level for sand of k_s
+    y = 1e3 * max(k, 1.0)
+    far = float(law_of_the_wall(np.array(y), np.array(k)))
+    assert far - np.log(y / k) / KARMAN == pytest.approx(level, abs=0.45)
