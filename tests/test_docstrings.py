@@ -27,6 +27,12 @@ PHYSICS = (
 """Modules whose public functions have an example each."""
 DESCRIBED = (
     *PHYSICS,
+    "orchestrator.bed.line",
+    "orchestrator.bed.packing",
+    "orchestrator.benchmark.checks",
+    "orchestrator.benchmark.export",
+    "orchestrator.benchmark.mechanics",
+    "orchestrator.benchmark.scenes",
     "orchestrator.calculator",
     "orchestrator.calculator.asked",
     "orchestrator.calculator.cli",

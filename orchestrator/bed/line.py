@@ -1,7 +1,7 @@
-"""The bed line: the bottom of the flow as a polyline, and how one is made of forms and obstacles.
+"""The bed line: the bottom of the flow as a polyline, made of forms and obstacles.
 
-Lengths are in any one unit: metres for the flow, diameters for a packing. The foot of the first
-form is at x = 0, where the arc length s is zero.
+Lengths are in any one unit: metres for the flow, diameters for a packing. The foot of
+the first form is at x = 0, where the arc length s is zero.
 """
 
 from collections.abc import Sequence
@@ -15,23 +15,40 @@ from orchestrator.digits import DIGITS
 from orchestrator.study.parts import Obstacle, PileBed, Range, UnfitError
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
-UPSTREAM, DOWNSTREAM = 10.0, 20.0
-"""Flat bed before and behind the forms, in heights of them."""
+UPSTREAM = 10.0
+"""Flat bed before the forms, in heights of them."""
+DOWNSTREAM = 20.0
+"""Flat bed behind the forms, in heights of them."""
 SIDE_DEG = 75.0
-"""Slope of an obstacle's sides: the grid lines of the mesh are vertical, and so no side is."""
-FENCE = 0.1  # thickness of a fence at its top, of its height
-CHORDS = 16  # chords of a half-cylinder
-LEVEL_DEG = 1e-6  # slope from which on a segment rises
-PLACES = 10**6  # most pairs of a point and a segment that are compared at a time
+"""Slope of an obstacle's sides: the grid lines of the mesh are vertical, and so no side
+is."""
+FENCE = 0.1
+"""Thickness of a fence at its top, of its height."""
+CHORDS = 16
+"""Chords of a half-cylinder."""
+LEVEL_DEG = 1e-6
+"""Slope from which on a segment rises."""
+MOST_PAIRS = 10**6
+"""Most pairs of a point and a segment that are compared at a time."""
+FOOT_STEPS = 50
+"""Steps in which the foot of a side is found: it is steeper than any bed, which
+converges."""
 
 
 @dataclass(frozen=True)
 class BedLine:
     """A bed line of n corners, which go downstream.
 
-    `x` is downstream of the foot of the first form, `z` above the flat bed before it; `h`, the
-    height of the forms, is that in which domain, mesh and averaging are measured; `bare` has the
-    ranges of x of obstacles, which carry no grains.
+    Attributes
+    ----------
+    x
+        Places of the corners downstream of the foot of the first form.
+    z
+        Their heights above the flat bed before it.
+    h
+        The height of the forms, in which domain, mesh and averaging are measured.
+    bare
+        The ranges of x of obstacles, which carry no grains.
     """
 
     x: tuple[float, ...]
@@ -41,27 +58,79 @@ class BedLine:
 
     @classmethod
     def through(cls, corners: FloatArray, h: float) -> "BedLine":
-        """The line through some corners, shape (n, 2)."""
+        """Make the line through some corners.
+
+        Parameters
+        ----------
+        corners
+            X and z of the corners, shape (n, 2).
+        h
+            The height of the forms.
+
+        Returns
+        -------
+        BedLine
+            The line.
+        """
         x, z = np.transpose(corners).tolist()
         return cls(tuple(x), tuple(z), h)
 
     def scaled(self, factor: float) -> "BedLine":
-        """The same line in another unit of length."""
-        x, z = (tuple(v * factor for v in values) for values in (self.x, self.z))
+        """Write the line in another unit of length.
+
+        Parameters
+        ----------
+        factor
+            The old unit over the new one.
+
+        Returns
+        -------
+        BedLine
+            The same line.
+        """
+        x = tuple(place * factor for place in self.x)
+        z = tuple(height * factor for height in self.z)
         bare = tuple((start * factor, end * factor) for start, end in self.bare)
         return BedLine(x, z, self.h * factor, bare)
 
     def with_corners(self, places: Sequence[float]) -> "BedLine":
-        """The same line with more corners, in which it does not bend."""
-        x = np.union1d(self.x, places)
+        """Add corners in which the line does not bend.
+
+        Parameters
+        ----------
+        places
+            Their places along x.
+
+        Returns
+        -------
+        BedLine
+            The same line.
+        """
+        return self._at(np.union1d(self.x, places))
+
+    def _at(self, x: FloatArray) -> "BedLine":
+        """The line with other corners on it."""
         return replace(self, x=tuple(x.tolist()), z=tuple(self.height(x).tolist()))
 
     def part(self, start: float, end: float, beyond: float) -> "BedLine":
-        """The line between two places of its inner part, and some of the bed beyond them."""
-        start, end = max(start, self.x[1]), min(end, self.x[-2])
-        inner = (x for x in self.x[1:-1] if start < x < end)
-        x = np.array([start - beyond, start, *inner, end, end + beyond])
-        return replace(self, x=tuple(x.tolist()), z=tuple(self.height(x).tolist()))
+        """Cut the line.
+
+        Parameters
+        ----------
+        start, end
+            Ends of the part along x; they are moved into the inner part of the line.
+        beyond
+            Length of the bed that is kept before and behind it.
+
+        Returns
+        -------
+        BedLine
+            The part.
+        """
+        start = max(start, self.x[1])
+        end = min(end, self.x[-2])
+        inner = [x for x in self.x[1:-1] if start < x < end]
+        return self._at(np.array([start - beyond, start, *inner, end, end + beyond]))
 
     @cached_property
     def corners(self) -> FloatArray:
@@ -85,7 +154,7 @@ class BedLine:
 
     @cached_property
     def slopes_deg(self) -> FloatArray:
-        """Slope of each segment, positive where the bed rises downstream, shape (n - 1,)."""
+        """Slope of each segment, positive where the bed rises, shape (n - 1,)."""
         slopes = np.degrees(np.arctan2(self.tangents[:, 1], self.tangents[:, 0]))
         # a bed of 15 degrees has a bend of 15 degrees, and not of a last digit more
         return np.asarray(np.round(slopes, DIGITS))
@@ -120,16 +189,36 @@ class BedLine:
     def toe(self) -> FloatArray:
         """Position of the corner where the form ends and the flat bed goes on, shape (2,)."""
         falls = np.flatnonzero(np.diff(self.z) < 0)
-        return np.asarray(self.corners[falls[-1] + 1 if len(falls) else -1])
+        last = falls[-1] + 1 if len(falls) else -1
+        return np.asarray(self.corners[last])
 
     def height(self, x: FloatArray) -> FloatArray:
-        """Height of the line at some places along x."""
+        """Find the height of the line.
+
+        Parameters
+        ----------
+        x
+            Places along x.
+
+        Returns
+        -------
+        FloatArray
+            The heights, of the same shape.
+        """
         return np.asarray(np.interp(x, self.x, self.z))
 
     def counted(self, counts: str | Range) -> BoolArray:
-        """Which segments carry counted grains, shape (n - 1,); none of the two at the ends.
+        """Find the segments that carry counted grains.
 
-        Those that rise for "windward", every one for "all", or those within a range of x.
+        Parameters
+        ----------
+        counts
+            "windward" for those that rise, "all" for every one, or a range of x.
+
+        Returns
+        -------
+        BoolArray
+            Which segments, shape (n - 1,); none of the two at the ends.
         """
         inner = np.zeros(len(self.lengths), bool)
         inner[1:-1] = True
@@ -141,47 +230,96 @@ class BedLine:
         return np.asarray(inner & (x[1:] > counts[0]) & (x[:-1] < counts[1]))
 
     def under(self, points: FloatArray) -> IntArray:
-        """The segment under each of some points over the bed; at a top that on their own side."""
+        """Find the segment under each of some points over the bed.
+
+        Parameters
+        ----------
+        points
+            X and z of the points, shape (m, 2).
+
+        Returns
+        -------
+        IntArray
+            The nearest segments, at a top those on the points' own side, shape (m,).
+        """
         segment, s = self.nearest(points)
         near = 1e-9 * self.lengths.max()
-        last = s >= self.arc_lengths[segment + 1] - near
-        behind = last & (points[:, 0] > self.corners[segment + 1, 0] + near)
-        return np.asarray(np.minimum(segment + behind, len(self.lengths) - 1))
+        is_at_end = s >= self.arc_lengths[segment + 1] - near
+        is_behind = points[:, 0] > self.corners[segment + 1, 0] + near
+        last = len(self.lengths) - 1
+        return np.asarray(np.minimum(segment + (is_at_end & is_behind), last))
 
     def over(self, points: FloatArray, segment: IntArray | int) -> FloatArray:
-        """Distance of points (m, 2) over the straight lines of segments, shape (m,)."""
-        (x, z), (nx, nz) = (points - self.corners[segment]).T, self.normals[segment].T
-        return np.asarray(x * nx + z * nz)
+        """Find how far points are over the straight lines of segments.
+
+        Parameters
+        ----------
+        points
+            X and z of the points, shape (m, 2).
+        segment
+            The segment of all, or of each, shape (m,).
+
+        Returns
+        -------
+        FloatArray
+            The distances along the segments' normals, shape (m,).
+        """
+        x, z = (points - self.corners[segment]).T
+        normal_x, normal_z = self.normals[segment].T
+        return np.asarray(x * normal_x + z * normal_z)
 
     def roof(self, clearance: float) -> tuple[float, FloatArray]:
-        """Slope (degrees) and ridge of two planes that are everywhere this far above the forms."""
+        """Find two planes that are everywhere so far above the forms.
+
+        Parameters
+        ----------
+        clearance
+            The distance.
+
+        Returns
+        -------
+        slope
+            Slope of both planes, degrees.
+        ridge
+            X and z of the ridge, shape (2,).
+        """
         inner = self.corners[1:-1]
         ridge = inner[np.argmax(inner[:, 1])]
         apart = inner[inner[:, 0] != ridge[0]] - ridge
         steep = np.abs(np.arctan2(-apart[:, 1], np.abs(apart[:, 0]))).min()
-        return float(np.degrees(steep)), ridge + np.array(
-            [0, clearance / np.cos(steep)]
-        )
+        above = np.array([0, clearance / np.cos(steep)])
+        return float(np.degrees(steep)), ridge + above
 
     def nearest(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
-        """The segment nearest to each of m points, and the arc length of the nearest place on it.
+        """Find the place on the line nearest to each of some points.
 
         If two are as near, the higher place counts.
+
+        Parameters
+        ----------
+        points
+            X and z of the points, shape (m, 2).
+
+        Returns
+        -------
+        segment
+            The segment of each place, shape (m,).
+        s
+            Its arc length, shape (m,).
         """
-        segment, s = np.empty(len(points), np.int64), np.empty(len(points))
-        blocks = len(points) * len(self.lengths) // PLACES + 1
+        segment = np.empty(len(points), np.int64)
+        s = np.empty(len(points))
+        tie = 1e-9 * self.lengths.max()
+        blocks = len(points) * len(self.lengths) // MOST_PAIRS + 1
         for block in np.array_split(np.arange(len(points)), blocks):
-            away = points[block, None] - self.corners[:-1]
-            along = np.clip(
-                np.einsum("mnk,nk->mn", away, self.tangents), 0.0, self.lengths
-            )
+            here = points[block, None]
+            away = here - self.corners[:-1]
+            along = np.einsum("mnk,nk->mn", away, self.tangents)
+            along = np.clip(along, 0.0, self.lengths)
             places = self.corners[:-1] + along[..., None] * self.tangents
-            distance = np.linalg.norm(points[block, None] - places, axis=2)
-            tied = (
-                distance
-                <= distance.min(axis=1, keepdims=True) + 1e-9 * self.lengths.max()
-            )
-            chosen = np.argmax(np.where(tied, places[..., 1], -np.inf), axis=1)
+            distance = np.linalg.norm(here - places, axis=2)
+            is_tied = distance <= distance.min(axis=1, keepdims=True) + tie
+            chosen = np.argmax(np.where(is_tied, places[..., 1], -np.inf), axis=1)
             segment[block] = chosen
             s[block] = self.arc_lengths[chosen] + along[np.arange(len(block)), chosen]
         return segment, s
@@ -189,13 +327,30 @@ class BedLine:
 
 @cache
 def of_bed(bed: PileBed) -> BedLine:
-    """The bed line that a pile's bed asks for, m; an UnfitError if the forms of a train overlap."""
+    """Make the bed line that a pile's bed asks for.
+
+    Parameters
+    ----------
+    bed
+        The bed.
+
+    Returns
+    -------
+    BedLine
+        The line, m.
+
+    Raises
+    ------
+    UnfitError
+        If the forms of a train overlap.
+    """
     if bed.profile:
         corners = np.column_stack([bed.profile.x, bed.profile.z])
     else:
         corners = _train(bed.form.corners(bed), bed.forms, bed.spacing)
     for obstacle in bed.obstacles:
-        start, end = obstacle.x - obstacle.reach, obstacle.x + obstacle.reach
+        start = obstacle.x - obstacle.reach
+        end = obstacle.x + obstacle.reach
         if start < corners[0, 0]:
             corners = np.vstack([[start, corners[0, 1]], corners])
         if end > corners[-1, 0]:
@@ -208,19 +363,46 @@ def of_bed(bed: PileBed) -> BedLine:
 
 @cache
 def triangle(slope_deg: float, height: float) -> BedLine:
-    """A pile with two faces of one slope (degrees), the paper's bed; of slope 0 the flat bed."""
-    face = height / tan(radians(slope_deg)) if slope_deg else 4 * height
-    top = height if slope_deg else 0.0
+    """Make a pile with two faces of one slope, the paper's bed.
+
+    Parameters
+    ----------
+    slope_deg
+        Slope of the faces, degrees; of 0 it is the flat bed.
+    height
+        Height of the pile.
+
+    Returns
+    -------
+    BedLine
+        The line, in the unit of the height.
+    """
+    if slope_deg:
+        face = height / tan(radians(slope_deg))
+        top = height
+    else:
+        face = 4 * height
+        top = 0.0
     return between_flats(np.array([[0, 0], [face, top], [2 * face, 0]]), height)
 
 
 def between_flats(corners: FloatArray, height: float) -> BedLine:
-    """A line with flat bed before and behind some corners."""
-    (x_first, z_first), (x_last, z_last) = corners[[0, -1]]
-    before, behind = (
-        (x_first - UPSTREAM * height, z_first),
-        (x_last + DOWNSTREAM * height, z_last),
-    )
+    """Make a line with flat bed before and behind some corners.
+
+    Parameters
+    ----------
+    corners
+        X and z of the corners, shape (n, 2).
+    height
+        The height of the forms.
+
+    Returns
+    -------
+    BedLine
+        The line.
+    """
+    before = corners[0] - np.array([UPSTREAM * height, 0.0])
+    behind = corners[-1] + np.array([DOWNSTREAM * height, 0.0])
     return BedLine.through(np.vstack([before, corners, behind]), height)
 
 
@@ -230,44 +412,47 @@ def _train(form: FloatArray, count: int, spacing: float | None) -> FloatArray:
     spacing = spacing or length
     if count > 1 and spacing < length * (1 - 1e-9):
         what = f"forms {length:g} m long overlap at {spacing:g} m"
-        raise UnfitError(
-            "bed.spacing", what, "raise it, or leave it out: they touch then"
-        )
-    corners = np.vstack(
-        [form + np.array([place * spacing, 0]) for place in range(count)]
-    )
+        remedy = "raise it, or leave it out: they touch then"
+        raise UnfitError("bed.spacing", what, remedy)
+    forms = [form + np.array([place * spacing, 0]) for place in range(count)]
+    corners = np.vstack(forms)
     # forms that touch share a corner
-    return np.asarray(corners[np.append(True, np.diff(corners[:, 0]) > 1e-9 * spacing)])
+    is_apart = np.append(True, np.diff(corners[:, 0]) > 1e-9 * spacing)
+    return np.asarray(corners[is_apart])
 
 
 def _with_obstacle(line: BedLine, obstacle: Obstacle) -> BedLine:
     """The line over an obstacle, whose sides go down to where they meet the bed."""
     middle = np.array([obstacle.x, float(line.height(np.array(obstacle.x)))])
     outline = _outline(obstacle) + middle
-    start, end = _foot(line, outline[0], -1), _foot(line, outline[-1], 1)
-    x, corners = line.corners[:, 0], line.corners
-    parts = [corners[x < start[0]], start, outline, end, corners[x > end[0]]]
-    whole = BedLine.through(np.vstack(parts), line.h)
-    return replace(whole, bare=(*line.bare, (float(start[0]), float(end[0]))))
+    start = _foot(line, outline[0], -1)
+    end = _foot(line, outline[-1], 1)
+    corners = line.corners
+    before = corners[corners[:, 0] < start[0]]
+    behind = corners[corners[:, 0] > end[0]]
+    parts = np.vstack([before, start, outline, end, behind])
+    bare = (float(start[0]), float(end[0]))
+    return replace(BedLine.through(parts, line.h), bare=(*line.bare, bare))
 
 
 def _foot(line: BedLine, top: FloatArray, way: int) -> FloatArray:
-    """Where a side that goes down from a point, upstream (-1) or downstream (1), meets the bed."""
+    """Where a side that goes down from a point, up- (-1) or downstream (1), meets the bed."""
     x = float(top[0])
-    for _ in range(50):  # the side is steeper than any bed: this converges
-        x = float(
-            top[0] + way * (top[1] - line.height(np.array(x))) / tan(radians(SIDE_DEG))
-        )
+    for _ in range(FOOT_STEPS):
+        depth = top[1] - line.height(np.array(x))
+        x = float(top[0] + way * depth / tan(radians(SIDE_DEG)))
     return np.array([x, float(line.height(np.array(x)))])
 
 
 def _outline(obstacle: Obstacle) -> FloatArray:
-    """The corners of an obstacle above its sides, around the middle of its foot, shape (n, 2)."""
+    """The corners of an obstacle above its sides, around the middle of its foot, (n, 2)."""
+    height = obstacle.height
     if obstacle.kind == "half-cylinder":
         # where the circle is steeper than the sides they go straight down
         first = radians(90 - SIDE_DEG)
         angles = np.linspace(pi - first, first, CHORDS + 1)
-        return obstacle.height * np.column_stack([np.cos(angles), np.sin(angles)])
-    height = obstacle.height
-    length = FENCE * height if obstacle.kind == "fence" else obstacle.length or height
+        return height * np.column_stack([np.cos(angles), np.sin(angles)])
+    length = obstacle.length or height
+    if obstacle.kind == "fence":
+        length = FENCE * height
     return np.array([[-length / 2, height], [length / 2, height]])

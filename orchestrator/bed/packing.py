@@ -1,11 +1,12 @@
 """Where the grains of a bed lie, which of them are exposed, and which may move.
 
-A lattice of equal spheres has rows in which the centres are ``2 d cos(beta)`` apart, each row
-resting in the pockets of the one below, ``d sin(beta)`` lower. Lengths here are in diameters d of
-the scene, with the foot of the first form at the origin; each grain has a size of its own.
+A lattice of equal spheres has rows in which the centres are ``2 d cos(beta)`` apart, each
+row resting in the pockets of the one below, ``d sin(beta)`` lower. Lengths here are in
+diameters d of the scene, with the foot of the first form at the origin; each grain has a
+size of its own.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,40 +20,59 @@ from orchestrator.study.parts import Range, UnfitError
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
 TIE = 1e-6
-"""Neighbours of a lattice lie exactly on the limits below; round-off must not decide, diameters."""
-TOUCH = 1e-3  # two grains closer than this touch, of the mean of their diameters
-APRON = 10.0  # length of the fixed flat bed beyond each toe, diameters
-STRAY = 0.1  # rows of a disordered bed are straight within this, diameters
+"""Neighbours of a lattice lie exactly on the limits below; round-off must not decide,
+diameters."""
+TOUCH = 1e-3
+"""Two grains closer than this touch, of the mean of their diameters."""
+APRON = 10.0
+"""Length of the fixed flat bed beyond each toe, diameters."""
+STRAY = 0.1
+"""Rows of a disordered bed are straight within this, diameters."""
 DISORDERED = 4
-"""Least disordered rows: the packing is the same for any number of mobile layers up to it."""
+"""Least disordered rows: the packing is the same for any number of mobile layers up to
+it."""
 PERTURBATION = 1e-6
-"""How far a replica's grains lie aside, diameters: it decides which grain of a chain goes first. A
-deck has nine digits of each place."""
-LEE_DEPTH = 1.5  # thickness of the fixed lee side, layers: no grain falls through it
-SHARP_DEG = 8.0  # bend from which on rows do not follow the bed round a corner
+"""How far a replica's grains lie aside, diameters: it decides which grain of a chain goes
+first. A deck has nine digits of each place."""
+LEE_DEPTH = 1.5
+"""Thickness of the fixed lee side, layers: no grain falls through it."""
+SHARP_ROW_DEG = 8.0
+"""Bend from which on rows do not follow the bed round a corner."""
 SLIT = 0.15
-"""Between neighbours of a row that goes round a bend a gap is at most this wide, diameters."""
+"""Between neighbours of a row that goes round a bend a gap is at most this wide,
+diameters."""
 ELSEWHERE = 'choose another part of the bed, or "all"'
-BARE = 1.0  # grains this near to an obstacle are fixed under its foot, diameters
-LOWER = 0.1  # a neighbour bears a grain that stands so much over it, diameters
-UNDER = 2  # rows of fixed grains where none is counted: none falls through them
-HIDES = (
-    4.0  # farthest distance at which a grain hides another one of a lattice, diameters
-)
-OFFSET = (
-    0.125  # largest offset of a grain normal to its row, over the size of the disorder
-)
-FINE = 0.1  # between two places of a curve at which a row may be opened, diameters
-TURNS = 100  # how often a row is opened further; grains that overlap then are left out by `cover`
-PLACES = 2000  # places along a bed without grains, as many as a figure shows
-ROOM = 1 + 1e-9  # neighbours of a disordered row are at least this far apart, diameters
+"""What to do where nothing is counted."""
+BARE = 1.0
+"""Grains this near to an obstacle are fixed under its foot, diameters."""
+LOWER = 0.1
+"""A neighbour bears a grain that stands so much over it, diameters."""
+UNDER = 2
+"""Rows of fixed grains where none is counted: none falls through them."""
+HIDES = 4.0
+"""Farthest distance at which a grain hides another one of a lattice, diameters."""
+OFFSET = 0.125
+"""Largest offset of a grain normal to its row, over the size of the disorder."""
+FINE = 0.1
+"""Distance between two places of a curve at which a row may be opened, diameters."""
+TURNS = 100
+"""How often a row is opened further; grains that overlap then are left out by `cover`."""
+SAMPLES = 2000
+"""Places along a bed without grains, as many as a figure shows."""
+ROOM = 1 + 1e-9
+"""Neighbours of a disordered row are at least this far apart, diameters."""
 
 
 @dataclass(frozen=True)
 class Places:
-    """The centres of n grains in one unit of length: along the flow, across it, up; shape (n, 3).
+    """The centres of n grains in one unit of length.
 
-    A strip of some `width` begins again beyond its sides; the width is 0 in one plane.
+    Attributes
+    ----------
+    xyz
+        Along the flow, across it, up; shape (n, 3).
+    width
+        Width of a strip that begins again beyond its sides; 0 in one plane.
     """
 
     xyz: FloatArray
@@ -62,7 +82,22 @@ class Places:
     def of(
         cls, centres: FloatArray, across: ArrayLike = 0.0, width: float = 0.0
     ) -> "Places":
-        """Places from x and z, shape (n, 2), and y."""
+        """Make places.
+
+        Parameters
+        ----------
+        centres
+            X and z, shape (n, 2).
+        across
+            Y of all, or of each, shape (n,).
+        width
+            Width of the strip.
+
+        Returns
+        -------
+        Places
+            The places, across the flow between 0 and the width.
+        """
         x, z = centres.T
         y = np.broadcast_to(np.asarray(across, float), x.shape)
         if width:
@@ -72,9 +107,20 @@ class Places:
         return cls(np.column_stack([x, y, z]), width)
 
     def pairs(self, reach: float) -> tuple[IntArray, IntArray, FloatArray]:
-        """First and second grain of each of k pairs within a reach, in both orders, (k,).
+        """Find the k pairs of grains within a reach, each in both orders.
 
-        Also the vector from the first to the second, the shorter way across the sides, (k, 3).
+        Parameters
+        ----------
+        reach
+            The largest distance.
+
+        Returns
+        -------
+        first, second
+            The grains, shape (k,).
+        apart
+            The vector from the first to the second, the shorter way across the sides,
+            shape (k, 3).
         """
         pairs = _tree(self.xyz, self.width).query_pairs(reach, output_type="ndarray")
         first, second = np.vstack([pairs, pairs[:, ::-1]]).T
@@ -83,35 +129,75 @@ class Places:
         return first, second, apart
 
     def contacts(self, sizes: FloatArray, touch: float = TOUCH) -> tuple[IntArray, ...]:
-        """Pairs as `pairs` gives them whose surfaces are nearer than a part of their mean size."""
+        """Find the pairs of grains that touch.
+
+        Parameters
+        ----------
+        sizes
+            Diameters, shape (n,).
+        touch
+            Largest distance of two surfaces, over the mean of their diameters.
+
+        Returns
+        -------
+        tuple
+            As `pairs` gives them.
+        """
         first, second, apart = self.pairs((1 + touch) * float(sizes.max()))
-        close = (
-            np.linalg.norm(apart, axis=1)
-            < (1 + touch) * (sizes[first] + sizes[second]) / 2
-        )
-        return first[close], second[close], apart[close]
+        distance = np.linalg.norm(apart, axis=1)
+        is_close = distance < (1 + touch) * (sizes[first] + sizes[second]) / 2
+        return first[is_close], second[is_close], apart[is_close]
 
 
 def _tree(points: FloatArray, width: float = 0.0) -> Any:
+    """A tree of points, which begins again beyond the sides of a strip."""
     from scipy.spatial import cKDTree  # 0.4 s, for which a plan does not wait
 
     return cKDTree(points, boxsize=np.array([0.0, width, 0.0])[: points.shape[1]])
 
 
 def across(distance: FloatArray, width: float) -> FloatArray:
-    """Distances across the flow, the shorter way in a strip of some width."""
-    return distance - width * np.round(distance / width) if width else distance
+    """Find the shorter way across the flow.
+
+    Parameters
+    ----------
+    distance
+        Distances across the flow.
+    width
+        Width of the strip; 0 in one plane.
+
+    Returns
+    -------
+    FloatArray
+        The shorter distances.
+    """
+    if not width:
+        return distance
+    return distance - width * np.round(distance / width)
 
 
 @dataclass(frozen=True)
 class Packing:
     """The grains of a pile, n of them, lengths in diameters; arrays of shape (n,).
 
-    `centres`, shape (n, 2), has x and z of each centre. `mobile` grains may move, the others are
-    fixed. `windward` ones are exposed and counted, by default on windward sides, `lee` ones exposed
-    elsewhere. `arc_length` is the position along the bed line, which means something for exposed
-    grains. `across` is y of each centre and `width` that of a strip with periodic sides; both are 0
-    in one plane.
+    Attributes
+    ----------
+    centres
+        X and z of each centre, shape (n, 2).
+    sizes
+        The diameters.
+    mobile
+        Which grains may move; the others are fixed.
+    windward
+        Which are exposed and counted, by default on windward sides.
+    lee
+        Which are exposed elsewhere.
+    arc_length
+        The position along the bed line, which means something for exposed grains.
+    across
+        Y of each centre; 0 in one plane.
+    width
+        Width of a strip with periodic sides; 0 in one plane.
     """
 
     centres: FloatArray
@@ -138,10 +224,22 @@ class Packing:
 class Lattice:
     """How the grains of a bed that is not poured are laid; lengths in diameters.
 
-    beta of the lattice; `gap`, the height z0/d of the exposed grains' lowest points over the bed
-    line; rows along the bed ("aligned"), level ("horizontal"), or along it with random gaps
-    ("disordered"); layers that may move; the largest random gap in the row below them; a seed that
-    chooses one disordered packing of many: on a lattice 0 is itself, others are its replicas.
+    Attributes
+    ----------
+    entrainment_angle_deg
+        Beta of the lattice, degrees.
+    gap
+        Height z0/d of the exposed grains' lowest points over the bed line.
+    pattern
+        Rows along the bed ("aligned"), level ("horizontal"), or along it with random
+        gaps ("disordered").
+    mobile_layers
+        Layers that may move.
+    disorder
+        The largest random gap in the row below them.
+    seed
+        Chooses one disordered packing of many: on a lattice 0 is itself, others are its
+        replicas.
     """
 
     entrainment_angle_deg: float
@@ -161,89 +259,160 @@ class Lattice:
         """Whether its rows have random gaps."""
         return self.pattern == "disordered"
 
+    @property
+    def layers(self) -> int:
+        """Layers that hold mobile grains.
+
+        Under a slope's level rows a grain rests on one that lies deeper below the face.
+        """
+        return self.mobile_layers + (1 if self.pattern == "horizontal" else 0)
+
     def packed(
-        self, line: BedLine, centres: FloatArray, kinds: Iterable[BoolArray]
+        self,
+        line: BedLine,
+        centres: FloatArray,
+        mobile: BoolArray,
+        windward: BoolArray,
+        lee: BoolArray,
     ) -> Packing:
-        """The mobile, windward and lee grains on a line; those of a replica a little aside."""
-        mobile, windward, lee = kinds
+        """Make the packing of grains on a line; those of a replica lie a little aside.
+
+        Parameters
+        ----------
+        line
+            The bed line.
+        centres
+            X and z of the grains, shape (n, 2).
+        mobile, windward, lee
+            As in `Packing`.
+
+        Returns
+        -------
+        Packing
+            The packing.
+        """
         aside = PERTURBATION if self.seed and not self.uneven else 0.0
         shift = np.random.default_rng(self.seed).uniform(-aside, aside, centres.shape)
-        arc_length = line.nearest(centres)[1]
-        return Packing(
-            centres + shift, np.ones(len(centres)), mobile, windward, lee, arc_length
-        )
+        _, arc_length = line.nearest(centres)
+        sizes = np.ones(len(centres))
+        return Packing(centres + shift, sizes, mobile, windward, lee, arc_length)
 
 
 def along(line: BedLine, counts: str | Range) -> Packing:
-    """Places on a bed line, none of them mobile: the middles of `PLACES` equal counted lengths.
+    """Lay places on a bed line: the middles of `SAMPLES` equal counted lengths.
 
-    `counts` is as `BedLine.counted` takes it; an UnfitError if no bed is counted.
+    Parameters
+    ----------
+    line
+        The bed line.
+    counts
+        Which part is counted, as `BedLine.counted` takes it.
+
+    Returns
+    -------
+    Packing
+        The places, none of them mobile.
+
+    Raises
+    ------
+    UnfitError
+        If no bed is counted.
     """
-    ends = () if isinstance(counts, str) else counts
-    finer = line.with_corners([*ends, *(end for bare in line.bare for end in bare)])
-    x, s = np.array(finer.x), finer.arc_lengths
-    middle = (x[1:] + x[:-1]) / 2
-    chosen = line.counted(counts)[np.searchsorted(line.x, middle) - 1] & within(
-        middle, counts
-    )
+    ends = [] if isinstance(counts, str) else list(counts)
+    for bare in line.bare:
+        ends += bare
+    finer = line.with_corners(ends)
+    corners = np.array(finer.x)
+    middle = (corners[1:] + corners[:-1]) / 2
+    is_counted = line.counted(counts)[np.searchsorted(line.x, middle) - 1]
+    is_counted &= within(middle, counts)
     for start, end in line.bare:
-        chosen &= (middle < start) | (middle > end)
-    sums = np.concatenate([[0.0], np.cumsum(np.where(chosen, finer.lengths, 0.0))])
+        is_counted &= (middle < start) | (middle > end)
+    lengths = np.where(is_counted, finer.lengths, 0.0)
+    sums = np.concatenate([[0.0], np.cumsum(lengths)])
     if not sums[-1]:
         raise UnfitError("bed.counted", "no bed is counted", ELSEWHERE)
-    ways = (np.arange(PLACES) + 0.5) / PLACES * sums[-1]
+    ways = (np.arange(SAMPLES) + 0.5) / SAMPLES * sums[-1]
     piece = np.searchsorted(sums, ways, side="right") - 1
-    arc_length = s[piece] + ways - sums[piece]
-    x = np.interp(arc_length, s, x)
-    each, none = np.ones(PLACES), np.zeros(PLACES, bool)
+    arc_length = finer.arc_lengths[piece] + ways - sums[piece]
+    x = np.interp(arc_length, finer.arc_lengths, corners)
+    none = np.zeros(SAMPLES, bool)
     return Packing(
-        np.column_stack([x, line.height(x)]), each, none, ~none, none, arc_length
+        centres=np.column_stack([x, line.height(x)]),
+        sizes=np.ones(SAMPLES),
+        mobile=none,
+        windward=~none,
+        lee=none,
+        arc_length=arc_length,
     )
 
 
 def pile(line: BedLine, lattice: Lattice) -> Packing:
-    """Pack a pile of two straight faces: rows of its windward face fill it to the lee one."""
-    beta, surface = lattice.beta, 0.5 + lattice.gap
-    row_height, faces = np.sin(beta), (line.top - 1, line.top)
-    most = whole_up(line.crest[1] / line.tangents[faces[0], 0] / row_height) + 1
-    mobile_layers = min(lattice.mobile_layers, most)
-    # under a slope's level rows a grain rests on one that lies deeper below the face
-    layers = mobile_layers + (lattice.pattern == "horizontal")
+    """Pack a pile of two straight faces.
+
+    Rows of its windward face fill it to the lee one.
+
+    Parameters
+    ----------
+    line
+        The bed line.
+    lattice
+        How the grains lie.
+
+    Returns
+    -------
+    Packing
+        The packing.
+    """
+    surface = 0.5 + lattice.gap
+    row_height = np.sin(lattice.beta)
+    windward_face = line.top - 1
+    lee_face = line.top
+    thickness = line.crest[1] / line.tangents[windward_face, 0]
+    most = whole_up(thickness / row_height) + 1
+    lattice = replace(lattice, mobile_layers=min(lattice.mobile_layers, most))
     # below the layers that hold mobile grains one is enough: a grain touches no deeper one
-    thick = {faces[0]: (layers + 0.5) * row_height, faces[1]: LEE_DEPTH * row_height}
-    points = _filling(
-        line, replace(lattice, mobile_layers=mobile_layers), surface, thick
-    )
-    deep = np.array([surface - line.over(points, face) for face in faces])
-    depth, level = deep.min(axis=0), points[:, 1] - surface
-    shell = (deep[0] < thick[faces[0]]) | (deep[1] < thick[faces[1]])
-    inside = (depth >= -(STRAY if lattice.uneven else TIE)) & shell
-    below = (level < -TIE) & (depth > 0.5 * row_height) & (level > -1.3)
-    kept = inside & ((level >= -TIE) | below)
+    thick = (lattice.layers + 0.5) * row_height
+    thick_lee = LEE_DEPTH * row_height
+    faces = {windward_face: thick, lee_face: thick_lee}
+    points = _filling(line, lattice, surface, faces)
+    below_windward = surface - line.over(points, windward_face)
+    below_lee = surface - line.over(points, lee_face)
+    depth = np.minimum(below_windward, below_lee)
+    level = points[:, 1] - surface
+
+    is_shell = (below_windward < thick) | (below_lee < thick_lee)
+    is_inside = (depth >= -(STRAY if lattice.uneven else TIE)) & is_shell
+    is_below = (level < -TIE) & (depth > 0.5 * row_height) & (level > -1.3)
+    kept = is_inside & ((level >= -TIE) | is_below)
     top = points[np.argmax(np.where(kept, points[:, 1], -np.inf))]
-    kept |= _behind(top, points) & (deep[1] < -TIE)
-    body, depth, behind = points[kept], deep[0, kept], deep[1, kept]
-    buried = level[kept] < -TIE
-    ahead = body[:, 0] <= line.crest[0] + TIE
-    free = (
-        exposed(body, line.tangents[np.where(ahead, *faces)], slack=lattice.disorder)
-        & ~buried
-    )
-    windward, lee = free & ahead, free & ~ahead
+    kept |= _behind(top, points) & (below_lee < -TIE)
+
+    body = points[kept]
+    is_buried = level[kept] < -TIE
+    is_ahead = body[:, 0] <= line.crest[0] + TIE
+    tangents = line.tangents[np.where(is_ahead, windward_face, lee_face)]
+    is_free = exposed(body, tangents, slack=lattice.disorder) & ~is_buried
+    windward = is_free & is_ahead
+    lee = is_free & ~is_ahead
     # on a steep lee side no grain lies by itself
-    fallen = (behind < 1) & ~_rests(body)
-    mobile = (
-        (depth < (mobile_layers - 0.5) * row_height) & ~buried & ~fallen
-    ) | windward
-    needed = ~buried | _touching(body, mobile)
+    has_fallen = (below_lee[kept] < 1) & ~_rests(body)
+    is_near = below_windward[kept] < (lattice.mobile_layers - 0.5) * row_height
+    mobile = (is_near & ~is_buried & ~has_fallen) | windward
+    needed = ~is_buried | _touching(body, mobile)
     apron = _apron(body[needed], surface)
     fixed = np.zeros(len(apron), bool)
-    kinds = (np.append(chosen[needed], fixed) for chosen in (mobile, windward, lee))
-    return lattice.packed(line, np.vstack([body[needed], apron]), kinds)
+    return lattice.packed(
+        line,
+        np.vstack([body[needed], apron]),
+        mobile=np.append(mobile[needed], fixed),
+        windward=np.append(windward[needed], fixed),
+        lee=np.append(lee[needed], fixed),
+    )
 
 
 def _behind(top: FloatArray, points: FloatArray) -> BoolArray:
-    """Which of some places bear a grain from downstream; beyond a steep lee side else none does."""
+    """Which places bear a grain from downstream; beyond a steep lee side none else does."""
     x, z = (points - top).T
     return np.asarray((np.hypot(x, z) < 1 + TOUCH) & (x > 0) & (z < -LOWER))
 
@@ -251,43 +420,42 @@ def _behind(top: FloatArray, points: FloatArray) -> BoolArray:
 def _filling(
     line: BedLine, lattice: Lattice, surface: float, thick: Mapping[int, float]
 ) -> FloatArray:
-    """Where grains of the pattern may lie in a pile of two faces, one of them on the crest.
+    """Where grains of the pattern may lie in a pile of two faces, one on the crest.
 
-    Of all places those are made that are no deeper below a face than it is `thick`, and some more.
+    Of all places those are made that are no deeper below a face than it is `thick`, and
+    some more.
     """
-    beta, face = lattice.beta, line.tangents[line.top - 1]
+    beta = lattice.beta
+    face = line.tangents[line.top - 1]
     direction = np.array([1.0, 0.0]) if lattice.pattern == "horizontal" else face
     normal = np.array([-direction[1], direction[0]])
     apex = line.crest + np.array([0, surface / face[0]])
     corners = np.array([np.zeros(2), line.toe, line.crest]) - apex
-    along, down = (
-        corners @ direction / np.cos(beta) / 2,
-        -corners @ normal / np.sin(beta),
-    )
+    along = corners @ direction / np.cos(beta) / 2
+    down = -corners @ normal / np.sin(beta)
     rows = np.arange(0, whole_up(down.max()) + 3)
     columns = np.arange(-whole_up(-along.min()) - 3, whole_up(along.max()) + 4)
     offset = (2 * columns + rows[:, None] % 2) * np.cos(beta)
-    fall, near = (
-        np.broadcast_to(rows[:, None] * np.sin(beta), offset.shape),
-        offset < -np.inf,
-    )
-    for face, most in thick.items():
-        out = line.normals[face]
-        over = offset * (direction @ out) - fall * (normal @ out)
-        near |= np.abs(over + (apex - line.corners[face]) @ out - surface) < most + 1
-    points = apex + np.outer(offset[near], direction) - np.outer(fall[near], normal)
+    fall = np.broadcast_to(rows[:, None] * np.sin(beta), offset.shape)
+    is_near = np.zeros(offset.shape, bool)
+    for number, most in thick.items():
+        out = line.normals[number]
+        over_apex = offset * (direction @ out) - fall * (normal @ out)
+        over = over_apex + (apex - line.corners[number]) @ out - surface
+        is_near |= np.abs(over) < most + 1
+    into = np.outer(offset[is_near], direction)
+    points = apex + into - np.outer(fall[is_near], normal)
     if not lattice.uneven:
         return np.asarray(points)
-    uneven = max(lattice.mobile_layers, DISORDERED)
-    count = whole_up(line.crest_s / np.cos(beta) / 2) + uneven + 4
-    upper = apex + _disordered(count, uneven, lattice) @ np.vstack([direction, normal])
-    return np.vstack(
-        [upper, points[(apex - points) @ normal > (uneven + 0.5) * np.sin(beta)]]
-    )
+    layers = max(lattice.mobile_layers, DISORDERED)
+    count = whole_up(line.crest_s / np.cos(beta) / 2) + layers + 4
+    upper = apex + _disordered(count, layers, lattice) @ np.vstack([direction, normal])
+    is_lower = (apex - points) @ normal > (layers + 0.5) * np.sin(beta)
+    return np.vstack([upper, points[is_lower]])
 
 
 def _disordered(columns: int, layers: int, lattice: Lattice) -> FloatArray:
-    """Rows over a straight one with random gaps: places along and normal to them, shape (n, 2)."""
+    """Rows over a straight one with random gaps: places along and normal to them, (n, 2)."""
     rng = np.random.default_rng(lattice.seed)
     size = lattice.disorder
     spacing = 2 * np.cos(lattice.beta) + rng.uniform(0, size, 2 * columns)
@@ -299,15 +467,16 @@ def _disordered(columns: int, layers: int, lattice: Lattice) -> FloatArray:
             break
         # where two grains of a row would overlap, the row below them is opened a little
         for above, row in enumerate(rows):
+            overlap = _overlap(row)
             wide = np.zeros_like(spacing)
-            for place in np.flatnonzero(_overlap(row) > 0):
-                wide[place : place + layers - above + 1] += _overlap(row)[place]
+            for place in np.flatnonzero(overlap > 0):
+                wide[place : place + layers - above + 1] += overlap[place]
             spacing = spacing + wide
     return np.asarray(np.vstack(rows) - rows[0][len(rows[0]) // 2])
 
 
 def _stacked(lowest: FloatArray, layers: int) -> list[FloatArray]:
-    """Rows above a lowest one, the uppermost first: each grain rests on two of the row below."""
+    """Rows above a lowest one, the uppermost first: grains rest on two of the row below."""
     rows = [lowest]
     for _ in range(layers):
         apart = np.diff(rows[0], axis=0)
@@ -325,10 +494,12 @@ def _overlap(row: FloatArray) -> FloatArray:
 def _apron(body: FloatArray, surface: float) -> FloatArray:
     """Two flat rows of touching fixed grains, each starting where it touches the pile."""
     drop = np.abs(body[:, 1] - surface)
-    near = body[drop < 1]
-    clearance = np.sqrt(1 - drop[drop < 1] ** 2)
+    is_near = drop < 1
+    near = body[is_near, 0]
+    clearance = np.sqrt(1 - drop[is_near] ** 2)
     steps = np.arange(0, APRON)
-    first, last = (near[:, 0] - clearance).min(), (near[:, 0] + clearance).max()
+    first = (near - clearance).min()
+    last = (near + clearance).max()
     x = np.concatenate([first - steps, last + steps])
     return np.column_stack([x, np.full(len(x), surface)])
 
@@ -338,77 +509,134 @@ def cover(
 ) -> Packing:
     """Pack the grains of a bed of any shape; lengths in diameters.
 
-    The line is divided at its sharp corners. Each part has rows of its own, those that are counted
-    first; where rows of two parts meet, grains of the later one that would overlap are left out,
-    and grains that do not rest on two are fixed. `ground` is the bed line without obstacles,
-    `counts` says which exposed grains are counted, as `BedLine.counted` takes it. Raises an
-    UnfitError if the bed bends more sharply than grains can follow, or none is counted.
+    The line is divided at its sharp corners. Each part has rows of its own, those that
+    are counted first; where rows of two parts meet, grains of the later one that would
+    overlap are left out, and grains that do not rest on two are fixed.
+
+    Parameters
+    ----------
+    line
+        The bed line.
+    ground
+        The bed line without obstacles.
+    counts
+        Which exposed grains are counted, as `BedLine.counted` takes it.
+    lattice
+        How the grains lie.
+
+    Returns
+    -------
+    Packing
+        The packing.
+
+    Raises
+    ------
+    UnfitError
+        If the bed bends more sharply than grains can follow, or none is counted.
     """
     x = np.array(ground.x)
-    x[0], x[-1] = x[1] - APRON, x[-2] + APRON
+    x[0] = x[1] - APRON
+    x[-1] = x[-2] + APRON
     top = offset(replace(ground, x=tuple(x.tolist())), 0.5 + lattice.gap)
-    segments = top.counted(counts)
-    centres = _without_overlaps(list(_rows(top, segments, lattice)))
+    is_counted = top.counted(counts)
+    centres = _without_overlaps(list(_rows(top, is_counted, lattice)))
     under, depth = _depth(top, centres)
     slack = 0.0 if lattice.pattern == "horizontal" else max(SLIT, lattice.disorder)
     seen = exposed(centres, top.tangents[under], slack) & (depth < 1)
-    chosen = segments[under] & within(centres[:, 0], counts)
+    chosen = is_counted[under] & within(centres[:, 0], counts)
     for start, end in line.bare:
         chosen &= (centres[:, 0] <= start - BARE) | (centres[:, 0] >= end + BARE)
-    near = depth < (lattice.mobile_layers - 0.5) * np.sin(lattice.beta)
-    mobile = chosen & near & _rests(centres)
-    counted = mobile & seen
-    if not counted.any():
+    is_near = depth < (lattice.mobile_layers - 0.5) * np.sin(lattice.beta)
+    mobile = chosen & is_near & _rests(centres)
+    windward = mobile & seen
+    lee = seen & ~windward
+    if not windward.any():
         raise UnfitError("bed.counted", "no grain is counted", ELSEWHERE)
     needed = mobile | seen | _touching(centres, mobile)
-    kinds = (mobile, counted, seen & ~counted)
-    return lattice.packed(line, centres[needed], (kind[needed] for kind in kinds))
+    return lattice.packed(
+        line,
+        centres[needed],
+        mobile=mobile[needed],
+        windward=windward[needed],
+        lee=lee[needed],
+    )
 
 
 def offset(line: BedLine, distance: float) -> BedLine:
-    """The line at a distance above a line, with its corners; UnfitError if it bends too sharply."""
-    bends = np.radians(line.bends_deg) / 2
-    ends = np.vstack([line.normals[:1], line.normals, line.normals[-1:]])
-    middle = ends[:-1] + ends[1:]
+    """Move a line along its normals.
+
+    Parameters
+    ----------
+    line
+        The line.
+    distance
+        The distance, positive upwards.
+
+    Returns
+    -------
+    BedLine
+        The line at that distance, with as many corners.
+
+    Raises
+    ------
+    UnfitError
+        If it bends too sharply.
+    """
+    half_bends = np.radians(line.bends_deg) / 2
+    normals = np.vstack([line.normals[:1], line.normals, line.normals[-1:]])
+    middle = normals[:-1] + normals[1:]
     middle /= np.linalg.norm(middle, axis=1)[:, None]
-    x, z = (line.corners + middle * (distance / np.cos(bends))[:, None]).T
+    x, z = (line.corners + middle * (distance / np.cos(half_bends))[:, None]).T
     back = np.flatnonzero(np.diff(x) <= 0)
     if len(back):
-        what = f"it bends more sharply than a grain at {line.x[back[0]]:.4g} d from the first foot"
+        place = f"{line.x[back[0]]:.4g} d from the first foot"
+        what = f"it bends more sharply than a grain at {place}"
         raise UnfitError("bed", what, "smooth it, or choose smaller grains")
     return BedLine(tuple(x.tolist()), tuple(z.tolist()), line.h)
 
 
 def _rows(top: BedLine, counted: BoolArray, lattice: Lattice) -> Iterator[FloatArray]:
-    """Centres of the rows along each part of a line between sharp corners, the counted first."""
-    bends = np.flatnonzero(np.abs(top.bends_deg[1:-1]) > SHARP_DEG).tolist()
-    ends = [*bends, len(top.lengths) - 1]
-    parts = list(zip([0, *(end + 1 for end in bends)], ends, strict=True))
-    carries = [bool(counted[first : last + 1].any()) for first, last in parts]
+    """Centres of the rows of each part of a line between sharp corners, counted first."""
+    is_sharp = np.abs(top.bends_deg[1:-1]) > SHARP_ROW_DEG
+    lasts = [*np.flatnonzero(is_sharp).tolist(), len(top.lengths) - 1]
+    firsts = [0, *(last + 1 for last in lasts[:-1])]
+    of_counted: list[tuple[int, int]] = []
+    of_others: list[tuple[int, int]] = []
+    for first, last in zip(firsts, lasts, strict=True):
+        is_counted = bool(counted[first : last + 1].any())
+        (of_counted if is_counted else of_others).append((first, last))
     if lattice.pattern == "horizontal":
         yield _level_rows(top, lattice)
-    for turn in (True, False) if lattice.pattern != "horizontal" else (False,):
-        for first, last in (
-            part for part, has in zip(parts, carries, strict=True) if has == turn
-        ):
-            points = _rows_along(top, first, last, lattice, turn)
-            straight = first == last and lattice.pattern == "aligned"
-            yield points[_depth(top, points)[1] >= -(TIE if straight else STRAY)]
+    else:
+        for first, last in of_counted:
+            yield _rows_of_part(top, first, last, lattice, True)
+    for first, last in of_others:
+        yield _rows_of_part(top, first, last, lattice, False)
+
+
+def _rows_of_part(
+    top: BedLine, first: int, last: int, lattice: Lattice, counted: bool
+) -> FloatArray:
+    """The grains of the rows under some segments of a line that are below it."""
+    points = _rows_along(top, first, last, lattice, counted)
+    is_straight = first == last and lattice.pattern == "aligned"
+    _, depth = _depth(top, points)
+    return np.asarray(points[depth >= -(TIE if is_straight else STRAY)])
 
 
 def _rows_along(
     top: BedLine, first: int, last: int, lattice: Lattice, counted: bool
 ) -> FloatArray:
     """Rows under some segments of a line, which end a little beyond them."""
-    layers = lattice.mobile_layers + (lattice.pattern == "horizontal")
+    layers = lattice.layers
     rows = layers + 1 if counted else UNDER
-    uneven = lattice.uneven and counted
-    below = max(rows, DISORDERED + 1 if uneven else rows) - 1
+    is_uneven = lattice.uneven and counted
+    below = max(rows, DISORDERED + 1) - 1 if is_uneven else rows - 1
     corners = top.corners[first : last + 2].copy()
     corners[0] -= top.tangents[first] * (2 * layers + 2)
     corners[-1] += top.tangents[last] * (2 * layers + 2)
     curve = offset(BedLine.through(corners, top.h), -below * np.sin(lattice.beta))
-    disorder = lattice.disorder if uneven else 0.0
+    disorder = lattice.disorder if is_uneven else 0.0
     stacked = _on_a_curve(curve, below, lattice, disorder, lattice.seed + first)
     return np.vstack(stacked[:rows])
 
@@ -416,33 +644,22 @@ def _rows_along(
 def _on_a_curve(
     curve: BedLine, layers: int, lattice: Lattice, size: float, seed: int
 ) -> list[FloatArray]:
-    """Rows over a curve, on which the lowest lies with random gaps, the uppermost first."""
+    """Rows over a curve, on which the lowest lies with random gaps; the uppermost first."""
     spacing = 2 * np.cos(lattice.beta)
     count = whole_up(curve.lengths.sum() / spacing) + 1
     rng = np.random.default_rng(seed)
     gaps = rng.uniform(0, size, count) if size else np.zeros(count)
     aside = rng.uniform(-OFFSET * size, OFFSET * size, count + 1)
     close = np.concatenate([[0.0], np.cumsum(spacing + gaps)])
-    # the opening belongs to places of the curve: grains that it shifts leave it where it is
+    # the opening belongs to places of the curve: grains that it shifts leave it there
     length = 2 * float(close[-1]) + 1
     places = np.linspace(0, length, whole_up(length / FINE) + 1)
-    step, opened = places[1] - places[0], np.zeros(len(places))
-    arc = curve.arc_lengths - curve.arc_lengths[0]
+    step = places[1] - places[0]
+    opened = np.zeros(len(places))
     for _ in range(TURNS):
         along = np.interp(close, places - np.cumsum(opened), places)
-        segment = np.clip(
-            np.searchsorted(arc, along, side="right") - 1, 0, len(arc) - 2
-        )
-        into = (along - arc[segment])[:, None] * curve.tangents[segment]
-        lowest = curve.corners[segment] + into + aside[:, None] * curve.normals[segment]
-        rows = _stacked(lowest, layers)
-        # where two grains of a row would overlap, in a bend, the row below them is opened
-        wide = np.zeros(count)
-        for above, row in enumerate(rows):
-            more = np.maximum(_overlap(row), 0.0)
-            for place in range(layers - above + 1):
-                opening = wide[place : place + len(more)]
-                np.maximum(opening, more, out=opening)
+        rows = _stacked(_beside(curve, along, aside), layers)
+        wide = _openings(rows, layers, count)
         if not wide.any():
             break
         gap = np.clip(np.searchsorted(along, places) - 1, 0, count - 1)
@@ -451,11 +668,35 @@ def _on_a_curve(
     return rows
 
 
+def _beside(curve: BedLine, along: FloatArray, aside: FloatArray) -> FloatArray:
+    """Points along a curve and normal to it, shape (n, 2)."""
+    arc = curve.arc_lengths - curve.arc_lengths[0]
+    segment = np.searchsorted(arc, along, side="right") - 1
+    segment = np.clip(segment, 0, len(arc) - 2)
+    into = (along - arc[segment])[:, None] * curve.tangents[segment]
+    out = aside[:, None] * curve.normals[segment]
+    return np.asarray(curve.corners[segment] + into + out)
+
+
+def _openings(rows: list[FloatArray], layers: int, count: int) -> FloatArray:
+    """By how much the gaps of the lowest row are too narrow for the rows above it."""
+    wide = np.zeros(count)
+    for above, row in enumerate(rows):
+        # in a bend two grains of a row would overlap
+        overlap = np.maximum(_overlap(row), 0.0)
+        for place in range(layers - above + 1):
+            under = slice(place, place + len(overlap))
+            wide[under] = np.maximum(wide[under], overlap)
+    return wide
+
+
 def _level_rows(top: BedLine, lattice: Lattice) -> FloatArray:
-    """Level rows under a whole line, near to it; one grain of the uppermost is on the crest."""
-    row_height, half = np.sin(lattice.beta), np.cos(lattice.beta)
+    """Level rows under a whole line, near to it; one grain of the uppermost is on top."""
+    row_height = np.sin(lattice.beta)
+    half = np.cos(lattice.beta)
     layers = lattice.mobile_layers + 1
-    thick = (layers + 1) * row_height / np.cos(np.radians(np.abs(top.slopes_deg).max()))
+    steepest = np.radians(np.abs(top.slopes_deg).max())
+    thick = (layers + 1) * row_height / np.cos(steepest)
     highest = float(np.max(top.z))
     spacing = 2 * half
     # where a whole number of spacings lies before the crest, its last digit decides nothing
@@ -464,28 +705,27 @@ def _level_rows(top: BedLine, lattice: Lattice) -> FloatArray:
     x = top.crest[0] + spacing * (np.arange(count) - before)
     parts = []
     for row in range(whole_up((highest - min(top.z)) / row_height) + layers + 2):
-        places = np.column_stack(
-            [x + row % 2 * half, np.full_like(x, highest - row * row_height)]
-        )
+        z = np.full_like(x, highest - row * row_height)
+        places = np.column_stack([x + row % 2 * half, z])
         over = top.height(places[:, 0]) - places[:, 1]
         parts.append(places[(over > -1) & (over < thick)])
     points = np.vstack(parts)
-    depth = _depth(top, points)[1]
+    _, depth = _depth(top, points)
     return np.asarray(points[(depth >= -TIE) & (depth < (layers + 0.5) * row_height)])
 
 
 def _depth(top: BedLine, points: FloatArray) -> tuple[IntArray, FloatArray]:
     """Nearest segment of each point, and how deep it lies under the line."""
-    segment = top.nearest(points)[0]
+    segment, _ = top.nearest(points)
     depth = -top.over(points, segment)
+    before = np.maximum(segment - 1, 0)
+    behind = np.minimum(segment + 1, len(top.lengths) - 1)
     # over a top the point may be above the line of the other segment
-    for other in (
-        np.maximum(segment - 1, 0),
-        np.minimum(segment + 1, len(top.lengths) - 1),
-    ):
-        convex = top.bends_deg[np.maximum(segment, other)] > SHARP_DEG
+    for other in (before, behind):
+        is_top = top.bends_deg[np.maximum(segment, other)] > SHARP_ROW_DEG
+        is_over_two = is_top & (other != segment)
         beside = -top.over(points, other)
-        depth = np.where(convex & (other != segment), np.minimum(depth, beside), depth)
+        depth = np.where(is_over_two, np.minimum(depth, beside), depth)
     return segment, depth
 
 
@@ -494,22 +734,37 @@ def _without_overlaps(groups: list[FloatArray]) -> FloatArray:
     points = np.vstack(groups)
     near = _tree(points).query_pairs(1 - 2 * TIE, output_type="ndarray")
     kept = np.ones(len(points), bool)
-    for first, second in near[np.argsort(near.max(axis=1), kind="stable")].tolist():
-        low, high = min(first, second), max(first, second)
-        kept[high] &= not kept[low]
+    order = np.argsort(near.max(axis=1), kind="stable")
+    for pair in near[order].tolist():
+        kept[max(pair)] &= not kept[min(pair)]
     return np.asarray(points[kept])
 
 
 def exposed(centres: FloatArray, tangents: FloatArray, slack: float = 0.0) -> BoolArray:
-    """Which equal grains have no other that is higher along their own normal, within d/2 of it.
+    """Find the equal grains that no other hides.
 
-    `tangents`, shape (n, 2), has the bed's direction under each. A slit between two grains that is
-    narrower than `slack` does not expose the one under it; on such a bed a neighbour that stands
-    out by less than `STRAY` hides none.
+    A grain is hidden by another one that is higher along its own normal, within d/2 of
+    it.
+
+    Parameters
+    ----------
+    centres
+        X and z of the grains, d, shape (n, 2).
+    tangents
+        The bed's direction under each, shape (n, 2).
+    slack
+        A slit between two grains that is narrower does not expose the one under it; on
+        such a bed a neighbour that stands out by less than `STRAY` hides none.
+
+    Returns
+    -------
+    BoolArray
+        Which grains, shape (n,).
     """
     # through a gap in the row above, a grain of the row above that may hide one
     first, _, apart = Places.of(centres).pairs(HIDES)
-    x, z = apart[:, 0], apart[:, 2]
+    x = apart[:, 0]
+    z = apart[:, 2]
     tx, tz = tangents[first].T
     hidden = np.abs(x * tx + z * tz) <= 0.5 + slack + TIE
     hidden &= z * tx - x * tz > (STRAY if slack else TIE)
@@ -519,11 +774,24 @@ def exposed(centres: FloatArray, tangents: FloatArray, slack: float = 0.0) -> Bo
 def shadows(
     along: Places, height: FloatArray, radii: FloatArray
 ) -> tuple[IntArray, IntArray]:
-    """Pairs of grains of any sizes: one that is hidden, and one that hides it.
+    """Find the grains of any sizes that others hide.
 
-    A grain is hidden where the line through its centre, normal to the bed, meets another grain
-    whose centre lies higher. `along` has the place of each along the bed and across the flow, its
-    third coordinate is 0; `height` is over the bed line.
+    A grain is hidden where the line through its centre, normal to the bed, meets another
+    grain whose centre lies higher.
+
+    Parameters
+    ----------
+    along
+        The place of each along the bed and across the flow; the third coordinate is 0.
+    height
+        Their heights over the bed line, shape (n,).
+    radii
+        Their radii, shape (n,).
+
+    Returns
+    -------
+    hidden, hides
+        Pairs of a grain and of one that hides it, shape (k,).
     """
     first, second, apart = along.pairs(float(radii.max()) + TIE)
     hidden = np.linalg.norm(apart, axis=1) <= radii[second] + TIE
@@ -532,28 +800,57 @@ def shadows(
 
 
 def unshadowed(along: Places, height: FloatArray, radii: FloatArray) -> BoolArray:
-    """Which grains of any sizes no other hides; arguments as in `shadows`."""
+    """Find the grains of any sizes that no other hides.
+
+    Parameters
+    ----------
+    along, height, radii
+        As in `shadows`.
+
+    Returns
+    -------
+    BoolArray
+        Which grains, shape (n,).
+    """
     hidden, _ = shadows(along, height, radii)
     return np.asarray(np.bincount(hidden, minlength=len(height)) == 0)
 
 
 def _rests(centres: FloatArray) -> BoolArray:
-    """Which grains touch one upstream and one downstream that lie no higher, one of them lower."""
+    """Which grains touch one upstream and one downstream, none higher, one lower."""
     first, _, apart = Places.of(centres).pairs(1 + TOUCH)
-    x, z = apart[:, 0], apart[:, 2]
-    sides = np.zeros((3, len(centres)), bool)
-    for side, beside in zip(sides, (x <= 0, x > 0, z < -LOWER), strict=True):
-        side[first[(z <= TOUCH) & beside]] = True
-    return np.asarray(sides.all(axis=0))
+    x = apart[:, 0]
+    z = apart[:, 2]
+    rests = np.ones(len(centres), bool)
+    for is_beside in (x <= 0, x > 0, z < -LOWER):
+        has_one = np.zeros(len(centres), bool)
+        has_one[first[(z <= TOUCH) & is_beside]] = True
+        rests &= has_one
+    return rests
 
 
 def _touching(centres: FloatArray, chosen: BoolArray) -> BoolArray:
     """Which grains touch one of the chosen ones, or are one."""
-    return np.asarray(_tree(centres[chosen]).query(centres)[0] < 1 + TOUCH)
+    distance, _ = _tree(centres[chosen]).query(centres)
+    return np.asarray(distance < 1 + TOUCH)
 
 
 def within(x: FloatArray, counts: str | Range) -> BoolArray:
-    """Which places along x a range contains; words contain all."""
+    """Find the places that a range contains.
+
+    Parameters
+    ----------
+    x
+        Places along x.
+    counts
+        The range; words contain all.
+
+    Returns
+    -------
+    BoolArray
+        Which places.
+    """
     if isinstance(counts, str):
         return np.ones(len(x), bool)
-    return np.asarray((x >= counts[0] - TIE) & (x <= counts[1] + TIE))
+    start, end = counts
+    return np.asarray((x >= start - TIE) & (x <= end + TIE))

@@ -13,15 +13,17 @@ import numpy as np
 import pandas as pd
 
 from orchestrator import pipeline, plan, tables
-from orchestrator.benchmark import pack, scenes
+from orchestrator.benchmark import checks, pack, scenes
 from orchestrator.benchmark.pack import KINDS, STUDY, Pack, Problem
 from orchestrator.errors import InputError, SolverError
+from orchestrator.grains.pile import Pile
 from orchestrator.plan import Plan
 from orchestrator.runs import case, engine, process
 from orchestrator.runs.workspace import Workspace
 from orchestrator.solvers import liggghts
 from orchestrator.study import fields, study
 from orchestrator.study.profile import Files
+from orchestrator.study.scene import Scene
 from orchestrator.study.study import Group, Study
 from orchestrator.tables import Tables
 
@@ -29,7 +31,8 @@ Times = dict[str, float]
 """Wall time and processor time of runs, s, ``seconds`` and ``cpu_s``; empty for formulas."""
 FORMULAS = (1, 2)
 """Levels that need no finished study."""
-LIMIT_S = 3600.0  # of our own runs
+LIMIT_S = 3600.0
+"""Wall time of each of our own runs, s."""
 CHECKS = ("collision", "incline", "sliding", "passing")
 """Kinds that have a deck of their own: they need no scene of the study."""
 PRINTED = {
@@ -42,162 +45,278 @@ PRINTED = {
 }
 """What the check decks print, and the quantities of a pack."""
 NAMED = {
-    **{
-        "alpha_deg": "{:g}deg",
-        "beta_deg": "beta{:g}",
-        "h_m": "h{:g}mm",
-        "d_m": "d{:g}mm",
-    },
-    **{
-        "z0_over_d": "z{:.3g}d",
-        "nu_m2_s": "nu{:g}",
-        "packing": "{}",
-        "force_law": "{}",
-    },
-    **{"stress": "{}", "seed": "seed{:g}"},
+    "alpha_deg": "{:g}deg",
+    "beta_deg": "beta{:g}",
+    "h_m": "h{:g}mm",
+    "d_m": "d{:g}mm",
+    "z0_over_d": "z{:.3g}d",
+    "nu_m2_s": "nu{:g}",
+    "packing": "{}",
+    "force_law": "{}",
+    "stress": "{}",
+    "seed": "seed{:g}",
 }
-"""Columns that name a scene where they differ between the scenes of a study; of lengths in mm."""
+"""Columns that name a scene where they differ between the scenes of a study; of lengths
+in mm."""
+IN_MM = ("h_m", "d_m")
+"""Those of them that are lengths."""
+OF_FLOW = ("alpha_deg", "h_m", "z0_over_d", "nu_m2_s")
+"""Those of them that name a flow."""
 
 
 def export(root: Path, source: Path | None, levels: Collection[int]) -> int:
-    """Write a pack, and return how many scenes it has.
+    """Write a pack.
 
-    `source` is the directory of a finished study; without one the answers are formulas, of levels
-    1 and 2 alone. Raises InputError if a level needs a study, or a pack cannot hold this one.
+    Parameters
+    ----------
+    root
+        The directory of the pack.
+    source
+        The directory of a finished study; without one the answers are formulas, of
+        levels 1 and 2 alone.
+    levels
+        The levels that the pack has; by default all that there can be.
+
+    Returns
+    -------
+    int
+        How many scenes the pack has.
+
+    Raises
+    ------
+    InputError
+        If a level needs a study, or a pack cannot hold this one.
     """
-    levels = levels or (FORMULAS if source is None else {*KINDS.values()})
-    kinds = [name for name, level in KINDS.items() if level in levels]
     if source is None:
-        if lacking := sorted({*levels} - {*FORMULAS}):
-            what = f"level {lacking[0]} needs the answers of a finished study"
-            raise InputError(
-                what, where="--level", remedy="name its directory with --from"
-            )
-        asked = study.load("first-look")
-        has_decks = 2 in levels and shutil.which(liggghts.PROGRAM) is not None
-        programs = {"liggghts": liggghts.version()} if has_decks else {}
-        listed = problems(asked, plan.make(asked), {}, Path(), kinds)
-        return pack.write(root, listed, (asked.name, asked.text), programs)
+        return _export_formulas(root, levels or FORMULAS)
+    kinds = _kinds(levels or KINDS.values())
     space = Workspace(source.absolute())
     asked, planned = pipeline.reopen(space)
-    unknown = [
-        (s.flow.gusts, s.grain.cohesion, s.forces.sheltering) for s in asked.scenes
-    ]
-    what, remedy = "", "run the study without it into another directory"
-    if any(answer.is_chosen for answer in planned.decisions.values()):
-        what = "levels were chosen for its scenes: a pack has the answers of scenes as written"
-        remedy = 'run it with protocol.method = "dem" and no tolerance into another directory'
-    elif any(
-        pile.scene.protocol.update or pile.bed.width for pile in planned.piles.values()
-    ):
-        what = "protocol.update or bed.width: a pack holds one flow over each bed, in its plane"
-    elif any(one != (None, 0.0, "none") for one in unknown):
-        what = "flow.gusts, grain.cohesion or forces.sheltering: a pack has no entries for them"
-    elif not space.drawn.is_file():
-        what, remedy = "the study is not finished", "run it to its end"
-    else:
-        times = tables.read(space, "timings")["timings"].set_index("case")["solver_s"]
-        if {*times.index} != {*planned.cases}:
-            what = "the study was run by another version of the program: its cases are others"
-            remedy = "run it again"
-    if what:
-        raise InputError(what, where=str(source), remedy=remedy)
-    sharing = {cell.name: len(cell.scenes) for cell in planned.cells}
-    listed = (
-        replace(one, seconds=sum(times[run] / sharing.get(run, 1) for run in one.runs))
-        if one.runs
-        else one
-        for one in problems(
-            asked, planned, tables.read(space, "tables"), space.cases, kinds
+    _check_exportable(asked, planned, str(source))
+    if not space.drawn.is_file():
+        what = "the study is not finished"
+        raise InputError(what, str(source), "run it to its end")
+    times = tables.read(space, "timings")["timings"].set_index("case")["solver_s"]
+    if set(times.index) != set(planned.cases):
+        what = (
+            "the study was run by another version of the program: its cases are others"
         )
-    )
+        raise InputError(what, str(source), "run it again")
+    sharing = {cell.name: len(cell.scenes) for cell in planned.cells}
+    results = tables.read(space, "tables")
+    listed = []
+    for problem in problems(asked, planned, results, space.cases, kinds):
+        if problem.runs:
+            seconds = sum(times[run] / sharing.get(run, 1) for run in problem.runs)
+            problem = replace(problem, seconds=seconds)
+        listed.append(problem)
     programs = case.programs(space.cases, planned.cases)
     return pack.write(root, listed, (asked.name, asked.text), programs)
+
+
+def _export_formulas(root: Path, levels: Collection[int]) -> int:
+    """Write a pack whose answers are formulas, but for those of our check decks."""
+    lacking = sorted(set(levels) - set(FORMULAS))
+    if lacking:
+        what = f"level {lacking[0]} needs the answers of a finished study"
+        raise InputError(what, "--level", "name its directory with --from")
+    asked = study.load("first-look")
+    programs = {}
+    if 2 in levels and _has_decks():
+        programs["liggghts"] = liggghts.version()
+    listed = problems(asked, plan.make(asked), {}, Path(), _kinds(levels))
+    return pack.write(root, listed, (asked.name, asked.text), programs)
+
+
+def _kinds(levels: Collection[int]) -> list[str]:
+    """The kinds of scenes of some levels."""
+    return [name for name, level in KINDS.items() if level in levels]
+
+
+def _has_decks() -> bool:
+    """Whether our check decks can be run."""
+    return shutil.which(liggghts.PROGRAM) is not None
+
+
+def _check_exportable(asked: Study, planned: Plan, where: str) -> None:
+    """Refuse a study of which a pack cannot hold the scenes."""
+    if any(decision.is_chosen for decision in planned.decisions.values()):
+        what = "levels were chosen for its scenes"
+        remedy = 'run it with protocol.method = "dem" and no tolerance'
+        raise InputError(
+            f"{what}: a pack has the answers of scenes as written",
+            where,
+            f"{remedy} into another directory",
+        )
+    remedy = "run the study without it into another directory"
+    for pile in planned.piles.values():
+        if pile.scene.protocol.update or pile.bed.width:
+            what = "a pack holds one flow over each bed, in its plane"
+            fields_of_it = "protocol.update or bed.width"
+            raise InputError(f"{fields_of_it}: {what}", where, remedy)
+    for scene in asked.scenes:
+        has_gusts = scene.flow.gusts is not None
+        if has_gusts or scene.grain.cohesion or scene.forces.sheltering != "none":
+            fields_of_it = "flow.gusts, grain.cohesion or forces.sheltering"
+            what = f"{fields_of_it}: a pack has no entries for them"
+            raise InputError(what, where, remedy)
 
 
 def problems(
     asked: Study, planned: Plan, results: Tables, cases: Path, kinds: Collection[str]
 ) -> Iterator[Problem]:
-    """The scenes of a study as problems of some kinds, names of `KINDS`.
+    """Make problems of the scenes of a study.
 
-    The study's tables are `results`, empty for formulas alone, and its runs lie in `cases`.
+    Parameters
+    ----------
+    asked
+        The study.
+    planned
+        Its plan.
+    results
+        Its tables; empty for formulas alone.
+    cases
+        The directory of its runs.
+    kinds
+        The kinds of problems, names of `KINDS`.
+
+    Yields
+    ------
+    Problem
+        The problems, by level but for single grains, whose two come together.
     """
     if "collision" in kinds:
-        has_decks = shutil.which(liggghts.PROGRAM) is not None
-        yield from map(_with_ours, scenes.checks()) if has_decks else scenes.checks()
-    names, piles = scene_names(planned, asked), planned.piles
+        for check in checks.checks():
+            yield _with_ours(check) if _has_decks() else check
+    names = scene_names(planned, asked)
+    yield from _of_grains(asked, planned, results, names, kinds)
+    if "flow" in kinds:
+        for run, solve in _solves(planned).items():
+            name = names[solve.flow.id[:12]]
+            yield replace(scenes.flow(name, solve, results), runs=(run,))
+    yield from _of_piles(planned, results, cases, names, kinds)
+
+
+def _of_grains(
+    asked: Study,
+    planned: Plan,
+    results: Tables,
+    names: Mapping[str, str],
+    kinds: Collection[str],
+) -> Iterator[Problem]:
+    """The problems of single grains."""
     cells = {scene.id: cell.name for cell in planned.cells for scene in cell.scenes}
-    answers = {asked: answer.scene.id for asked, answer in planned.decisions.items()}
-    thresholds = results.get("single_grain")
-    ours = (
-        {}
-        if thresholds is None
-        else dict(thresholds.set_index("scene_id")["ustar_m_s"])
-    )
-    for scene in (scene for scene in asked.scenes if scene.id not in piles):
+    ustar: dict[Any, float] = {}
+    if "single_grain" in results:
+        ustar = results["single_grain"].set_index("scene_id")["ustar_m_s"].to_dict()
+    for scene in asked.scenes:
+        if scene.id in planned.piles:
+            continue
         name = names[scene.id]
         if "closed-form" in kinds:
             yield scenes.closed_form(name, scene)
         if "pivot" in kinds and scenes.has_pivot(scene):
-            problem = scenes.pivot(name, scene, ours.get(scene.id, np.nan))
-            yield replace(
-                problem, runs=(cells[answers[scene.id]],) if scene.id in ours else ()
-            )
-    # neither a theory's stress nor a channel's is a question at levels 3 and 5
-    solved = {
-        i: p for i, p in piles.items() if p.model.cases and not p.scene.flow.depth
-    }
-    flows = {
-        run: solve for pile in solved.values() for run, solve in pile.solves.items()
-    }
-    for run, solve in flows.items() if "flow" in kinds else ():
-        yield replace(
-            scenes.flow(names[solve.flow.id[:12]], solve, results), runs=(run,)
-        )
-    for id_, pile in piles.items():
+            problem = scenes.pivot(name, scene, ustar.get(scene.id, np.nan))
+            if scene.id in ustar:
+                answered = planned.decisions[scene.id].scene
+                problem = replace(problem, runs=(cells[answered.id],))
+            yield problem
+
+
+def _has_solved_layer(pile: Pile) -> bool:
+    """Whether the flow of a pile is a question: no theory's, and no channel's."""
+    return bool(pile.model.cases) and not pile.scene.flow.depth
+
+
+def _solves(planned: Plan) -> dict[str, Pile]:
+    """A pile for each solved flow that is a question, by the flow's case."""
+    solves = {}
+    for pile in planned.piles.values():
+        if _has_solved_layer(pile):
+            solves.update(pile.solves)
+    return solves
+
+
+def _of_piles(
+    planned: Plan,
+    results: Tables,
+    cases: Path,
+    names: Mapping[str, str],
+    kinds: Collection[str],
+) -> Iterator[Problem]:
+    """The problems of piles that DEM answers, under the given stress and with one's own."""
+    for scene_id, pile in planned.piles.items():
         # replicas of lattices are in the intervals of the others
         if pile.bed.is_replica or pile.scene.protocol.method != "dem":
             continue
+        name = names[scene_id]
+        if "pile" in kinds:
+            problem = scenes.bed(name, "pile", scene_id, pile, results, cases)
+            yield replace(problem, runs=(pile.case.name,))
         # grains on other beds are given at level 4 alone, one by one
-        has_line = id_ in solved and pile.bed.is_triangle and not pile.pouring
-        for kind in ("pile", "line") if has_line else ("pile",):
-            if kind in kinds:
-                runs = (*(pile.solves if kind == "line" else ()), pile.case.name)
-                yield replace(
-                    scenes.bed(names[id_], kind, id_, pile, results, cases), runs=runs
-                )
+        is_lattice = pile.bed.is_triangle and not pile.pouring
+        if "line" in kinds and is_lattice and _has_solved_layer(pile):
+            problem = scenes.bed(name, "line", scene_id, pile, results, cases)
+            yield replace(problem, runs=(*pile.solves, pile.case.name))
 
 
 def scene_names(planned: Plan, asked: Study) -> dict[str, str]:
-    """A name for each scene and each flow of a study, by its digest: the numbers that differ."""
-    flows = {
-        s.flow.id[:12]: s.scene
-        for p in planned.piles.values()
-        for s in p.solves.values()
-    }
+    """Name each scene and each flow of a study by the numbers that differ.
+
+    Parameters
+    ----------
+    planned
+        The plan of the study.
+    asked
+        The study.
+
+    Returns
+    -------
+    dict of str to str
+        The names, by the digests of scenes and flows.
+    """
     grains = {one.id: one for one in asked.scenes if one.id not in planned.piles}
     piles = {name: pile.scene for name, pile in planned.piles.items()}
-    of_flow = {"alpha_deg", "h_m", "z0_over_d", "nu_m2_s"}
+    names = _named("grain", grains, NAMED)
+    names |= _named("pile", piles, NAMED)
+    names |= _named("flow", _scenes_of_flows(planned), OF_FLOW)
+    return names
+
+
+def _scenes_of_flows(planned: Plan) -> dict[str, Scene]:
+    """A scene for each flow of a plan, by the digest of the flow."""
+    flows = {}
+    for pile in planned.piles.values():
+        for solve in pile.solves.values():
+            flows[solve.flow.id[:12]] = solve.scene
+    return flows
+
+
+def _named(
+    kind: str, listed: Mapping[str, Scene], columns: Collection[str]
+) -> dict[str, str]:
+    """Names of scenes of a kind by their digests: the columns in which they differ."""
+    values = pd.DataFrame([fields.used(scene) for scene in listed.values()])
+    values.index = pd.Index(listed)
+    differ = []
+    for name in NAMED:
+        if name in columns and name in values and values[name].nunique() > 1:
+            differ.append(name)
     names: dict[str, str] = {}
-    for kind, listed in (("grain", grains), ("pile", piles), ("flow", flows)):
-        values = pd.DataFrame(
-            [fields.used(scene) for scene in listed.values()], index=[*listed]
-        )
-        columns = [
-            name for name in NAMED if name in values and values[name].nunique() > 1
-        ]
-        if kind == "flow":
-            columns = [name for name in columns if name in of_flow]
-        counts: Counter[str] = Counter()
-        for length in {"h_m", "d_m"} & {*columns}:
-            values[length] *= 1e3
-        for digest, row in values[columns].iterrows():
-            words = [
-                NAMED[str(column)].format(x) for column, x in row.items() if pd.notna(x)
-            ]
-            name = re.sub("[^a-z0-9.+]+", "-", "-".join([kind, *words]).lower())
-            counts[name] += 1
-            names[str(digest)] = name if counts[name] == 1 else f"{name}-{counts[name]}"
+    counts: Counter[str] = Counter()
+    for digest, row in values[differ].iterrows():
+        words = [kind]
+        for column in differ:
+            value = row[column]
+            if column in IN_MM:
+                value = value * 1e3
+            if pd.notna(value):
+                words.append(NAMED[column].format(value))
+        name = re.sub("[^a-z0-9.+]+", "-", "-".join(words).lower())
+        counts[name] += 1
+        if counts[name] > 1:
+            name = f"{name}-{counts[name]}"
+        names[str(digest)] = name
     return names
 
 
@@ -206,122 +325,168 @@ def _with_ours(check: Problem) -> Problem:
     with tempfile.TemporaryDirectory() as folder:
         answer, times = run_check(check.kind, check.parameters, Path(folder) / "deck")
     ours = answer.set_index(["quantity", "at"])["value"]
-    rows = [{**row, "ours": ours[row["quantity"], row["at"]]} for row in check.rows]
+    rows = []
+    for row in check.rows:
+        rows.append({**row, "ours": ours[row["quantity"], row["at"]]})
     return replace(check, rows=rows, seconds=times["seconds"])
 
 
 class Ours:
-    """The solvers of this package on the scenes named of a pack, in a directory of cases.
+    """The solvers of this package on scenes of a pack.
 
-    Raises InputError if the study of the pack lacks the text of a file that it names, or one of
-    the scenes.
+    Parameters
+    ----------
+    chosen
+        The pack.
+    names
+        The names of the scenes.
+    root
+        The directory of the cases.
+
+    Raises
+    ------
+    InputError
+        If the study of the pack lacks the text of a file that it names, or one of the
+        scenes.
     """
 
     def __init__(self, chosen: Pack, names: Sequence[str], root: Path) -> None:
         path = chosen.root / STUDY
         text = path.read_text(encoding="utf-8", errors="replace")
-        self.pack, self.root = chosen, root
+        self.pack = chosen
+        self.root = root
         # a pack has the texts of the files that its study names
         files = Files(None)
         self.study = study.parse(text, name="benchmark", where=str(path), files=files)
         planned = plan.make(self.study)
-        digests = scene_names(planned, self.study)
-        piles = planned.piles.values()
-        flows = {
-            digests[s.flow.id[:12]]: s.scene for p in piles for s in p.solves.values()
-        }
-        self.scenes = {digests[scene.id]: scene for scene in self.study.scenes} | flows
+        names_of = scene_names(planned, self.study)
+        self.scenes = {names_of[scene.id]: scene for scene in self.study.scenes}
+        for digest, scene in _scenes_of_flows(planned).items():
+            self.scenes[names_of[digest]] = scene
         for name in names:
-            if (
-                chosen.scenes[name]["kind"] not in CHECKS
-                and name[2:] not in self.scenes
-            ):
-                what = f"no scene of its study is {name}: it is of another version of the program"
-                raise InputError(what, where=str(chosen.root), remedy="export it again")
+            is_check = chosen.scenes[name]["kind"] in CHECKS
+            if not is_check and name[2:] not in self.scenes:
+                what = f"no scene of its study is {name}"
+                why = "it is of another version of the program"
+                where = str(chosen.root)
+                raise InputError(f"{what}: {why}", where, "export it again")
 
     def answer(self, name: str) -> tuple[pd.DataFrame, Times]:
-        """Answer a scene: columns ``quantity``, ``at`` and ``value``, and its times."""
+        """Answer a scene by our solvers.
+
+        Parameters
+        ----------
+        name
+            The name of the scene in the pack.
+
+        Returns
+        -------
+        answer
+            Columns ``quantity``, ``at`` and ``value``.
+        times
+            Its times.
+        """
         given = self.pack.scenes[name]
-        if given["kind"] in CHECKS:
-            return run_check(given["kind"], given, self.root / "checks")
-        group = Group(
-            "benchmark", (self.scenes[name[2:]],), str(self.pack.root / STUDY)
-        )
+        kind = given["kind"]
+        if kind in CHECKS:
+            return run_check(kind, given, self.root / "checks")
+        where = str(self.pack.root / STUDY)
+        group = Group("benchmark", (self.scenes[name[2:]],), where)
         asked = replace(self.study, groups=(group,))
         planned = plan.make(asked, cases=self.root)
-        kinds = {"closed-form": (), "flow": ("flow",)}.get(given["kind"])
-        for run in (
-            planned.cases.values()
-        ):  # several scenes share a flow, a poured bed or a pile
-            is_asked = kinds is None or run.kind in kinds
-            if is_asked and not case.done_state(run, self.root):
-                engine.execute(run, self.root, LIMIT_S)
+        self._run(planned, kind)
         states = planned.done(self.root)
-        results = tables.make(asked, planned, self.root, states) if states else {}
-        (problem,) = problems(asked, planned, results, self.root, [given["kind"]])
-        answer = problem.expected[["quantity", "at", "ours"]].rename(
-            columns={"ours": "value"}
-        )
-        if given["kind"] == "pile":
-            steps = pd.read_csv(self.root / problem.runs[0] / "samples.csv")[
-                "step"
-            ].iloc[-1]
-            row = pd.DataFrame(
-                {"quantity": ["steps"], "at": [""], "value": [float(steps)]}
-            )
-            answer = pd.concat([answer, row])
-        pairs = (("seconds", "solver_s"), ("cpu_s", "cpu_s")) if problem.runs else ()
-        return answer, {
-            name: sum(states[run][key] for run in problem.runs) for name, key in pairs
-        }
+        results: Tables = {}
+        if states:
+            results = tables.make(asked, planned, self.root, states)
+        (problem,) = problems(asked, planned, results, self.root, [kind])
+        answer = problem.expected[["quantity", "at", "ours"]]
+        answer = answer.rename(columns={"ours": "value"})
+        if kind == "pile":
+            samples = pd.read_csv(self.root / problem.runs[0] / "samples.csv")
+            steps = float(samples["step"].iloc[-1])
+            row = {"quantity": ["steps"], "at": [""], "value": [steps]}
+            answer = pd.concat([answer, pd.DataFrame(row)])
+        if not problem.runs:
+            return answer, {}
+        ended = [states[run] for run in problem.runs]
+        seconds = sum(state["solver_s"] for state in ended)
+        cpu_s = sum(state["cpu_s"] for state in ended)
+        return answer, {"seconds": seconds, "cpu_s": cpu_s}
+
+    def _run(self, planned: Plan, kind: str) -> None:
+        """Run the cases that a kind of scene needs; several share a flow or a pile."""
+        if kind == "closed-form":
+            return
+        for run in planned.cases.values():
+            is_needed = kind != "flow" or run.kind == "flow"
+            if is_needed and not case.done_state(run, self.root):
+                engine.execute(run, self.root, LIMIT_S)
 
 
 def run_check(
     kind: str, given: Mapping[str, Any], folder: Path
 ) -> tuple[pd.DataFrame, Times]:
-    """Run the deck of a kind of `CHECKS` with the entries of a scene, in a folder that is emptied.
+    """Run a check deck.
 
-    Raises SolverError if it does not come to its end.
+    Parameters
+    ----------
+    kind
+        Its kind, one of `CHECKS`.
+    given
+        The entries of the scene.
+    folder
+        The directory that it runs in, which is emptied.
+
+    Returns
+    -------
+    answer
+        Columns ``quantity``, ``at`` and ``value``.
+    times
+        Its times.
+
+    Raises
+    ------
+    SolverError
+        If it does not come to its end.
     """
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(case.templates() / "liggghts", folder)
-    variables = {name: given[name] for name in ("damping", "time_step")}
+    deck = f"in.{kind}"
+    command = ["stdbuf", "-o0", "liggghts", "-in", deck, "-nocite", "-log", "none"]
+    for name, value in _variables(kind, given).items():
+        command += ["-var", name, repr(value)]
+    log = folder / "log.check"
+    ended = process.run(
+        command,
+        cwd=folder / "checks",
+        log=log,
+        limit_s=LIMIT_S,
+        env=liggghts.ENVIRONMENT,
+    )
+    printed = log.read_text(errors="replace")
+    if ended.returncode != 0 or "the check has ended" not in printed:
+        what = "the check did not come to its end"
+        raise SolverError(what, where=str(log), remedy="see it")
+    rows = []
+    for label, text in re.findall(r"^([a-z][a-z ]+): (\S+)$", printed, re.MULTILINE):
+        if label in PRINTED:
+            rows.append((*PRINTED[label], float(text)))
+    answer = pd.DataFrame(rows, columns=["quantity", "at", "value"])
+    return answer, {"seconds": ended.seconds, "cpu_s": ended.cpu_s}
+
+
+def _variables(kind: str, given: Mapping[str, Any]) -> dict[str, float]:
+    """The variables of a check deck."""
+    variables = {"damping": given["damping"], "time_step": given["time_step"]}
     if kind == "incline":
         variables["incline"] = given["incline_deg"]
     elif kind == "sliding":
         unit = float(np.sqrt(given["d_m"] * given["reduced_gravity_m_s2"]))
         variables["speed"] = given["speed_m_s"] / unit
     elif kind == "passing":
-        push = (
-            given["force_n"] * np.tan(np.radians(given["beta_deg"])) / given["weight_n"]
-        )
-        names = ("displacement_criterion", "stiffness")
-        variables |= {"push": float(push), **{name: given[name] for name in names}}
-    command = [
-        "stdbuf",
-        "-o0",
-        "liggghts",
-        "-in",
-        f"in.{kind}",
-        "-nocite",
-        "-log",
-        "none",
-    ]
-    command += [
-        word for name, x in variables.items() for word in ("-var", name, repr(x))
-    ]
-    work, log = folder / "checks", folder / "log.check"
-    ended = process.run(
-        command, cwd=work, log=log, limit_s=LIMIT_S, env=liggghts.ENVIRONMENT
-    )
-    printed = log.read_text(errors="replace")
-    if ended.returncode != 0 or "the check has ended" not in printed:
-        raise SolverError(
-            "the check did not come to its end", where=str(log), remedy="see it"
-        )
-    numbers = re.findall(r"^([a-z][a-z ]+): (\S+)$", printed, re.MULTILINE)
-    rows = [
-        (*PRINTED[label], float(text)) for label, text in numbers if label in PRINTED
-    ]
-    answer = pd.DataFrame(rows, columns=["quantity", "at", "value"])
-    return answer, {"seconds": ended.seconds, "cpu_s": ended.cpu_s}
+        force = given["force_n"] * np.tan(np.radians(given["beta_deg"]))
+        variables["push"] = float(force / given["weight_n"])
+        variables["displacement_criterion"] = given["displacement_criterion"]
+        variables["stiffness"] = given["stiffness"]
+    return variables

@@ -10,7 +10,7 @@ import os
 import platform
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any, Literal, NoReturn
@@ -98,6 +98,23 @@ class Problem:
     rows: Sequence[Row]
     runs: tuple[str, ...] = ()
     seconds: float = np.nan
+
+    def with_table(self, stem: str, table: pd.DataFrame) -> "Problem":
+        """Add a table.
+
+        Parameters
+        ----------
+        stem
+            The stem of its file.
+        table
+            The table.
+
+        Returns
+        -------
+        Problem
+            The problem with the table.
+        """
+        return replace(self, tables={**self.tables, stem: table})
 
     @property
     def scene(self) -> str:

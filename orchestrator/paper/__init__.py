@@ -16,16 +16,28 @@ CLAIMS = "claims.csv"
 
 
 def cards(study: "Study", tables: "Tables") -> "list[Guest]":
-    """The report card of a study of the paper; none for any other, or if no claim can be judged.
+    """Make the report card of a study of the paper.
 
     The paper's studies are the presets of this package, word for word.
+
+    Parameters
+    ----------
+    study
+        The study.
+    tables
+        Its tables.
+
+    Returns
+    -------
+    list of Guest
+        The card; none for any other study, or if no claim can be judged.
     """
-    if study.text not in [
-        path.read_text(encoding="utf-8") for path in PRESETS.glob("*.toml")
-    ]:
+    texts = [path.read_text(encoding="utf-8") for path in PRESETS.glob("*.toml")]
+    if study.text not in texts:
         return []
     from orchestrator.paper import claims
 
     judged = claims.judge(tables)
-    found = any(one.verdict != "no data" for one in judged)
-    return [claims.card(judged, bool(study.tolerance), CLAIMS)] if found else []
+    if all(one.verdict == "no data" for one in judged):
+        return []
+    return [claims.card(judged, bool(study.tolerance), CLAIMS)]

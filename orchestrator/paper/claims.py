@@ -60,67 +60,115 @@ class Judged:
         if self.verdict == self.claim.verdict:
             return self.claim.why
         if self.verdict == "no data":
-            lines = (one for one in self.comparisons if one.is_decisive)
-            lacking = "; ".join(one.name for one in lines if one.verdict == "no data")
-            return (
-                f"The study has no scenes for: {lacking or 'any of its comparisons'}."
-            )
+            lacking = []
+            for one in self.comparisons:
+                if one.is_decisive and one.verdict == "no data":
+                    lacking.append(one.name)
+            names = "; ".join(lacking) or "any of its comparisons"
+            return f"The study has no scenes for: {names}."
         there = f"on the preset `paper` without a tolerance it is {self.claim.verdict}"
         return f"Not explained: {there}."
 
 
 def judge(tables: Tables) -> list[Judged]:
-    """Judge every claim of the paper by the tables of a study."""
+    """Judge every claim of the paper.
+
+    Parameters
+    ----------
+    tables
+        The tables of a study.
+
+    Returns
+    -------
+    list of Judged
+        The claims in the paper's order, then those on its method.
+    """
     evidence = Evidence(tables)
     return [Judged(claim, tuple(claim.measure(evidence))) for claim in CLAIMS]
 
 
 def card(judged: Sequence[Judged], has_tolerance: bool, file: str) -> Guest:
-    """The report card: how many claims hold, the section of the page, and a CSV file."""
+    """Make the report card.
+
+    Parameters
+    ----------
+    judged
+        The claims.
+    has_tolerance
+        Whether the study was answered within a tolerance.
+    file
+        Name of the CSV file of the claims.
+
+    Returns
+    -------
+    Guest
+        How many claims hold, a section of the page, and the file.
+    """
     counts = Counter(one.verdict for one in judged)
     told = ", ".join(f"{counts[verdict]} {word}" for verdict, word in WORDS.items())
     said = f"{len(judged)} claims of the paper: {told}."
-    if lacking := counts["no data"]:
-        why = "a tolerance leaves scenes without DEM; without one all are judged"
-        why = why if has_tolerance else "the study has no scenes for them"
+    lacking = counts["no data"]
+    if lacking:
+        why = "the study has no scenes for them"
+        if has_tolerance:
+            why = "a tolerance leaves scenes without DEM; without one all are judged"
         said += f" {lacking} could not be judged: {why}."
 
     def section(figures: Sequence[str]) -> Markup:
-        each = list(enumerate(figures, 1))
-        shown = [
-            [n for n, name in each if name.startswith(one.claim.figures)]
-            for one in judged
-        ]
-        values = {
-            "entries": list(zip(judged, shown, strict=True)),
-            "said": said,
-            "rule": RULE,
-        }
-        return Markup(page.fill("card.html.j2", FILE.parent, **values, words=WORDS))
+        """The section of the page, with the numbers of the figures that show claims."""
+        entries = []
+        for one in judged:
+            numbers = []
+            for number, name in enumerate(figures, 1):
+                if name.startswith(one.claim.figures):
+                    numbers.append(number)
+            entries.append((one, numbers))
+        text = page.fill(
+            "card.html.j2",
+            FILE.parent,
+            entries=entries,
+            said=said,
+            rule=RULE,
+            words=WORDS,
+        )
+        return Markup(text)
 
     return Guest("claims", said, section, {file: frame(judged).to_csv(index=False)})
 
 
 def frame(judged: Sequence[Judged]) -> pd.DataFrame:
-    """The claims as a table; the comparisons are one text, a line for each."""
+    """List claims as a table.
+
+    Parameters
+    ----------
+    judged
+        The claims.
+
+    Returns
+    -------
+    DataFrame
+        A row for each; its comparisons are one text, a line for each.
+    """
     columns = ["claim", "where", "measured", "verdict", "rule", "why"]
-    texts = ["\n".join(map(str, one.comparisons)) for one in judged]
-    rows = [
-        (one.claim.says, one.claim.where, text, one.verdict, RULE, one.why)
-        for one, text in zip(judged, texts, strict=True)
-    ]
+    rows = []
+    for one in judged:
+        text = "\n".join(map(str, one.comparisons))
+        claim = one.claim
+        rows.append((claim.says, claim.where, text, one.verdict, RULE, one.why))
     return pd.DataFrame(rows, columns=columns)
 
 
 def _claims() -> Iterator[Claim]:
+    """The claims of the file; one of neighbours in a column is measured by `along`."""
     for entry in tomllib.loads(FILE.read_text(encoding="utf-8"))["claim"]:
-        pairs, measure = entry.pop("pairs", None), entry.pop("measure", "")
-        function = (
-            partial(measures.along, **pairs) if pairs else getattr(measures, measure)
-        )
-        yield Claim(
-            **{**entry, "measure": function, "figures": tuple(entry["figures"])}
-        )
+        pairs = entry.pop("pairs", None)
+        measure = entry.pop("measure", "")
+        entry["figures"] = tuple(entry["figures"])
+        if pairs:
+            entry["measure"] = partial(measures.along, **pairs)
+        else:
+            entry["measure"] = getattr(measures, measure)
+        yield Claim(**entry)
 
 
 CLAIMS: tuple[Claim, ...] = tuple(_claims())

@@ -1,4 +1,4 @@
-"""The tables of a study as claims are judged by them, and comparisons of many of its scenes."""
+"""The tables of a study as claims are judged by them, and comparisons of its scenes."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -14,24 +14,25 @@ from orchestrator.types import BoolArray, FloatArray
 
 Verdict = Literal["reproduced", "partly", "not", "no data"]
 
-SHARE = 0.95  # part of comparisons from which a statement counts as true; from one less it, false
+SHARE = 0.95
+"""Part of comparisons from which a statement counts as true; from one less it, false."""
 RULE = (
-    f"reproduced: so in at least {SHARE:.0%} of the comparisons of each judged line; not: in at "
-    f"most {1 - SHARE:.0%} of each; else partly; no data: if a judged line has none"
+    f"reproduced: so in at least {SHARE:.0%} of the comparisons of each judged line; "
+    f"not: in at most {1 - SHARE:.0%} of each; else partly; no data: if a judged line "
+    "has none"
 )
-WAITING_TIME = (
-    5.0  # least of a held flow, sqrt(d/g'); load steps that wait less make a ramp
-)
+WAITING_TIME = 5.0
+"""Least waiting time of a held flow, sqrt(d/g'); load steps that wait less are a ramp."""
 REGIMES = {"low": "low regime", "high": "high regime"}
-BRIDGED = (
-    "bridged"  # the force law that has an answer where neither of the paper's has one
-)
+BRIDGED = "bridged"
+"""The force law that has an answer where neither of the paper's has one."""
 ANSWERS = ("pile_threshold", "wall_stress")
 """Tables that any threshold method fills; of all others the rows by DEM are taken."""
 BESIDE = ("fraction", "flow_level", "grain_level")
 """Columns in which two rows must agree beside those of their scenes."""
 GRAIN = ("alpha_deg", "beta_deg", "d_m", "z0_over_d", "nu_m2_s", "force_law")
-"""Columns in which single grains may differ; in all others the commonest combination is taken."""
+"""Columns in which single grains may differ; in all others the commonest combination is
+taken."""
 PAPER = {"rho_sol_kg_m3": 2500.0, "rho_f_kg_m3": 1.0, "g_m_s2": 9.81, "phi_deg": 35.0}
 """The grains and the gas of the paper: no others are judged."""
 
@@ -40,9 +41,20 @@ PAPER = {"rho_sol_kg_m3": 2500.0, "rho_f_kg_m3": 1.0, "g_m_s2": 9.81, "phi_deg":
 class Comparison:
     """Values of one quantity in many scenes, and the range in which a claim has them.
 
-    `values` are numbers, NaN where a scene has none, printed by `form`; the claim is true of those
-    `above` the one bound and not above the other, `below`. Without a bound they are shown and not
-    judged. Bools say themselves if the claim is true, and are judged unless `is_judged` is False.
+    Attributes
+    ----------
+    name
+        What the values are.
+    values
+        Numbers, NaN where a scene has none; or bools, which say themselves whether the
+        claim is true.
+    above, below
+        The claim is true of numbers above the one and not above the other. Without a
+        bound numbers are shown and not judged.
+    form
+        Format of a number.
+    is_judged
+        Whether the verdict of a claim may depend on the values.
     """
 
     name: str
@@ -60,9 +72,8 @@ class Comparison:
     @property
     def is_decisive(self) -> bool:
         """Whether the verdict of a claim depends on these values."""
-        return self.is_judged and (
-            self.has_bools or self.above > -np.inf or self.below < np.inf
-        )
+        has_bound = self.above > -np.inf or self.below < np.inf
+        return self.is_judged and (self.has_bools or has_bound)
 
     @cached_property
     def numbers(self) -> FloatArray:
@@ -82,13 +93,9 @@ class Comparison:
         if not len(self.numbers):
             return "no data"
         share = self.true.mean()
-        return (
-            "reproduced"
-            if share >= SHARE
-            else "not"
-            if share <= 1 - SHARE
-            else "partly"
-        )
+        if share >= SHARE:
+            return "reproduced"
+        return "not" if share <= 1 - SHARE else "partly"
 
     def __str__(self) -> str:
         if not len(self.numbers):
@@ -96,27 +103,47 @@ class Comparison:
         count = f"in {int(self.true.sum())} of {len(self.numbers)}"
         if self.has_bools:
             return f"{self.name}: {count}"
+        limits = []
+        if np.isfinite(self.above):
+            limits.append(f"above {self.above:{self.form}}")
+        if np.isfinite(self.below):
+            limits.append(f"at most {self.below:{self.form}}")
+        text = f"{self.name}: {self._spread()}"
+        if limits:
+            text += f", {' and '.join(limits)} {count}"
+        missing = np.size(self.values) - len(self.numbers)
+        if missing:
+            text += f"; {missing} without a value"
+        return text
+
+    def _spread(self) -> str:
+        """The median of the values, the least and the largest."""
         ends = np.quantile(self.numbers, [0.5, 0.0, 1.0]).tolist()
         middle, least, most = (format(end, self.form) for end in ends)
-        spread = (
-            middle if least == most else f"{middle} in the median ({least} … {most})"
-        )
-        bounds = {"above": self.above, "at most": self.below}
-        limits = [
-            f"{word} {x:{self.form}}" for word, x in bounds.items() if np.isfinite(x)
-        ]
-        judged = f", {' and '.join(limits)} {count}" if limits else ""
-        missing = np.size(self.values) - len(self.numbers)
-        lacking = f"; {missing} without a value" if missing else ""
-        return f"{self.name}: {spread}{judged}{lacking}"
+        if least == most:
+            return middle
+        return f"{middle} in the median ({least} … {most})"
 
 
 def combined(verdicts: Iterable[Verdict]) -> Verdict:
-    """The verdict of several statements: partly where they differ, none where one lacks data."""
+    """Combine the verdicts of several statements.
+
+    Parameters
+    ----------
+    verdicts
+        The verdicts.
+
+    Returns
+    -------
+    str
+        Partly where they differ, no data where one lacks them.
+    """
     different = set(verdicts)
     if not different or "no data" in different:
         return "no data"
-    return different.pop() if len(different) == 1 else "partly"
+    if len(different) > 1:
+        return "partly"
+    return different.pop()
 
 
 class Evidence:
@@ -135,23 +162,21 @@ class Evidence:
     def joined(self, name: str) -> pd.DataFrame:
         """A table with the columns of its scenes; it has all columns even without rows."""
         if name not in self._joined:
-            table = self._tables.get(
-                name, pd.DataFrame(columns=list(COLUMNS), dtype=float)
-            )
-            if len(table):
-                extra = [
-                    item
-                    for item in self.scenes
-                    if item not in table or item == "scene_id"
-                ]
-                table = table.merge(
-                    self.scenes[extra], on="scene_id", validate="many_to_one"
-                )
-                by_dem = table["answered_method"] == "dem"
-                table = table if name in ANSWERS else table[by_dem]
             # one block: columns are added to more than a hundred others
-            self._joined[name] = table.copy()
+            self._joined[name] = self._with_scenes(name).copy()
         return self._joined[name]
+
+    def _with_scenes(self, name: str) -> pd.DataFrame:
+        """A table with the columns of its scenes, or an empty one with all columns."""
+        table = self._tables.get(name, pd.DataFrame())
+        if table.empty:
+            return pd.DataFrame(columns=list(COLUMNS), dtype=float)
+        columns = self.scenes.columns.difference(table.columns, sort=False)
+        scenes = self.scenes[["scene_id", *columns]]
+        table = table.merge(scenes, on="scene_id", validate="many_to_one")
+        if name in ANSWERS:
+            return table
+        return table[table["answered_method"] == "dem"]
 
     @cached_property
     def grains(self) -> pd.DataFrame:
@@ -173,12 +198,26 @@ class Evidence:
     def piles(
         self, name: str, packing: str = "aligned", *stresses: str
     ) -> pd.DataFrame:
-        """A table of piles of a packing whose force law holds; by default under the wall stress."""
+        """Look up the piles of a packing whose force law holds.
+
+        Parameters
+        ----------
+        name
+            Name of a table.
+        packing
+            Their packing.
+        *stresses
+            The stresses on their grains, by default the wall stress.
+
+        Returns
+        -------
+        DataFrame
+            Rows of the table with the columns of their scenes.
+        """
         table = self.joined(name)
-        chosen = table["stress"].isin(stresses or ("wall",)) & (
-            table["packing"] == packing
-        )
-        return table[chosen & (table["force_law"] == table["regime"])]
+        is_chosen = table["stress"].isin(stresses or ("wall",))
+        is_chosen &= table["packing"] == packing
+        return table[is_chosen & (table["force_law"] == table["regime"])]
 
     @cached_property
     def curves(self) -> list[pd.DataFrame]:
@@ -193,7 +232,9 @@ def commonest(grains: pd.DataFrame) -> pd.DataFrame:
     """The grains under held flows that have the commonest contact and protocol."""
     held = grains[grains["waiting_time"] >= WAITING_TIME]
     combination = held.groupby(others(held, *GRAIN), dropna=False).ngroup()
-    return held[combination == combination.mode()[0]] if len(held) else held
+    if held.empty:
+        return held
+    return held[combination == combination.mode()[0]]
 
 
 def others(table: pd.DataFrame, *along: str) -> list[str]:

@@ -23,30 +23,50 @@ from orchestrator.paper.evidence import (
 )
 from orchestrator.physics import curves
 from orchestrator.physics.laws import LAWS, Exposure
-from orchestrator.types import FloatArray
+from orchestrator.types import FloatArray, IntArray
 
 Comparisons = Iterator[Comparison]
 
-NEARLY = 0.05  # change that still counts as nearly none
-SMALL_RE = 0.3  # Re* up to which a claim on Re* < 3 must be true to be partly right
-BETA, Z0_OVER_D = (50.0, 55.0), 1 / 30  # for these the paper claims the best fit
-POINTS = 60  # Re* at which a series of thresholds is compared with curves
-GOOD = 1.25  # mean factor from the curves up to which a fit is called good
-CREST = (
-    0.9  # part of the counted grains, from the toe, above which they are at the crest
-)
-RANKED = (
-    -0.9
-)  # rank correlation of place and load step from which the motion runs downward
-COARSE_M = 5e-4  # diameter above which the paper sees wiggles, m
-STEEP = 0.2  # least n/N for wiggles: below it the curve rises too steeply for the load steps
-# the sum of five neighbours by these weights is the value of the parabola that fits them best
+NEARLY = 0.05
+"""Change that still counts as nearly none."""
+SMALL_RE = 0.3
+"""Re* up to which a claim on Re* < 3 must be true to be partly right."""
+BETA = (50.0, 55.0)
+"""Entrainment angles, degrees, for which the paper claims the best fit."""
+Z0_OVER_D = 1 / 30
+"""Roughness length for which it does."""
+POINTS = 60
+"""Re* at which a series of thresholds is compared with curves."""
+GOOD = 1.25
+"""Mean factor from the curves up to which a fit is called good."""
+CREST = 0.9
+"""Part of the counted grains, from the toe, above which they are at the crest."""
+RANKED = -0.9
+"""Rank correlation of place and load step from which the motion runs downward."""
+COARSE_M = 5e-4
+"""Diameter above which the paper sees wiggles, m."""
+STEEP = 0.2
+"""Least n/N for wiggles: below it the curve rises too steeply for the load steps."""
 SMOOTH = np.array([-3, 12, 17, 12, -3]) / 35
-WINDOW = 0.06  # part of the face over which the stress is smoothed, to see the effect of its steps
-LATER = 1.5  # n/N is read at this many times the stress that moves 30 %
-LEAST_M = 5e-5  # the least diameter of the paper, m
-PILES_M = (1e-4, 1e-3)  # the least and the largest diameter of the paper's piles, m
-INSENSITIVE = 0.01  # change of the threshold that counts as none
+"""Weights of five neighbours whose sum is the value of the parabola that fits them."""
+WINDOW = 0.06
+"""Part of the face over which the stress is smoothed, to see the effect of its steps."""
+LATER = 1.5
+"""n/N is read at this many times the stress that moves 30 %."""
+LEAST_M = 5e-5
+"""The least diameter of the paper, m."""
+PILES_M = (1e-4, 1e-3)
+"""The least and the largest diameter of the paper's piles, m."""
+METHODS = ("DEM", "pivots", "pivots under a smoothed stress")
+"""Curves whose wiggles are compared."""
+INSENSITIVE = 0.01
+"""Change of the threshold that counts as none."""
+PACKINGS = {
+    "aligned": "rows along the slope",
+    "disordered": "random gaps",
+    "horizontal": "level rows",
+}
+"""What the lines of claims call packings."""
 
 
 def by_regime(
@@ -73,19 +93,22 @@ def constant(evidence: Evidence) -> Comparisons:
     """Thresholds of single grains at small Re*, where lift over drag grows with Re*."""
     grains = evidence.held.dropna(subset=["shields_dem"])
     flat = grains[(grains["force_law"] == "low") & (grains["alpha_deg"] == 0)]
-    lifts, changes, law = [], [], LAWS["low"]
+    law = LAWS["low"]
+    lifts = []
+    changes = []
     for (beta, z0), series in parts(flat, "beta_deg", "z0_over_d"):
-        if len(series) > 1:
-            unit = Exposure(1.0, z0, 1.0, 1.0, series["alpha_s"].iloc[0])
-            lifts.append(
-                law.lift(1.0, unit) / law.drag(1.0, unit) / np.tan(np.radians(beta))
-            )
-            ends = series.sort_values("reynolds")["shields_dem"]
-            changes.append(ends.iloc[-1] / ends.iloc[0] - 1)
-    lift, end = np.array(lifts, float), law.reynolds[1]
+        if len(series) < 2:
+            continue
+        unit = Exposure(1.0, z0, 1.0, 1.0, series["alpha_s"].iloc[0])
+        lift_over_drag = law.lift(1.0, unit) / law.drag(1.0, unit)
+        lifts.append(lift_over_drag / np.tan(np.radians(beta)))
+        tau = series.sort_values("reynolds")["shields_dem"]
+        changes.append(tau.iloc[-1] / tau.iloc[0] - 1)
+    lift = np.array(lifts, float)
+    end = law.reynolds[1]
     reach = NEARLY / (1 - NEARLY) / lift
-    name = f"Re* up to which τ is within {NEARLY:.0%} of its limit for Re* → 0, by the closed form"
-    yield Comparison(f"{name}, for each β and z₀", reach, end)
+    limit = f"Re* up to which τ is within {NEARLY:.0%} of its limit for Re* → 0"
+    yield Comparison(f"{limit}, by the closed form, for each β and z₀", reach, end)
     yield Comparison("the same beside a tenth of that range", reach, SMALL_RE)
     name = "closed form: change of τ from Re* → 0 to 3"
     yield Comparison(name, 1 / (1 + lift * end) - 1, form="+.0%")
@@ -94,8 +117,9 @@ def constant(evidence: Evidence) -> Comparisons:
 
 def numerical(evidence: Evidence) -> Comparisons:
     """Thresholds by DEM over the closed form, by how the flow is raised."""
-    held, ramps = evidence.held, evidence.grains
-    ramps = ramps[ramps["waiting_time"] < WAITING_TIME]
+    held = evidence.held
+    every = evidence.grains
+    ramps = every[every["waiting_time"] < WAITING_TIME]
     name = "lower end of DEM’s interval of τ over the closed form"
     for flow, grains in (("held flows", held), ("ramps", ramps)):
         ratio = grains["shields_dem_low"] / grains["shields_closed_form"]
@@ -121,88 +145,88 @@ def best_fit(evidence: Evidence) -> Comparisons:
             continue
         named = table[table["beta_deg"].between(*BETA) & table["is_z0_named"]]
         best = table.iloc[:1]
-        of = [f", of β = {row.beta_deg:g}°, {row.z0}" for row in best.itertuples()]
         prefix = REGIMES.get(law, "bridged law")
         fit = f"{prefix}: mean factor of τ from the curves for water"
-        yield Comparison(f"{fit}, best fit{''.join(of)}", best["factor"], -np.inf, GOOD)
+        name = f"{fit}, best fit"
+        for row in best.itertuples():
+            name += f", of β = {row.beta_deg:g}°, {row.z0}"
+        yield Comparison(name, best["factor"], -np.inf, GOOD)
         among = best.index.isin(named.index)
         yield Comparison(f"{prefix}: the best fit is one of those named", among)
         yield Comparison(f"{fit}, fits of the named β and z₀", named["factor"])
 
 
 def _over_d(z0: float) -> str:
+    """A roughness length in diameters as a text."""
     return f"d/{1 / z0:.3g}"
 
 
 def _fits(
     grains: pd.DataFrame, lines: Iterable[tuple[FloatArray, FloatArray]]
 ) -> pd.DataFrame:
-    """Mean factor of each series of one law from some curves, at the Re* that all cover."""
-    series = [
-        (key, own)
-        for key, own in parts(grains, "beta_deg", "z0_over_d")
-        if len(own) > 1
-    ]
-    low = max((own["reynolds"].min() for _, own in series), default=1.0)
-    high = min((own["reynolds"].max() for _, own in series), default=0.0)
-    grid = np.geomspace(low, high, POINTS) if low < high else np.array([])
-    table = np.array([_read(x, y, grid) for x, y in lines])
-    covered = np.isfinite(table).any(axis=0) if table.size else np.array([], bool)
-    rows = []
-    for (beta, z0), own in series if covered.any() else ():
-        ordered = own.sort_values("reynolds")
-        tau = _read(
-            ordered["reynolds"].to_numpy(), ordered["shields_dem"].to_numpy(), grid
-        )
-        away = np.abs(tau[covered] - np.nanmean(table[:, covered], axis=0)).mean()
-        rows.append(
-            (beta, _over_d(z0), abs(z0 / Z0_OVER_D - 1) < 1e-3, float(np.exp(away)))
-        )
-    fits = pd.DataFrame(rows, columns=["beta_deg", "z0", "is_z0_named", "factor"])
-    return fits.sort_values("factor", kind="stable")
+    """Mean factor of each series of one law from curves, at the Re* that all cover."""
+    columns = ["beta_deg", "z0", "is_z0_named", "factor"]
+    series = {}
+    for key, rows in parts(grains, "beta_deg", "z0_over_d"):
+        if len(rows) > 1:
+            series[key] = rows.sort_values("reynolds")
+    low = max((rows["reynolds"].min() for rows in series.values()), default=1.0)
+    high = min((rows["reynolds"].max() for rows in series.values()), default=0.0)
+    if low >= high:
+        return pd.DataFrame(columns=columns)
+    grid = np.geomspace(low, high, POINTS)
+    table = np.array([_log_at(x, y, grid) for x, y in lines])
+    is_covered = np.isfinite(table).any(axis=0)
+    if not is_covered.any():
+        return pd.DataFrame(columns=columns)
+    mean = np.nanmean(table[:, is_covered], axis=0)
+    fits = []
+    for (beta, z0), rows in series.items():
+        re = rows["reynolds"].to_numpy()
+        tau = _log_at(re, rows["shields_dem"].to_numpy(), grid)
+        factor = float(np.exp(np.abs(tau[is_covered] - mean).mean()))
+        is_named = abs(z0 / Z0_OVER_D - 1) < 1e-3
+        fits.append((beta, _over_d(z0), is_named, factor))
+    return pd.DataFrame(fits, columns=columns).sort_values("factor", kind="stable")
 
 
-def _read(x: FloatArray, y: FloatArray, grid: FloatArray) -> FloatArray:
+def _log_at(x: FloatArray, y: FloatArray, grid: FloatArray) -> FloatArray:
     """Logarithm of a line at some Re*; NaN beyond its ends."""
     order = np.argsort(x, kind="stable")
-    logs = np.log(grid), np.log(x[order]), np.log(y[order])
-    return np.asarray(np.interp(*logs, left=np.nan, right=np.nan))
+    ln_x = np.log(x[order])
+    ln_y = np.log(y[order])
+    return np.asarray(np.interp(np.log(grid), ln_x, ln_y, left=np.nan, right=np.nan))
 
 
 def order(evidence: Evidence) -> Comparisons:
     """Which grains of a pile move first, and where the motion goes."""
-    rows = "rows along the slope"
-    for packing, name in (
-        ("aligned", rows),
-        ("disordered", "random gaps"),
-        ("horizontal", "level rows"),
-    ):
-        downward, ranks = [], []
-        every = evidence.piles("pile_grain", packing)[
-            ["scene_id", "s_m", "moved_in_load_step"]
-        ]
-        for _, grains in parts(every, "scene_id"):
+    for packing, name in PACKINGS.items():
+        downward = []
+        ranks = []
+        for _, grains in parts(evidence.piles("pile_grain", packing), "scene_id"):
             step = grains.sort_values("s_m")["moved_in_load_step"].to_numpy(int)
-            if (step > 0).any():
-                late = np.where(step > 0, step, step.max() + 1)
-                place = (np.arange(len(late)) + 0.5) / len(late)
-                _, each, many = np.unique(late, return_inverse=True, return_counts=True)
-                rank = (np.cumsum(many) - many / 2)[
-                    each
-                ]  # Spearman's, of ties the mean
-                ranks.append(
-                    float(np.corrcoef(place, rank)[0, 1]) if len(many) > 1 else np.nan
-                )
-                downward.append(
-                    place[late == late.min()].max() > CREST and ranks[-1] <= RANKED
-                )
+            if not (step > 0).any():
+                continue
+            late = np.where(step > 0, step, step.max() + 1)
+            place = (np.arange(len(late)) + 0.5) / len(late)
+            ranks.append(_rank_correlation(place, late))
+            is_first_on_top = place[late == late.min()].max() > CREST
+            downward.append(is_first_on_top and ranks[-1] <= RANKED)
         if packing == "aligned":
             rule = f"the topmost tenth moves first, rank correlation at most {RANKED:g}"
             yield Comparison(f"{name}: {rule}", np.array(downward, bool))
         if ranks:
-            yield Comparison(
-                f"{name}: rank correlation of place and load step of motion", ranks
-            )
+            what = "rank correlation of place and load step of motion"
+            yield Comparison(f"{name}: {what}", ranks)
+
+
+def _rank_correlation(place: FloatArray, late: IntArray) -> float:
+    """Spearman's, with mean ranks of ties; the places rise. NaN if all are alike."""
+    _, number, count = np.unique(late, return_inverse=True, return_counts=True)
+    if len(count) < 2:
+        return float("nan")
+    rank = (np.cumsum(count) - count / 2)[number]
+    return float(np.corrcoef(place, rank)[0, 1])
 
 
 def above_single(evidence: Evidence) -> Comparisons:
@@ -233,41 +257,47 @@ def above_single(evidence: Evidence) -> Comparisons:
 
 def wiggles(evidence: Evidence) -> Comparisons:
     """Roughness of the curves of the fraction, by DEM and by pivots."""
-    every = evidence.piles("pile_grain")[["scene_id", "s_m", "ustar_over_ustar0"]]
-    grains = dict(parts(every, "scene_id"))
-    rows = []
-    for curve in evidence.curves:
-        scene = curve.iloc[0]
-        if scene["scene_id"] in grains:
-            stress = (
-                grains[scene["scene_id"]]
-                .sort_values("s_m")["ustar_over_ustar0"]
-                .to_numpy()
-            )
-            width = 2 * int(WINDOW * len(stress) / 2) + 1
-            padded = np.pad(stress, width // 2, mode="edge")
-            smoothed = np.convolve(padded, np.full(width, 1 / width), mode="valid")
-            fractions = curve["fraction_moved"].to_numpy(), _pivots(curve, stress)
-            each = map(wiggle, (*fractions, _pivots(curve, smoothed)))
-            rows.append((scene["d_m"], 1 / scene["count"], *each))
-    columns = ["d_m", "grain", "DEM", "pivots", "pivots under a smoothed stress"]
-    table = pd.DataFrame(rows, columns=columns, dtype=float).dropna()
-    coarse, fine = table[table["d_m"] > COARSE_M], table[table["d_m"] <= COARSE_M]
-    beside = coarse["DEM"] / (fine["DEM"].median() if len(fine) else np.nan)
-    yield Comparison(
-        "d > 0.5 mm: wiggle over the median of the finer piles", beside, 1.0
-    )
-    yield Comparison(
-        "d > 0.5 mm: wiggle over 1/N", coarse["DEM"] / coarse["grain"], -np.inf, 1.0
-    )
+    table = _wiggles(evidence)
+    coarse = table[table["d_m"] > COARSE_M]
+    fine = table[table["d_m"] <= COARSE_M]
+    of_fine = fine["DEM"].median() if len(fine) else np.nan
+    name = "d > 0.5 mm: wiggle over the median of the finer piles"
+    yield Comparison(name, coarse["DEM"] / of_fine, 1.0)
+    over_grain = coarse["DEM"] / coarse["grain"]
+    yield Comparison("d > 0.5 mm: wiggle over 1/N", over_grain, -np.inf, 1.0)
     yield Comparison("d ≤ 0.5 mm: wiggle over 1/N", fine["DEM"] / fine["grain"])
     for name, part in (("d > 0.5 mm", coarse), ("d ≤ 0.5 mm", fine)):
-        for method in columns[2:]:
+        for method in METHODS:
             yield Comparison(f"{name}: wiggle by {method}", part[method], form=".2%")
 
 
+def _wiggles(evidence: Evidence) -> pd.DataFrame:
+    """The wiggles of each pile by `METHODS`, with its d and the part that a grain is."""
+    grains = dict(parts(evidence.piles("pile_grain"), "scene_id"))
+    rows = []
+    for curve in evidence.curves:
+        scene = curve.iloc[0]
+        if scene["scene_id"] not in grains:
+            continue
+        along = grains[scene["scene_id"]].sort_values("s_m")
+        stress = along["ustar_over_ustar0"].to_numpy()
+        by_dem = wiggle(curve["fraction_moved"].to_numpy())
+        by_pivots = wiggle(_pivots(curve, stress))
+        smoothed = wiggle(_pivots(curve, _smoothed(stress)))
+        rows.append((scene["d_m"], 1 / scene["count"], by_dem, by_pivots, smoothed))
+    columns = ["d_m", "grain", *METHODS]
+    return pd.DataFrame(rows, columns=columns, dtype=float).dropna()
+
+
+def _smoothed(stress: FloatArray) -> FloatArray:
+    """The mean of a stress along the bed over `WINDOW`."""
+    width = 2 * int(WINDOW * len(stress) / 2) + 1
+    padded = np.pad(stress, width // 2, mode="edge")
+    return np.convolve(padded, np.full(width, 1 / width), mode="valid")
+
+
 def wiggle(fraction: FloatArray) -> float:
-    """Rms distance of n/N from the parabola through its five neighbours, for n/N of some size."""
+    """Rms distance of n/N from the parabola through its five neighbours, above `STEEP`."""
     fraction = fraction[fraction >= STEEP]
     if len(fraction) < len(SMOOTH):
         return float("nan")
@@ -276,7 +306,7 @@ def wiggle(fraction: FloatArray) -> float:
 
 
 def _pivots(curve: pd.DataFrame, stress: FloatArray) -> FloatArray:
-    """n/N at each load step if each grain goes at one local u*, after those downstream of it.
+    """n/N at each load step if grains go at one local u*, after those downstream of them.
 
     That u* is set so that half of the grains have moved at the same flow as by DEM.
     """
@@ -290,50 +320,51 @@ def _pivots(curve: pd.DataFrame, stress: FloatArray) -> FloatArray:
 
 def saturation(evidence: Evidence) -> Comparisons:
     """How the rise of the fraction slows down."""
-    rows = []
-    for curve in evidence.curves:
-        low, middle, high = (
-            _stress_at(curve, fraction) for fraction in (0.2, 0.5, 0.8)
-        )
-        later = _fraction_at(curve, LATER * _stress_at(curve, 0.3))
-        bend = (middle - low) / (high - middle)
-        rows.append(
-            {**curve.iloc[0].drop("fraction_moved"), "bend": bend, "later": later}
-        )
-    table = (
-        pd.DataFrame(rows)
-        if rows
-        else evidence.joined("none").assign(bend=[], later=[])
-    )
+    table = _bends(evidence)
     name = "slope of n/N against τ from 50 to 80 % over that from 20 to 50 %"
     yield Comparison(name, table["bend"], -np.inf, 1.0)
-    name, ends = (
-        f"n/N at {LATER:g} τ₃₀",
-        ("largest d over smallest", "steepest over flattest"),
-    )
-    for along, pair in zip(("d_m", "alpha_deg"), ends, strict=True):
-        values = table.groupby(others(table, along), dropna=False)[along]
-        at_end = (table[along] == values.transform("min")) | (
-            table[along] == values.transform("max")
-        )
-        ratio = pairs(table[at_end], along, "later")["ratio"]
+    name = f"n/N at {LATER:g} τ₃₀"
+    ends = {"d_m": "largest d over smallest", "alpha_deg": "steepest over flattest"}
+    for column, pair in ends.items():
+        values = table.groupby(others(table, column), dropna=False)[column]
+        is_least = table[column] == values.transform("min")
+        is_largest = table[column] == values.transform("max")
+        ratio = pairs(table[is_least | is_largest], column, "later")["ratio"]
         yield Comparison(f"{name}, {pair}", ratio, -np.inf, 1.0)
     for alpha, piles in parts(table, "alpha_deg"):
         yield Comparison(f"{name}, {alpha:g}°", piles["later"], form=".0%")
 
 
+def _bends(evidence: Evidence) -> pd.DataFrame:
+    """The bend of each pile's curve, and n/N at `LATER` times the stress that moves 30 %."""
+    rows = []
+    for curve in evidence.curves:
+        low = _stress_at(curve, 0.2)
+        middle = _stress_at(curve, 0.5)
+        high = _stress_at(curve, 0.8)
+        row = curve.iloc[0].drop("fraction_moved").to_dict()
+        row["bend"] = (middle - low) / (high - middle)
+        row["later"] = _fraction_at(curve, LATER * _stress_at(curve, 0.3))
+        rows.append(row)
+    if rows:
+        return pd.DataFrame(rows)
+    return evidence.joined("none").assign(bend=[], later=[])
+
+
 def _stress_at(curve: pd.DataFrame, fraction: float) -> float:
     """Shields number at which a fraction had moved, between load steps; NaN if not reached."""
-    ends = {"left": np.nan, "right": np.nan}
-    return float(np.interp(fraction, curve["fraction_moved"], curve["shields"], **ends))
+    fractions = curve["fraction_moved"]
+    shields = np.interp(
+        fraction, fractions, curve["shields"], left=np.nan, right=np.nan
+    )
+    return float(shields)
 
 
 def _fraction_at(curve: pd.DataFrame, shields: float) -> float:
     """The fraction that had moved when the mean stress first reached a value."""
     stress = np.maximum.accumulate(curve["shields"].to_numpy(float))
-    return float(
-        np.interp(shields, stress, curve["fraction_moved"].to_numpy(float), left=0.0)
-    )
+    fraction = curve["fraction_moved"].to_numpy(float)
+    return float(np.interp(shields, stress, fraction, left=0.0))
 
 
 def fraction(evidence: Evidence) -> Comparisons:
@@ -360,7 +391,8 @@ def conditioning(evidence: Evidence) -> Comparisons:
     held = evidence.grains[evidence.grains["waiting_time"] >= WAITING_TIME]
     ratio = held["ustar_m_s"] / held["ustar_closed_form_m_s"]
     held = held[[*GRAIN, "stiffness"]].assign(ratio=ratio)
-    changes, stiffness = [], [np.array([])]
+    changes = []
+    stiffness = [np.array([])]
     for _, same in parts(held, *GRAIN):
         if same["stiffness"].nunique() > 1:
             changes.append(same["ratio"].max() / same["ratio"].min() - 1)
@@ -370,45 +402,49 @@ def conditioning(evidence: Evidence) -> Comparisons:
 
 
 def regimes(evidence: Evidence) -> Comparisons:
-    """How many piles of the paper's own range the two force laws and the drag law cover."""
+    """How many piles of the paper's own range the force laws and the drag law cover."""
     piles = evidence.scenes[evidence.scenes["bed"] == "pile"]
     piles = piles[piles["nu_m2_s"] == piles["nu_m2_s"].min()]
     keys = ["alpha_deg", "d_m", "z0_over_d"]
-    each, (least, largest) = piles.drop_duplicates(keys), PILES_M
-    if not (each["d_m"].min() < 1.01 * least and each["d_m"].max() > 0.99 * largest):
+    each = piles.drop_duplicates(keys)
+    least, largest = PILES_M
+    has_least = each["d_m"].min() < 1.01 * least
+    if not (has_least and each["d_m"].max() > 0.99 * largest):
         return
     for z0, part in parts(each, "z0_over_d"):
-        name = f"z₀ = {_over_d(z0)}: piles at the lowest ν of the study that lie in a regime"
-        yield Comparison(name, part["regime"] != "transition")
+        where = "piles at the lowest ν of the study that lie in a regime"
+        is_covered = part["regime"] != "transition"
+        yield Comparison(f"z₀ = {_over_d(z0)}: {where}", is_covered)
     holds = piles[piles["law_holds"].astype(bool)]
     if (holds["force_law"] == BRIDGED).any():
-        answered = each.merge(
-            holds[keys].drop_duplicates(), on=keys, how="left", indicator=True
-        )
-        name = "the same piles that have an answer of a law that holds, the bridged law included"
+        held = holds[keys].drop_duplicates()
+        answered = each.merge(held, on=keys, how="left", indicator=True)
+        what = "the same piles that have an answer of a law that holds"
+        name = f"{what}, the bridged law included"
         yield Comparison(name, answered["_merge"] == "both", is_judged=False)
-    law = LAWS["high"]
     tables = {"single grains": evidence.held, "piles": evidence.piles("pile_threshold")}
     for name, table in tables.items():
-        high = table[(table["force_law"] == "high") & table["reynolds"].notna()]
-        if len(high):
-            unit = Exposure(1.0, high["z0_over_d"].to_numpy(float), 1.0, 1.0, 1.0)
-            within = (
-                law.particle_reynolds(high["reynolds"].to_numpy(float), unit)
-                <= law.drag_end
-            )
-            name = f"high regime: thresholds of {name} within the range of the drag law"
-            yield Comparison(name, within, is_judged=False)
+        yield from _within_drag_law(name, table)
+
+
+def _within_drag_law(name: str, table: pd.DataFrame) -> Comparisons:
+    """How many thresholds of the high regime lie within the range of its drag law."""
+    law = LAWS["high"]
+    high = table[(table["force_law"] == "high") & table["reynolds"].notna()]
+    if high.empty:
+        return
+    unit = Exposure(1.0, high["z0_over_d"].to_numpy(float), 1.0, 1.0, 1.0)
+    particle_reynolds = law.particle_reynolds(high["reynolds"].to_numpy(float), unit)
+    what = f"high regime: thresholds of {name} within the range of the drag law"
+    yield Comparison(what, particle_reynolds <= law.drag_end, is_judged=False)
 
 
 def stress(evidence: Evidence) -> Comparisons:
     """Eq. 10 against the wall stress, in the thresholds of piles."""
     table = evidence.piles("pile_threshold", "aligned", "wall", "eq10")
     coded = table.assign(code=(table["stress"] == "eq10").astype(float))
-    for symbol, column, bound in (
-        ("u*₀", "ustar0_m_s", NEARLY),
-        ("τ", "shields", np.inf),
-    ):
+    judged = (("u*₀", "ustar0_m_s", NEARLY), ("τ", "shields", np.inf))
+    for symbol, column, bound in judged:
         changes = pairs(coded, "code", column, ["stress"])
         changes["ratio"] -= 1
         name = f"{symbol} by Eq. 10 over that by the wall stress, less 1"

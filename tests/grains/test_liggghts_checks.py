@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.benchmark.scenes import passing_time
+from orchestrator.benchmark.checks import passing_time
 from tests.conftest import Deck
 
 MU = math.tan(math.radians(35))

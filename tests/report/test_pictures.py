@@ -214,7 +214,10 @@ def test_motion_starts_on_a_natural_dune_where_stress_and_slope_say(
     grains = dune.tables["pile_grain"]
     local, lattice = (rows for _, rows in grains.groupby("scene_id", sort=False))
     assert (
-        len(local) <= packing.PLACES < len(lattice) == pytest.approx(1 / 3e-4, rel=0.02)
+        len(local)
+        <= packing.SAMPLES
+        < len(lattice)
+        == pytest.approx(1 / 3e-4, rel=0.02)
     )
     at_grains = np.interp(lattice["x_m"], local["x_m"], local["ustar0_m_s"])
     np.testing.assert_allclose(lattice["ustar0_m_s"], at_grains, rtol=0.02)
