@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator import paper, pipeline, report, tables
-from orchestrator.calculator import PARAMETERS
+from orchestrator.calculator import LEAVES, PARAMETERS
 from orchestrator.calculator.asked import thresholds_and_questions
 from orchestrator.calculator.cli import OPTIONS
 from orchestrator.errors import InputError, OrchestratorError, SolverError
@@ -57,11 +57,12 @@ def threshold(
     law: str | None = "auto",
     fluid: str | None = None,
     temperature: float | None = None,
+    criterion: str = LEAVES,
     **parameters: "ArrayLike",
 ) -> pd.DataFrame:
     """Thresholds of motion of single grains by the closed form.
 
-    All parameters but `law`, `fluid` and `temperature` are numbers or arrays that broadcast
+    All parameters but `law`, `fluid`, `temperature` and `criterion` are numbers or arrays that broadcast
     together.
 
     Parameters
@@ -76,6 +77,11 @@ def threshold(
         paper's fluid.
     temperature
         Of that fluid, deg C, by default 15.
+    criterion
+        What a grain must do: "leaves", its pocket, or "goes on", which is to leave it
+        in a gust and to hop on after it. The threshold is then the larger of both mean
+        stresses, and there are columns of both, of the stress at which motion ceases,
+        and of which decides.
     density, fluid_density
         Densities of the grains (2500) and of the fluid (1), kg/m3.
     viscosity
@@ -104,7 +110,8 @@ def threshold(
     Raises
     ------
     InputError
-        For a point that is no scene, a law that is none, or if no law holds at any point.
+        For a point that is no scene, a law or criterion that is none, or if no law
+        holds at any point.
     """
     given: dict[str, Any] = {"diameter": diameter, **parameters}
     for name, values in given.items():
@@ -125,7 +132,7 @@ def threshold(
     names = {name: name for name in OPTIONS}
     form = "{} {:.4g}"
     table, asked = thresholds_and_questions(
-        points, law or "auto", fluid, temperature, names, form
+        points, law or "auto", fluid, temperature, names, form, criterion
     )
     if asked:
         warnings.warn("; ".join(asked), stacklevel=2)

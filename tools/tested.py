@@ -55,7 +55,8 @@ def intervals(rows: pd.DataFrame, strip: Scene) -> pd.DataFrame:
             "bed": "grain",
         }
         answers[kind_of({**usual, **row})] = np.where(at.valid, at.shields, np.nan)
-    for model, law in itertools.product(MODELS[1:], ("bridged", "bridged-gravel")):
+    of_strips = (each for each in MODELS if each.name != PAPER and not each.goes_on)
+    for model, law in itertools.product(of_strips, ("bridged", "bridged-gravel")):
         gusts = {"intensity": INTENSITY, "events": EVENTS} if model.gust > 1 else None
         scene = changed(strip, {**model.fields, "forces.law": law, "flow.gusts": gusts})
         part = flumes[flumes["model"] == model.name]

@@ -104,3 +104,13 @@ QUANTITIES = {
     "lift_n": ("lift", "lift, N"),
 }
 """Columns of a threshold, each with its name in JSON, and its symbol and unit."""
+LEAVES, GOES_ON = "leaves", "goes on"
+CRITERIA = (LEAVES, GOES_ON)
+"""What a grain must do to count: leave its pocket, or also go on after the gust."""
+OF_CRITERION = {
+    "shields_leaves": "leaves",
+    "shields_goes_on": "goes on",
+    "shields_cessation": "ceases",
+    "decides": "decides",
+}
+"""Columns of a threshold of grains that go on, each with its head for people."""

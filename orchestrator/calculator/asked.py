@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.calculator import PARAMETERS
+from orchestrator.calculator import LEAVES, PARAMETERS
 from orchestrator.errors import InputError
 from orchestrator.physics.fluids import TEMPERATURE, numbers_of
 from orchestrator.study.units import first, questions
@@ -16,8 +16,8 @@ Value = float | str
 """A number, or a part of the diameter such as ``d/30``."""
 OF_FLUID = {"fluid_density": "density", "viscosity": "viscosity"}
 """Parameters that a fluid has by its name, as a table ``[fluid]`` calls them."""
-FIELD = re.compile(r"\b([a-z]+\.[a-z_]+|(?<=threshold: )(depth|law))\b")
-"""A field of a study file in a message, or the depth or law that is refused."""
+FIELD = re.compile(r"\b([a-z]+\.[a-z_]+|(?<=threshold: )(depth|law|criterion))\b")
+"""A field of a study file in a message, or what else is refused."""
 
 
 def thresholds_and_questions(
@@ -27,6 +27,7 @@ def thresholds_and_questions(
     temperature: float | None,
     names: Mapping[str, str],
     form: str,
+    criterion: str = LEAVES,
 ) -> tuple["Table", list[str]]:
     """Find the thresholds of some points, and ask about numbers that seem to be wrong.
 
@@ -41,10 +42,12 @@ def thresholds_and_questions(
     temperature
         Temperature of that fluid, deg C.
     names
-        What refusals and questions call the parameters, ``fluid``, ``temperature`` and
-        ``law``.
+        What refusals and questions call the parameters, ``fluid``, ``temperature``,
+        ``law`` and ``criterion``.
     form
         How a parameter is given a value: a format of its name and the value.
+    criterion
+        What a grain must do, one of `CRITERIA`.
 
     Returns
     -------
@@ -64,11 +67,12 @@ def thresholds_and_questions(
     fields["fluid.kind"] = names["fluid"]
     fields[f"fluid.{TEMPERATURE}"] = names["temperature"]
     fields["law"] = names["law"]
+    fields["criterion"] = names["criterion"]
     asked: list[str] = []
     try:
         points = _of_fluid(points, fluid, temperature)
         asked = questions(_by_field(points), fields, form)
-        return thresholds(points, law), asked
+        return thresholds(points, law, criterion), asked
     except InputError as error:
         renamed = InputError(
             _renamed(error.what, fields),

@@ -6,7 +6,7 @@ import math
 import sys
 from typing import Any
 
-from orchestrator.calculator import GEOMETRIC, MOST_POINTS, PARAMETERS
+from orchestrator.calculator import GEOMETRIC, LEAVES, MOST_POINTS, PARAMETERS
 from orchestrator.calculator.asked import OF_FLUID, Value, thresholds_and_questions
 from orchestrator.calculator.printed import as_json, as_text, print_csv
 from orchestrator.errors import InputError
@@ -15,7 +15,7 @@ from orchestrator.study.units import meant, number
 
 OPTIONS = {
     name: f"--{name.removesuffix('_deg').replace('_', '-')}"
-    for name in (*PARAMETERS, "fluid", "temperature", "law")
+    for name in (*PARAMETERS, "fluid", "temperature", "law", "criterion")
 }
 """Options of the command line, by the parameters of `face.threshold`."""
 FORM = (
@@ -31,6 +31,10 @@ RANGES = (
 LAW_HELP = (
     "force law of the answer; default: bridged, or bridged-gravel where the drag law "
     "of bridged ends; paper: Eq. 2 or 4 where each holds"
+)
+CRITERION_HELP = (
+    "what a grain must do: leaves, its pocket, the default; or goes on: leave it in a "
+    "gust, and hop on after it, the larger of both mean stresses"
 )
 
 
@@ -58,6 +62,9 @@ def add(commands: Any) -> None:
     text = f"of that fluid, deg C, one number; default {STANDARD_DEG_C:g}"
     command.add_argument("--temperature", type=number, metavar="T", help=text)
     command.add_argument("--law", default="auto", metavar="NAME", help=LAW_HELP)
+    command.add_argument(
+        "--criterion", default=LEAVES, metavar="NAME", help=CRITERION_HELP
+    )
     form = command.add_mutually_exclusive_group()
     text = "an object for each law by its name"
     form.add_argument("--json", action="store_true", help=text)
@@ -101,6 +108,7 @@ def _run(options: argparse.Namespace) -> int:
         options.temperature,
         OPTIONS,
         "{} {:.4g}",
+        options.criterion,
     )
     if questions:
         print(f"orchestrator: {'; '.join(questions)}", file=sys.stderr)

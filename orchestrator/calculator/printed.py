@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from orchestrator.calculator import PARAMETERS, QUANTITIES
+from orchestrator.calculator import OF_CRITERION, PARAMETERS, QUANTITIES
 from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.physics.fluids import PAPER
 
@@ -50,6 +50,9 @@ def as_json(rows: Sequence["Row"]) -> str:
     names = {column: name for column, (name, _) in QUANTITIES.items()}
     for column in ("valid", "why_not", *MEASURED, *TESTED):
         names[column] = column
+    for column in OF_CRITERION:
+        if column in rows[0]:
+            names[column] = column
     law_count = len({row["law"] for row in rows})
     records = []
     for start in range(0, len(rows), law_count):
@@ -120,7 +123,11 @@ def _of_one(rows: Sequence["Row"], asked: str) -> Iterator[str]:
     quantities = _quantities(rows)
     chosen = [row for row in rows if row["answer"]]
     grain = f"a grain of {rows[0]['d_m'] * 1000:.4g} mm"
-    yield f"{_subject(rows, asked)} {grain} starts to move at"
+    goes_on = "decides" in chosen[0]
+    starts = (
+        "leaves its pocket in a gust, and goes on," if goes_on else "starts to move"
+    )
+    yield f"{_subject(rows, asked)} {grain} {starts} at"
     width = max(map(len, quantities.values()))
     listed = quantities
     if len(chosen) > 1:
@@ -130,6 +137,8 @@ def _of_one(rows: Sequence["Row"], asked: str) -> Iterator[str]:
         for row in chosen:
             cells.append(f"{_cell(row[column]):10}")
         yield f"  {'  '.join(cells)}".rstrip()
+    if goes_on:
+        yield from _criteria(chosen)
     yield ""
     for row in chosen:
         of_law = f"{row['law']}: " if len(chosen) > 1 else ""
@@ -141,6 +150,20 @@ def _of_one(rows: Sequence["Row"], asked: str) -> Iterator[str]:
     yield from _as_table(ordered, {"law": "force law", **quantities})
     laws = " and ".join(LAWS_OF[rows[0]["regime"]])
     yield f"\nlaws of the paper's rule: {laws}"
+
+
+def _criteria(chosen: Sequence["Row"]) -> Iterator[str]:
+    """Both criteria of grains that go on, and which of them decides, for each law."""
+    for row in chosen:
+        of_law = f"{row['law']}: " if len(chosen) > 1 else ""
+        leaves = _cell(row["shields_leaves"])
+        goes_on = _cell(row["shields_goes_on"])
+        ceases = _cell(row["shields_cessation"])
+        yield (
+            f"{of_law}mean Shields number at which the gust turns it over {leaves}, "
+            f"at which it goes on {goes_on}: “{row['decides']}” decides; "
+            f"motion ceases below {ceases}"
+        )
 
 
 def _subject(rows: Sequence["Row"], asked: str) -> str:
@@ -168,6 +191,8 @@ def _of_many(rows: Sequence["Row"], asked: str, varied: Sequence[str]) -> Iterat
     if asked == "paper" or len(laws) > 1:
         heads["law"] = "force law"
     heads |= _quantities(rows)
+    if "decides" in rows[0]:
+        heads |= OF_CRITERION
     heads["measured_median"] = "measured"
     heads["measured_curve"] = "curve"
     yield from _as_table(chosen, heads)

@@ -8,8 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.calculator import PARAMETERS, QUANTITIES
+from orchestrator.calculator import (
+    CRITERIA,
+    GOES_ON,
+    LEAVES,
+    PARAMETERS,
+    QUANTITIES,
+)
 from orchestrator.errors import InputError
+from orchestrator.physics import saltation
 from orchestrator.physics.beside import beside
 from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.physics.laws import LAWS, Exposure, law
@@ -34,9 +41,16 @@ from orchestrator.types import FloatArray, Row
 
 Table = dict[str, NDArray[Any]]
 """Columns of equal length by their names."""
+NO_START = f"not reached: no flow up to a Shields number of {saltation.MOST:g} does it"
+NO_END = "not reached: hops have no end, or go on without a flow"
+"""Why a grain has no threshold of going on."""
 
 
-def thresholds(points: Mapping[str, Any], asked: str = AUTO) -> Table:
+def thresholds(
+    points: Mapping[str, Any],
+    asked: str = AUTO,
+    criterion: str = LEAVES,
+) -> Table:
     """Find the thresholds of single grains under every force law.
 
     Parameters
@@ -47,19 +61,25 @@ def thresholds(points: Mapping[str, Any], asked: str = AUTO) -> Table:
     asked
         The law that is asked for, ``auto`` for the default law, or ``paper`` for the
         paper's rule.
+    criterion
+        What a grain must do: one of `CRITERIA`. Grains that go on leave their pockets
+        in a gust of `saltation.PEAK` times the mean stress and hop on after it; their
+        threshold is the larger of the two mean stresses.
 
     Returns
     -------
     dict of str to ndarray
         A row for each point and law, point by point. A gas has winds, a liquid of a
         given depth a mean velocity where its flow is turbulent; the others are NaN. The
-        column ``answer`` is whether the law is one of those asked for.
+        column ``answer`` is whether the law is one of those asked for. Grains that go
+        on have the columns `OF_CRITERION` as well: both stresses, that at which motion
+        ceases, and the criterion that decides.
 
     Raises
     ------
     InputError
-        For a law or a depth that is none, a point that is no scene, or if no law holds
-        anywhere.
+        For a law, a criterion or a depth that is none, a point that is no scene, or if
+        no law holds anywhere.
 
     Examples
     --------
@@ -69,6 +89,9 @@ def thresholds(points: Mapping[str, Any], asked: str = AUTO) -> Table:
     ['bridged'] [0.89]
     """
     _check_law(asked)
+    if criterion not in CRITERIA:
+        what = f"no criterion {criterion!r}"
+        raise InputError(what, "threshold: criterion", f"choose {', '.join(CRITERIA)}")
     grains = _grains(points)
     if "depth" in points:
         _check_depth(grains)
@@ -85,17 +108,26 @@ def thresholds(points: Mapping[str, Any], asked: str = AUTO) -> Table:
         by_law = {name: _threshold(name, exposure, grains) for name in LAWS}
         regimes = regime(by_law["low"], by_law["high"]).astype(object)
         picked = _picked(asked, regimes, by_law["bridged"].friction_velocity, exposure)
+        hops = _hops(grains) if criterion == GOES_ON else None
         blocks = []
         for name, at in by_law.items():
             block = _block(name, at, exposure, grains)
+            kind: Table = {**inputs, "force_law": block["law"]}
+            if hops is not None:
+                block = _going_on(block, hops, exposure, grains)
+                # no interval was tested for them
+                kind["gusts"] = block["decides"]
             block["regime"] = regimes
-            block |= beside({**inputs, **block, "force_law": block["law"]})
+            block |= beside({**block, **kind})
             block["answer"] = np.array([name in laws for laws in picked])
             blocks.append(block)
     table = {name: np.repeat(column, len(LAWS)) for name, column in inputs.items()}
     for name in blocks[0]:
         of_laws = [block[name] for block in blocks]
         table[name] = np.stack(of_laws, axis=1).ravel()
+    if hops is not None and not np.isfinite(table["shields_goes_on"]).any():
+        remedy = f"take the criterion {LEAVES}, or a larger grain"
+        raise InputError(NO_START, "threshold: criterion", remedy)
     if not table["valid"].any():
         remedy = "are all numbers in SI units?"
         raise InputError("no force law holds", "threshold", remedy)
@@ -186,6 +218,67 @@ def _block(name: str, at: Threshold, exposure: Exposure, grains: Table) -> Table
     )
     block["why_not"] = np.array(reasons, object)
     return block
+
+
+def _hops(grains: Table) -> saltation.Thresholds:
+    """The thresholds of the grains as they hop over the bed."""
+    return saltation.tabulated(
+        saltation.Grains.of(
+            grains["diameter"],
+            density=grains["density"],
+            fluid_density=grains["fluid_density"],
+            viscosity=grains["viscosity"],
+            slope_deg=grains["slope_deg"],
+            roughness=grains["roughness"],
+            gravity=grains["gravity"],
+        )
+    )
+
+
+def _going_on(
+    block: Table,
+    hops: saltation.Thresholds,
+    exposure: Exposure,
+    grains: Table,
+) -> Table:
+    """The columns of a force law for grains that leave in a gust, and go on after it.
+
+    Drag and lift are those in the gust at the threshold. A law is valid where it holds
+    for the grain that leaves.
+    """
+    leaves = block["shields"] / saltation.PEAK
+    goes_on = hops.initiation(saltation.PEAK)
+    shields = np.maximum(leaves, goes_on)
+    density = grains["fluid_density"]
+    excess = (grains["density"] - density) * grains["gravity"] * grains["diameter"]
+    ustar = np.sqrt(shields * excess / density)
+    law = LAWS[block["law"][0]]
+    in_gust = ustar * np.sqrt(saltation.PEAK)
+    changed = dict(block)
+    changed |= measurable_speeds(
+        ustar,
+        roughness=grains["roughness"],
+        density=density,
+        viscosity=grains["viscosity"],
+        depth=np.where(density < GAS_BELOW, np.nan, grains["depth"]),
+    )
+    changed["ustar_m_s"] = ustar
+    changed["stress_pa"] = density * ustar**2
+    changed["shields"] = shields
+    changed["reynolds"] = exposure.reynolds(ustar)
+    changed["drag_n"] = law.drag(in_gust, exposure)
+    changed["lift_n"] = law.lift(in_gust, exposure)
+    changed["shields_leaves"] = leaves
+    changed["shields_goes_on"] = goes_on
+    changed["shields_cessation"] = hops.cessation
+    changed["decides"] = np.where(leaves > goes_on, LEAVES, GOES_ON).astype(object)
+    changed["why_not"] = block["why_not"].copy()
+    for row in np.flatnonzero(~np.isfinite(goes_on)).tolist():
+        reason = NO_START if np.isinf(goes_on[row]) else NO_END
+        reasons = [block["why_not"][row], reason]
+        changed["why_not"][row] = "; ".join(filter(None, reasons))
+    changed["valid"] = block["valid"] & np.isfinite(goes_on)
+    return changed
 
 
 def _picked(

@@ -21,6 +21,7 @@ from orchestrator.experiments.strips import PERCENTILES, ROUGH, Strips
 from orchestrator.fidelity.decision import as_asked
 from orchestrator.fidelity.levels import Fields
 from orchestrator.flow.stress import WallStress, bubble
+from orchestrator.physics import saltation
 from orchestrator.physics.constants import GRAVITY
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import CLIFT_GAUVIN, LAWS, Exposure
@@ -67,25 +68,44 @@ class Model(NamedTuple):
         The fields of a scene that it sets.
     gust
         Largest over mean stress of its gusts.
+    goes_on
+        Whether grains must go on hopping after the gust. Such a model has no strips,
+        but one grain in closed form.
+    leaves
+        Whether grains must leave their pockets in the gust.
     """
 
     name: str
     fields: Fields
     gust: float = 1.0
+    goes_on: bool = False
+    leaves: bool = True
 
 
 LONE = {"forces.exposure": "protrusion"}
 """Each grain feels the flow at its own height, as if it stood alone."""
 BALANCED = {"forces.exposure": "protrusion", "forces.sheltering": "balanced"}
 """And the drags add up to the stress of the flow."""
+GUST = peak_over_mean(INTENSITY, EVENTS)
+"""Largest over mean stress of the gusts of the models that have gusts."""
 MODELS = (
     Model("paper", {"forces.law": PAPER}),
+    Model("goes on", {}, GUST, goes_on=True, leaves=False),
+    Model("leaves and goes on", {}, GUST, goes_on=True),
     Model("bridged", {}),
     Model("bridged, protrusion", LONE),
     Model("balanced", BALANCED),
-    Model("balanced, gusts", BALANCED, peak_over_mean(INTENSITY, EVENTS)),
+    Model("balanced, gusts", BALANCED, GUST),
 )
-COLOURS = ("#009e73", "#999999", "#56b4e9", "#e69f00", "#d55e00")
+COLOURS = (
+    "#009e73",
+    "#cc79a7",
+    "#0072b2",
+    "#999999",
+    "#56b4e9",
+    "#e69f00",
+    "#d55e00",
+)
 """Colours of the models in figures."""
 
 
@@ -182,8 +202,39 @@ def over_hump(stress: WallStress) -> pd.DataFrame:
     )
 
 
+def going_on(beds: pd.DataFrame, gust: float, *, leaves: bool) -> FloatArray:
+    """Find the mean stress from which grains go on after a gust, on measured beds.
+
+    Parameters
+    ----------
+    beds
+        The grains and fluids, as `single` takes them.
+    gust
+        Largest over mean stress.
+    leaves
+        Whether a grain must also leave its pocket in the gust: that of `single`, under
+        the law `bridged-gravel`.
+
+    Returns
+    -------
+    FloatArray
+        Shields numbers of the mean flow, of shape (rows,).
+    """
+    grains = saltation.Grains.of(
+        beds["d_m"],
+        density=beds["rho_sol_kg_m3"],
+        fluid_density=beds["rho_f_kg_m3"],
+        viscosity=beds["nu_m2_s"],
+        slope_deg=-np.degrees(np.arctan(beds["slope"])),
+    )
+    shields = saltation.tabulated(grains).initiation(gust)
+    if not leaves:
+        return shields
+    return np.maximum(shields, single(beds, "bridged-gravel").shields / gust)
+
+
 class _Answers(NamedTuple):
-    """The answers of a model without gusts.
+    """The answers of a model, at first without gusts.
 
     Shields numbers of a sphere that stands `clear` or is `level` with its neighbours,
     and of the measured `beds`, shape (rows,); the exponent of `hiding`.
@@ -193,6 +244,11 @@ class _Answers(NamedTuple):
     level: float
     beds: FloatArray
     hiding: float
+
+    def under(self, gust: float) -> "_Answers":
+        """The answers under a gust, as mean stresses; hiding is alike."""
+        mean = _Answers(self.clear / gust, self.level / gust, self.beds / gust, 0.0)
+        return mean._replace(hiding=self.hiding)
 
 
 def _answers(model: Model, strips: Strips, beds: pd.DataFrame) -> _Answers:
@@ -247,22 +303,26 @@ def compared(
     without_gusts: dict[str, _Answers] = {}
     rows = []
     for model in MODELS:
-        # a model with gusts has a part of the same model's stresses without them
-        key = str(model.fields)
-        if key not in without_gusts:
-            without_gusts[key] = _answers(model, strips, beds)
-        answers = without_gusts[key]
+        if model.goes_on:
+            shields = going_on(beds, model.gust, leaves=model.leaves)
+            answers = _Answers(np.nan, np.nan, shields, np.nan)
+        else:
+            # a model with gusts has a part of the same model's stresses without them
+            key = str(model.fields)
+            if key not in without_gusts:
+                without_gusts[key] = _answers(model, strips, beds)
+            answers = without_gusts[key].under(model.gust)
         values = {
             "saddle": speed_of(2500.0, 0.354),
             "top": speed_of(1430.0, 0.707),
             "drag": float(24 / FREE * CLIFT_GAUVIN.factor(np.array(FREE))),
             **lengths,
-            "clear": answers.clear / model.gust,
-            "level": answers.level / model.gust,
+            "clear": answers.clear,
+            "level": answers.level,
             "hiding": answers.hiding,
         }
         parts = [
-            beds.drop(columns="bond").assign(value=answers.beds / model.gust),
+            beds.drop(columns="bond").assign(value=answers.beds),
             others.assign(value=others["what"].map(values)),
             pivots,
             hump,
@@ -405,7 +465,10 @@ Level beds are answered on three poured strips of sand, where a tenth of the exp
 grains has moved, each by its own pivot. `bridged` is the drag and lift of a grain \
 that stands alone, as high as all others; `protrusion` takes its own height over the \
 bed; `balanced` lets the drags on a patch add up to the stress of the flow; gusts are \
-the largest of 100 independent, log-normal stresses of intensity 0.4."""
+the largest of 100 independent, log-normal stresses of intensity 0.4. `goes on` is the \
+least mean stress at which one grain that has left its pocket keeps hopping after such \
+a gust, in closed form; `leaves and goes on` asks as well that the gust turns it over \
+its neighbour."""
 SHIELDS_TEXT = """\
 Measured thresholds and those of the models. The Galileo number has no threshold in \
 it: both axes are independent."""

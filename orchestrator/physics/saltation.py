@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 
 from orchestrator.physics import velocity
 from orchestrator.physics.constants import GRAVITY
+from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import CLIFT_GAUVIN, SAND_GRAIN
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
@@ -247,6 +248,11 @@ class Gust(NamedTuple):
 
 CALM = Gust()
 """No gust."""
+PEAK = peak_over_mean(0.4, 100)
+"""Stress of the gust that decides, over that of the mean flow: 2.28.
+
+It is the largest of 100 independent stresses of intensity 0.4.
+"""
 STOPS, GOES_ON, ENDLESS = 0, 1, 2
 """What becomes of a grain: it is trapped, goes on, or its trajectory does not end."""
 

@@ -11,6 +11,7 @@ import pytest
 
 from orchestrator import cli
 from orchestrator.calculator import QUANTITIES
+from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import LAWS
 
 Ended = tuple[int, str, str]
@@ -261,3 +262,69 @@ def test_gravel_is_answered_by_a_law_that_holds(run: Run) -> None:
     lines = run(*sizes)[1].splitlines()
     assert lines[0] == "Force law bridged and bridged-gravel"
     assert all(line.endswith("yes") for line in lines[2:5])
+
+
+def test_grains_that_go_on_have_the_larger_of_two_stresses(run: Run) -> None:
+    asked = [*QUARTZ_IN_WATER, "--depth", "1", "--json"]
+    leaves = _json(run(*asked))
+    both = _json(run(*asked, "--criterion", "goes on"))
+    for law in LAWS:
+        of_law = both[law]
+        gust = peak_over_mean(0.4, 100)
+        assert of_law["shields_leaves"] == pytest.approx(leaves[law]["shields"] / gust)
+        larger = max(of_law["shields_leaves"], of_law["shields_goes_on"])
+        assert of_law["shields"] == larger
+        decides = "leaves" if larger == of_law["shields_leaves"] else "goes on"
+        assert of_law["decides"] == decides
+        assert of_law["stress"] == pytest.approx(larger * 1650 * 9.81 * 5e-4)
+        assert of_law["friction_velocity"] ** 2 * 1000 == pytest.approx(
+            of_law["stress"]
+        )
+        assert of_law["tested_rows"] == 0
+    # the default is as it was, and names no criterion
+    assert _json(run(*asked, "--criterion", "leaves")) == leaves
+    assert "decides" not in leaves["bridged"]
+
+
+def test_the_forces_on_a_grain_that_goes_on_are_those_of_the_gust(run: Run) -> None:
+    # where leaving decides, the grain is turned over by the gust: the forces of its threshold
+    sand = ["--diameter", "5e-4", "--density", "2650", "--fluid", "air", "--json"]
+    leaves = _json(run(*sand))["bridged"]
+    both = _json(run(*sand, "--criterion", "goes on"))["bridged"]
+    assert both["decides"] == "leaves"
+    assert both["drag"] == pytest.approx(leaves["drag"])
+    assert both["lift"] == pytest.approx(leaves["lift"])
+    assert both["friction_velocity"] < leaves["friction_velocity"]
+
+
+def test_text_says_which_criterion_decides(run: Run) -> None:
+    one = run(*QUARTZ_IN_WATER, "--depth", "1", "--criterion", "goes on")[1]
+    assert "“goes on” decides; motion ceases below" in one
+    many = run(
+        "--diameter", RANGE, "--density", "2650", *WATER, "--criterion", "goes on"
+    )
+    head, *rows = many[1].splitlines()[1:7]
+    assert "leaves" in head
+    assert "decides" in head
+    assert all("goes on" in row for row in rows[:5])
+
+
+def test_a_criterion_that_is_none_and_a_grain_that_never_goes_on_are_refused(
+    run: Run,
+) -> None:
+    code, _, err = run(*D, "--criterion", "gone")
+    assert code == 2
+    assert "--criterion: no criterion 'gone' (choose leaves, goes on)" in err
+    dust = ["--diameter", "1e-6", "--density", "2650", *WATER]
+    code, _, err = run(*dust, "--criterion", "goes on")
+    assert code == 2
+    assert "not reached" in err
+    assert run(*dust)[0] == 0
+    # beside one that goes on it has a reason
+    records = _json(
+        run("--diameter", "1e-6:1e-3:2", *dust[2:], "--criterion", "goes on", "--json")
+    )
+    assert not records[0]["bridged"]["valid"]
+    assert "not reached" in records[0]["bridged"]["why_not"]
+    assert records[0]["bridged"]["shields"] is None
+    assert records[1]["bridged"]["valid"]

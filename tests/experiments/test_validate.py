@@ -180,3 +180,25 @@ def test_the_rows_of_the_wind_tunnel_are_on_their_curve() -> None:
     assert len(d) > 0
     _, curve = air.shields_diagram(d, iversen_white(d, air))
     assert tunnel["shields"].to_numpy() == pytest.approx(curve, rel=1e-3)
+
+
+def test_grains_that_go_on_are_as_near_as_the_documents_say() -> None:
+    beds = pd.read_csv(validate.FOLDER / "beds.csv")
+    shields = validate.going_on(beds, validate.GUST, leaves=True)
+    rows = beds.assign(model="m", ratio=shields / beds["shields"], sure="read")
+    factors = validate.scores(rows).set_index("set")["factor"]
+    said = {
+        "flumes, fixed intensity": 1.16,
+        "flumes, reference transport": 1.32,
+        "flumes, visual": 1.55,
+        "steep flumes": 3.63,
+        "steep flumes, large elements": 1.39,
+        "wind, field": 1.19,
+        "wind tunnel, curve": 1.26,
+    }
+    assert factors.to_dict() == pytest.approx(said, rel=0.01)
+    # in water a grain that leaves stops with its gust; in air one that leaves goes on
+    alone = validate.going_on(beds, validate.GUST, leaves=False)
+    in_water = beds["rho_f_kg_m3"] > 100
+    assert (alone[in_water] == shields[in_water]).mean() > 0.95
+    assert (alone[~in_water] < shields[~in_water]).all()
