@@ -123,6 +123,18 @@ M. Beladjine, M. Ammi, L. Oger and A. Valance, Phys. Rev. E 75, 061305, 2007,
 doi:10.1103/PhysRevE.75.061305.
 """
 
+SIMULATED = {
+    0.9: Rebound(whole=(0.717, 0.484), normal=(0.293, 0.187), trapped=0.12, level=0.7),
+    0.55: Rebound(whole=(0.692, 0.506), normal=(0.252, 0.187), trapped=0.12, level=0.7),
+    0.25: Rebound(whole=(0.682, 0.527), normal=(0.225, 0.178), trapped=0.12, level=0.7),
+}
+"""Spheres thrown at poured beds of the same spheres by LIGGGHTS, by restitution.
+
+The friction coefficient is 0.5. The shots are in ``docs/measured/rebounds.csv``, made
+by ``tools/rebound.py``. Nothing takes these laws by default: they say how much hangs on
+the rebound.
+"""
+
 
 @dataclass(frozen=True, init=False, eq=False)
 class Grains:
