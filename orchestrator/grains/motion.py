@@ -45,6 +45,12 @@ BURST = 10.0  # kinetic energy per grain, over W d, that no fall of a grain can 
 REMEDY = (
     "a smaller protocol.time_step or grain.damping, or look for grains that overlap"
 )
+POURED_REMEDY = (
+    "another bed.seed, a gentler slope, or a larger grain.friction_angle_deg; the springs "
+    "of a poured bed are at most of grain.stiffness = 1e5"
+)
+"""Of poured beds. Grains that have come to rest on a slope roll off it when the springs
+or the fixed grains under them are others; a smaller time step changes nothing."""
 
 
 @dataclass(frozen=True)
@@ -364,11 +370,12 @@ def check_rest(
     stiffness: float,
     *,
     all_rest: bool,
+    remedy: str = REMEDY,
 ) -> None:
     """See that a bed of grains came to rest before the flow rose, judged by their energy.
 
     The weight W is in N, the stiffness is K d/W. All grains of a pile must come to rest; of cells
-    some grains may fall out. Raises `Exploded` if the energy is no number, grows, or has driven
+    some grains may fall out. The errors name the remedy. Raises `Exploded` if the energy is no number, grows, or has driven
     grains away, `Noisy` if the grains keep moving.
     """
     settling, where = (
@@ -382,13 +389,13 @@ def check_rest(
     )
     if not energy.max() < BURST:
         what = f"the bed burst as it settled: {energy.max():.2g} W d of kinetic energy per grain"
-        raise Exploded(what, where=where, remedy=REMEDY)
+        raise Exploded(what, where=where, remedy=remedy)
     if not all_rest:
         return
     lost = grains.mobile_count - int(settling["grains"].iloc[-1])
     if lost:
         what = f"{lost} of {grains.mobile_count} grains were lost before the flow rose"
-        raise Exploded(what, where=where, remedy=REMEDY)
+        raise Exploded(what, where=where, remedy=remedy)
     energy *= stiffness
     last = float(energy[-LAST:].max())
     if last < NOISE:
@@ -398,8 +405,8 @@ def check_rest(
     if quarters[3] > GROWS * quarters[1]:
         ratio = quarters[3] / quarters[1]
         what = f"the energy of the bed at rest grows: {text}, {ratio:.1f} times the earlier"
-        raise Exploded(what, where=where, remedy=REMEDY)
+        raise Exploded(what, where=where, remedy=remedy)
     what = (
         f"the bed does not come to rest: {text}; {NOISE:g} is the most of a bed at rest"
     )
-    raise Noisy(what, where=where, remedy=REMEDY)
+    raise Noisy(what, where=where, remedy=remedy)

@@ -416,7 +416,12 @@ class PileCase(GrainCase):
         scene, (loads, worn) = self.scene, self._state(directory.parent)
         grains = table(loads, worn)
         motion.check_rest(
-            directory, grains, scene.weight, scene.grain.stiffness, all_rest=True
+            directory,
+            grains,
+            scene.weight,
+            scene.grain.stiffness,
+            all_rest=True,
+            remedy=motion.POURED_REMEDY if scene.is_poured else motion.REMEDY,
         )
         criterion = scene.protocol.displacement_criterion
         moved = motion.read(directory, grains, criterion, falls_out=False)
