@@ -10,9 +10,16 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.experiments.strips import MOVED
-from orchestrator.experiments.validate import EVENTS, INTENSITY, MODELS, single
+from orchestrator.experiments.validate import (
+    EVENTS,
+    GUST,
+    INTENSITY,
+    MODELS,
+    going_on,
+    single,
+)
 from orchestrator.fidelity.levels import changed
-from orchestrator.physics.beside import kind_of
+from orchestrator.physics.beside import GOES_ON, kind_of
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.threshold import PAPER
 from orchestrator.study import fields as columns
@@ -24,6 +31,8 @@ FLUMES = ("flumes, visual", "flumes, fixed intensity", "flumes, reference transp
 DECADES = (0.1, 1.0, 10.0, 100.0, 1000.0, 1e4)
 LEAST = 10
 """Ranges of Re* of the intervals, and the fewest rows of one."""
+GOING_ON = ("bridged", "bridged-gravel")
+"""Force laws of the grains that go on whose intervals are found: those of the default."""
 BETAS, RATIOS = (60.0, 50.0, 45.0), (30.0, 10.0)
 """Entrainment angles (deg) and d/z0 of the single grains whose intervals are found."""
 
@@ -55,6 +64,18 @@ def intervals(rows: pd.DataFrame, strip: Scene) -> pd.DataFrame:
             "bed": "grain",
         }
         answers[kind_of({**usual, **row})] = np.where(at.valid, at.shields, np.nan)
+    for law, beta, ratio in itertools.product(GOING_ON, BETAS, RATIOS):
+        row = {
+            "force_law": law,
+            "beta_deg": beta,
+            "d_m": 1.0,
+            "z0_m": 1 / ratio,
+            "bed": "grain",
+            "criterion": GOES_ON,
+        }
+        answers[kind_of({**usual, **row})] = going_on(
+            beds, GUST, leaves=True, law=law, beta_deg=beta, ratio=ratio
+        )
     of_strips = (each for each in MODELS if each.name != PAPER and not each.goes_on)
     for model, law in itertools.product(of_strips, ("bridged", "bridged-gravel")):
         gusts = {"intensity": INTENSITY, "events": EVENTS} if model.gust > 1 else None

@@ -115,8 +115,7 @@ def thresholds(
             kind: Table = {**inputs, "force_law": block["law"]}
             if hops is not None:
                 block = _going_on(block, hops, exposure, grains)
-                # no interval was tested for them
-                kind["gusts"] = block["decides"]
+                kind["criterion"] = np.full(len(block["law"]), GOES_ON, object)
             block["regime"] = regimes
             block |= beside({**block, **kind})
             block["answer"] = np.array([name in laws for laws in picked])

@@ -202,7 +202,15 @@ def over_hump(stress: WallStress) -> pd.DataFrame:
     )
 
 
-def going_on(beds: pd.DataFrame, gust: float, *, leaves: bool) -> FloatArray:
+def going_on(
+    beds: pd.DataFrame,
+    gust: float,
+    *,
+    leaves: bool,
+    law: str = "bridged-gravel",
+    beta_deg: float = 60,
+    ratio: float = 30,
+) -> FloatArray:
     """Find the mean stress from which grains go on after a gust, on measured beds.
 
     Parameters
@@ -212,8 +220,11 @@ def going_on(beds: pd.DataFrame, gust: float, *, leaves: bool) -> FloatArray:
     gust
         Largest over mean stress.
     leaves
-        Whether a grain must also leave its pocket in the gust: that of `single`, under
-        the law `bridged-gravel`.
+        Whether a grain must also leave its pocket in the gust: that of `single`.
+    law, beta_deg
+        Force law and entrainment angle (degrees) of that.
+    ratio
+        Diameter over roughness length, d/z0.
 
     Returns
     -------
@@ -226,11 +237,12 @@ def going_on(beds: pd.DataFrame, gust: float, *, leaves: bool) -> FloatArray:
         fluid_density=beds["rho_f_kg_m3"],
         viscosity=beds["nu_m2_s"],
         slope_deg=-np.degrees(np.arctan(beds["slope"])),
+        roughness=beds["d_m"] / ratio,
     )
     shields = saltation.tabulated(grains).initiation(gust)
     if not leaves:
         return shields
-    return np.maximum(shields, single(beds, "bridged-gravel").shields / gust)
+    return np.maximum(shields, single(beds, law, beta_deg, ratio).shields / gust)
 
 
 class _Answers(NamedTuple):

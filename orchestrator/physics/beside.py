@@ -57,10 +57,13 @@ OF_KIND = (
         "poured_depth",
     ),
     *("answered_mobile_layers", "counted", "loaded_grains", "length", "h_m"),
+    "criterion",
 )
 """Columns that the kind of a threshold follows from."""
 LENGTHS = ("d_m", "length", "h_m")
 """Those of them that are lengths, of which the ratios to z0 alone matter."""
+GOES_ON = "goes on"
+"""The criterion of the kinds of grains that must go on after a gust."""
 LEAST_LENGTH = 20.0
 """Length of the strips whose intervals were found, d: shorter ones have too few grains."""
 
@@ -135,6 +138,8 @@ def kind_of(row: Mapping[str, Any]) -> str:
     words = [row["force_law"], f"z0 d/{row['d_m'] / row['z0_m']:.3g}"]
     if row.get("bed", "grain") == "grain":
         words += ["grain", f"beta {row['beta_deg']:g}"]
+        if row.get("criterion") == GOES_ON:
+            words.append(GOES_ON)
     elif _is_strip(row):
         words += ["strip", f"phi {row['phi_deg']:g}", f"{row['poured_depth']:g} d deep"]
         words += [

@@ -280,7 +280,11 @@ def test_grains_that_go_on_have_the_larger_of_two_stresses(run: Run) -> None:
         assert of_law["friction_velocity"] ** 2 * 1000 == pytest.approx(
             of_law["stress"]
         )
-        assert of_law["tested_rows"] == 0
+    # its interval is that of grains that go on, not that of the same law's pivot
+    assert both["bridged"]["tested_rows"] > 10
+    held = [record["bridged"]["tested_low"] for record in (both, leaves)]
+    assert held[0] != pytest.approx(held[1], rel=0.01)
+    assert both["zeng"]["tested_rows"] == 0
     # the default is as it was, and names no criterion
     assert _json(run(*asked, "--criterion", "leaves")) == leaves
     assert "decides" not in leaves["bridged"]
