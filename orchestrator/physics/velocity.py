@@ -261,7 +261,7 @@ def open_water_reynolds(
     --------
     >>> water = {"roughness": 1e-4, "viscosity": 1e-6, "depth": 0.5}
     >>> print(open_water_reynolds(0.05, **water).round(-3))
-    459000.0
+    458000.0
     """
     z0 = outer_roughness(roughness, ustar, viscosity)
     mean = depth_mean_speed(ustar, depth, z0, closed=closed)
@@ -270,7 +270,23 @@ def open_water_reynolds(
 
 
 def laminar(reynolds: float) -> str:
-    """Why a flow of a Reynolds number below `LAMINAR_BELOW` has no logarithmic law."""
+    """Say why a flow below `LAMINAR_BELOW` has no logarithmic law.
+
+    Parameters
+    ----------
+    reynolds
+        Reynolds number of the flow, speed times depth over nu.
+
+    Returns
+    -------
+    str
+        The reason.
+
+    Examples
+    --------
+    >>> "below 2000" in laminar(117.0)
+    True
+    """
     said = f"speed times depth over nu, {reynolds:.0f}, is below {LAMINAR_BELOW:g}"
     return f"laminar flow: {said}"
 
@@ -470,12 +486,12 @@ def bridge(ustar: FloatArray, viscous: FloatArray, rough: FloatArray) -> FloatAr
 def law_of_the_wall(height: FloatArray, roughness: FloatArray) -> FloatArray:
     """Compute the mean speed over a smooth, rough or transitional wall, in closed form.
 
-    On a smooth wall it is H. Reichardt's profile (Z. Angew. Math. Mech. 31, 1951,
-    doi:10.1002/zamm.19510310704), from the sublayer ``U = y`` to the logarithm. The
-    roughness lowers the speed by ``ln(1 + 0.3 k (1 - exp(-k/26)))/kappa``, as T. Pahtz
-    and O. Duran have it (arXiv 1602.07079): nothing on a smooth wall, and on a rough
-    one so much that the profile is that over ``z0 = k_s/33``. It lies within 0.45 ustar
-    of Nikuradse's sand in between, where Colebrook's sum (`outer_roughness`) is up to 2
+    On a smooth wall it is H. Reichardt's profile (Z. Angew. Math. Mech. 31, 1951), as
+    public codes have it, from the sublayer ``U = y`` to the logarithm. The roughness
+    lowers the speed by ``ln(1 + 0.3 k (1 - exp(-k/26)))/kappa``, as T. Pahtz and O.
+    Duran have it (arXiv 1602.07079): nothing on a smooth wall, and on a rough one so
+    much that the profile is that over ``z0 = k_s/33``. It lies within 0.45 ustar of
+    Nikuradse's sand in between, where Colebrook's sum (`outer_roughness`) is up to 2
     ustar lower.
 
     Parameters
