@@ -27,7 +27,7 @@ calibration: setup  ## measure the fidelity levels and the maps anew, for the pa
 	$(PYTHON) -m orchestrator stability
 	$(PYTHON) -m orchestrator budget
 	$(PYTHON) -m orchestrator validate
-	cp results/ladder/tables/levels.csv results/stability/tables/maps.csv orchestrator/fidelity/calibration/
+	cp results/ladder/tables/errors.csv results/stability/tables/maps.csv orchestrator/fidelity/calibration/
 	cp results/budget/tables/budget.csv orchestrator/fidelity/calibration/
 	$(PYTHON) tools/tested.py results/validate/tables/measured.csv > tested.csv
 	mv tested.csv orchestrator/physics/tested.csv

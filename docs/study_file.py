@@ -11,6 +11,7 @@ from pydantic_core import PydanticUndefined
 
 from orchestrator.fidelity import limits
 from orchestrator.study import fields, profile, scene
+from orchestrator.study.fidelities import AUTO, WRITTEN
 from orchestrator.study.fields import Quantity
 from orchestrator.study.study import BED, TIME_LIMIT_S
 
@@ -107,6 +108,35 @@ SIGNS = {
 COLUMNS = "| field | symbol, unit, range | default | meaning | scope | column |"
 
 
+FIDELITIES = f"""## Fidelities
+
+`protocol.fidelity` names a fidelity, a set of numbers for flow and grains: `fidelity = "paper"` is
+the same as writing its numbers. A number that the file writes itself stands before that of the
+fidelity. With `"{AUTO}"`, the default, the program chooses one by known errors
+([ladder.md](ladder.md)). A single grain takes the numbers of the grains alone, and over a level bed
+no flow is solved.
+
+| fidelity | meaning | fields |
+|---|---|---|
+"""
+
+
+def fidelities() -> str:
+    """The section of the fidelities, in Markdown."""
+    rows = []
+    for name, written in WRITTEN.items():
+        numbers = [
+            f"`{key}` {value}"
+            for key, value in (written["flow"] | written["grains"]).items()
+        ]
+        cell = ", ".join(numbers)
+        for packing, fields_on in written.get("on", {}).items():
+            others = ", ".join(f"`{key}` {value}" for key, value in fields_on.items())
+            cell += f"; {packing}: {others}"
+        rows.append(f"| `{name}` | {written['meaning']} | {cell} |")
+    return FIDELITIES + "\n".join(rows) + "\n"
+
+
 def text() -> str:
     """The reference, in Markdown."""
     lines = [HEAD]
@@ -119,6 +149,7 @@ def text() -> str:
             _row(each) for each in fields.FIELDS if each.name.startswith(f"{part}.")
         )
         lines += [*(f"| {' | '.join(row)} |" for row in rows), ""]
+    lines.append(fidelities())
     lines.append("## Limits\n\n| field | refused | remedy |\n|---|---|---|")
     lines += [f"| `{name}` | {' | '.join(words)} |" for name, words in LIMITS.items()]
     return "\n".join(lines) + "\n"

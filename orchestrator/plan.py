@@ -32,7 +32,7 @@ SORT_S = (
 )
 BYTES = 2.2e6  # mean size of a case of the preset `paper`
 BY_DEM = 'protocol.method = "dem", without a tolerance, answers its scenes as they are written'
-"""What to do where a run on levels that were chosen has failed."""
+"""What to do where a run of a chosen fidelity has failed."""
 
 
 @dataclass(frozen=True)

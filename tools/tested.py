@@ -18,13 +18,13 @@ from orchestrator.experiments.validate import (
     going_on,
     single,
 )
-from orchestrator.fidelity.levels import changed
 from orchestrator.physics.beside import GOES_ON, kind_of
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.threshold import PAPER
 from orchestrator.study import fields as columns
 from orchestrator.study import study
 from orchestrator.study.scene import Scene
+from orchestrator.study.study import changed
 
 FLUMES = ("flumes, visual", "flumes, fixed intensity", "flumes, reference transport")
 """Sets of level beds in flumes, whose rows an interval holds."""

@@ -1,6 +1,6 @@
-"""The budget: how far the choices that all fidelity levels share move a threshold.
+"""The budget: how far the choices that all fidelities share move a threshold.
 
-A choice is changed alone, on the cheapest levels that feel it.
+A choice is changed alone, by the cheapest fidelity that feels it.
 """
 
 from collections.abc import Iterator, Sequence
@@ -15,17 +15,10 @@ from matplotlib.figure import Figure as Canvas
 from orchestrator import plan
 from orchestrator.errors import InputError
 from orchestrator.experiments.experiment import Experiment, Results, Runs, label, piles
-from orchestrator.fidelity import levels, limits
-from orchestrator.fidelity.decision import Decision, on_levels
-from orchestrator.fidelity.levels import (
-    FROZEN,
-    PEELING,
-    Fields,
-    Pair,
-    changed,
-    level,
-    value_of,
-)
+from orchestrator.fidelity import limits, spread
+from orchestrator.fidelity.decision import Decision, on_fidelity
+from orchestrator.fidelity.fidelities import OWN, Fidelity, Fields, named
+from orchestrator.fidelity.spread import FROZEN
 from orchestrator.grains.pile import Pile
 from orchestrator.physics.laws import LAWS
 from orchestrator.report import style
@@ -34,15 +27,13 @@ from orchestrator.report.results import FRACTION
 from orchestrator.report.style import Figure
 from orchestrator.study.closed_form import law_holds
 from orchestrator.study.scene import Scene
-from orchestrator.study.study import Study
+from orchestrator.study.study import Study, changed, value_of
 from orchestrator.tables.rows import shields
 
-COARSE = level("flow", "coarse")
-"""Level of a solved flow; another flow model is kept."""
-DYNAMIC = level("grains", "1 layer, fast")
-"""Level for a choice that dynamics alone feel."""
-DYNAMIC_POURED = level("grains", "4 layers, fast")
-"""The same on poured beds."""
+QUASI_STATIC = named("static")
+"""Fidelity of the choices but for those that dynamics alone feel."""
+DYNAMIC = named("paper")
+"""Fidelity whose grains move where a choice is felt by dynamics alone."""
 SEEDS = (1, 2, 3)
 """Other draws of a random packing that are as good."""
 QUANTITIES = {
@@ -69,7 +60,7 @@ BASE = "as asked"
 
 @dataclass(frozen=True)
 class Choice:
-    """One choice that all levels share, and what else it could be.
+    """One choice that all fidelities share, and what else it could be.
 
     Attributes
     ----------
@@ -104,8 +95,8 @@ class Choice:
     of_solved_flow: bool = False
     dynamic: bool = False
 
-    def levels(self, scene: Scene) -> Pair:
-        """Choose the levels on which it is changed in a scene.
+    def fidelity(self, scene: Scene) -> Fidelity:
+        """Choose the fidelity by which it is changed in a scene.
 
         Parameters
         ----------
@@ -114,14 +105,12 @@ class Choice:
 
         Returns
         -------
-        Pair
-            The levels of the flow and of the grains.
+        Fidelity
+            The flow is that of `QUASI_STATIC`; a flow model that is not solved is kept.
         """
-        flow = COARSE if scene.flow.model == "solve" else levels.AS_ASKED
-        grains = PEELING
-        if self.dynamic:
-            grains = DYNAMIC_POURED if scene.is_poured else DYNAMIC
-        return Pair(flow, grains)
+        flow = QUASI_STATIC.flow if scene.flow.model == "solve" else OWN
+        grains = DYNAMIC.grains if self.dynamic else QUASI_STATIC.grains
+        return Fidelity(f"{flow.name} | {grains.name}", "", flow, grains)
 
     def scenes(self, scene: Scene) -> Iterator[tuple[str, Scene]]:
         """List the alternatives that a scene can have.
@@ -296,7 +285,7 @@ CHOICES: tuple[Choice, ...] = (
         of_solved_flow=True,
     ),
 )
-"""The choices that every fidelity level shares."""
+"""The choices that all fidelities share."""
 
 
 class Change(NamedTuple):
@@ -339,13 +328,13 @@ def changes(study: Study) -> tuple[list[Change], dict[str, Decision]]:
     why = "the budget changes one choice"
     for scene in piles(study):
         for choice in CHOICES:
-            pair = choice.levels(scene)
-            start = f"{scene.id} | {pair.text} | "
+            fidelity = choice.fidelity(scene)
+            start = f"{scene.id} | {fidelity.name} | "
             base = f"{start}{BASE}"
-            asked[base] = on_levels(scene, pair, why)
+            asked[base] = on_fidelity(scene, fidelity, why)
             for name, changed_scene in choice.scenes(scene):
                 other = f"{start}{choice.name}: {name}"
-                asked[other] = on_levels(changed_scene, pair, why)
+                asked[other] = on_fidelity(changed_scene, fidelity, why)
                 listed.append(Change(scene, choice, name, base, other))
     return listed, asked
 
@@ -426,7 +415,7 @@ def measure(listed: Sequence[Change], runs: Runs) -> pd.DataFrame:
         of_scene = {
             "scene_id": change.scene.id,
             "scene": label(change.scene),
-            "model_class": levels.model_class(change.scene),
+            "model_class": spread.model_class(change.scene),
             "choice": change.choice.name,
             "alternative": change.alternative,
         }
@@ -486,17 +475,17 @@ def known(shared: pd.DataFrame) -> pd.DataFrame:
 
 
 TOGETHER_TEXT = """\
-The fidelity levels are measured against the best one. What all of them share does \
+The fidelities are measured against the best one. What all of them share does \
 not show there: it is changed here, one choice at a time. Each bar spans the largest \
 change over the fractions, downwards and upwards; the top bar is the root of the sum \
 of squares, as if the choices had nothing to do with one another."""
 SCENE_TEXT = """\
-Quasi-static levels (coarse flow, peeling) except for the friction angle, which DEM \
+The fidelity `static` (peeling) except for the friction angle, which DEM \
 alone feels. The Shields number is that of the mean stress on the grains that moved; \
 u*₀ is that of the flow far from the bed. tables/shares.csv has the share of each \
 choice at each fraction."""
 CHANGING_TEXT = """\
-The levels keep the flow over the whole pile until the end, as the paper does. Here \
+All fidelities keep the flow over the whole pile to the end, as the paper does. Here \
 the bed line is drawn anew after each tenth of the counted grains, the flow is solved \
 again, and the grains go on by peeling. The table has the threshold on the bed that \
 changes over that on the frozen one, less 1."""
@@ -585,7 +574,7 @@ def _from_usual(fraction: float) -> float:
 
 def _interval(largest: pd.DataFrame, quantity: str, value: float) -> _Interval:
     """A value with the interval of all choices together."""
-    low, high = levels.together(largest, quantity)
+    low, high = spread.together(largest, quantity)
     widths = largest[f"{quantity}_low"] + largest[f"{quantity}_high"]
     return _Interval(value, low, high, most=str(widths.idxmax()))
 
@@ -660,7 +649,7 @@ def tornado(largest: pd.DataFrame) -> Canvas:
     largest = largest.loc[rising.index]
     total: list[float] = []
     for name in QUANTITIES:
-        total += levels.together(largest, name)
+        total += spread.together(largest, name)
     together = pd.DataFrame([total], columns=ENDS, index=["all together"])
     rows = pd.concat([largest, together])
     canvas = style.canvas(0.28 * len(rows) + 1.0)

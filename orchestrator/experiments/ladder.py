@@ -1,12 +1,13 @@
-"""The ladder: what each fidelity level costs, and how far its thresholds are from the reference.
+"""The ladder: what each rung costs, and how far its thresholds are from the reference.
 
-The levels of the grains are run on the flow of the reference, those of the flow with the grains by
-peeling, so that each error is that of one part; a few pairs as they are used show that the errors
-add up.
+The rungs of the grains are run on the flow of the reference, those of the flow with the
+grains by peeling, so that each error is that of one part; the fidelities, which have
+one rung of each, show that the errors add up.
 """
 
 import math
 import time
+import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -30,9 +31,17 @@ from orchestrator.experiments.experiment import (
     label,
     piles,
 )
-from orchestrator.fidelity import levels, limits
-from orchestrator.fidelity.decision import Decision, on_levels
-from orchestrator.fidelity.levels import FLAT, LEVELS, PEELING, Pair, level
+from orchestrator.fidelity import limits, spread
+from orchestrator.fidelity.classes import FLOW, GRAINS, LEVEL_BED, scene_class
+from orchestrator.fidelity.decision import Decision, on_fidelity
+from orchestrator.fidelity.fidelities import (
+    FIDELITIES,
+    FLAT,
+    REFERENCE,
+    Fidelity,
+    Rung,
+    packing,
+)
 from orchestrator.grains.loads import forget
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import of_pile
@@ -45,26 +54,37 @@ from orchestrator.study.study import Study
 from orchestrator.tables.rows import point
 from orchestrator.types import Row
 
-FINE = level("flow", "fine")
+
+def _rungs() -> dict[str, tuple[Rung, ...]]:
+    data = tomllib.loads(
+        Path(__file__).with_name("rungs.toml").read_text(encoding="utf-8")
+    )
+    more = {part: [Rung(**row) for row in rows] for part, rows in data.items()}
+    return {
+        FLOW: (FLAT, *more[FLOW], *(one.flow for one in FIDELITIES)),
+        GRAINS: (*more[GRAINS], *(one.grains for one in FIDELITIES)),
+    }
+
+
+RUNGS = _rungs()
+"""All rungs, by the part of a pile that they answer."""
+PEELING = next(one.grains for one in FIDELITIES if one.name == "static")
+AGAIN, FINER = "soft reference", "finest"
+"""Rungs as good as those of the reference, with all of their numbers changed."""
 REFERENCES = (
-    (("fine", "reference"), ("fine", "soft reference")),
-    (("flat", "reference"), ("flat", "soft reference")),
-    (("fine", "peeling"), ("finest", "peeling")),
+    ((REFERENCE.name, REFERENCE.name), (REFERENCE.name, AGAIN)),
+    ((FLAT.name, REFERENCE.name), (FLAT.name, AGAIN)),
+    ((REFERENCE.name, PEELING.name), (FINER, PEELING.name)),
 )
-"""The reference of a scene is the first of these pairs that it has (over a level bed no flow is
-solved); beside it stands a pair as good with all of its numbers changed: the uncertainty."""
-USED = (  # together
-    ("waves", "pivot"),
-    ("coarse", "1 layer, coarse"),
-    ("coarse", "1 layer, fast"),
-    ("standard", "1 layer, fast"),
-    ("standard", "1 layer, slow"),
-)
-CURVE = np.arange(0.05, 0.86, 0.05)  # fractions at which whole curves are compared
+"""The reference of a scene is the first of these pairs that it has (over a level bed no
+flow is solved); beside it stands a pair as good with all of its numbers changed: the
+uncertainty."""
+MOST_WHOLE = 24  # exposed grains of piles on which whole fidelities are run
+CURVE = np.arange(0.05, 0.76, 0.05)  # fractions at which whole curves are compared
 HEADS = {f"error_{n}": f"$n/N$ = {n} %" for n in (10, 30, 50, 70)} | {
     "error_curve": "whole curve"
 }
-LEVEL_PAIR = ["flow_level", "grain_level"]
+PAIR = ["flow_rung", "grain_rung"]
 FLOOR = 1e-3  # errors below it are drawn on it
 BANDS = (
     ("error of the reference itself", "0.88"),
@@ -75,12 +95,12 @@ MARKS: Mapping[str, Look] = {
     "threshold too low": {"marker": "v", "mfc": "0.2"},
     "hollow: another model": {"marker": "^", "mfc": "white"},
 }
-METHODS = {"pivot": "#009e73", "peeling": "#d55e00", "DEM": "#0072b2"}
+METHODS = {"quick": "#009e73", "static": "#d55e00", "DEM": "#0072b2"}
 FRONT: Look = {"color": "0.25", "lw": 0.9, "zorder": 1.5}
 
 
 def experiment(study: Study, out: Path) -> Experiment:
-    """What each level costs and how far it is off, on the piles of a study."""
+    """What each rung costs and how far it is off, on the piles of a study."""
     limits.check_study(study)
     pairs = decisions(study)
     planned = plan.of(pairs, cases=out.absolute() / "cases")
@@ -90,9 +110,9 @@ def experiment(study: Study, out: Path) -> Experiment:
         if measured.empty or (compared := errors(measured)).empty:
             return {}, ()
         means = together(compared)
-        rows = compared.merge(means[["packing", *LEVEL_PAIR, "pareto"]], how="left")
+        rows = compared.merge(means[["packing", *PAIR, "pareto"]], how="left")
         known = known_errors(measured)
-        return {"points": rows.fillna({"pareto": False}), "levels": known}, _sections(
+        return {"points": rows.fillna({"pareto": False}), "errors": known}, _sections(
             means, known
         )
 
@@ -108,43 +128,54 @@ def experiment(study: Study, out: Path) -> Experiment:
 
 
 def decisions(study: Study) -> dict[str, Decision]:
-    """Every pile of a study on its pairs of levels, by names for the plan."""
+    """Every pile of a study on its pairs of rungs, by names for the plan."""
     return {
-        f"{scene.id} | {pair.text}": on_levels(
-            scene, pair, "the ladder measures these levels"
+        f"{scene.id} | {pair.name}": on_fidelity(
+            scene, pair, "the ladder measures these rungs"
         )
         for scene, bed in piles(study).items()
         for pair in _pairs(scene, bed)
     }
 
 
-def _pairs(scene: Scene, bed: PileBed) -> Iterator[Pair]:
-    line, by_dem = of_bed(bed), scene.protocol.method == "dem"
+def _pair(flow: Rung, grains: Rung) -> Fidelity:
+    name = f"{flow.name} | {grains.name}"
+    return Fidelity(name, "", flow, grains)
+
+
+def _pairs(scene: Scene, bed: PileBed) -> Iterator[Fidelity]:
+    """The pairs of rungs that are measured on a pile."""
+    is_dem = scene.protocol.method == "dem"
+    line = of_bed(bed)
     exposed = line.lengths[line.counted(bed.counts)].sum() / scene.grain.diameter - 1e-6
-    flows, grains = (
-        [level for level in part if level.takes(scene) and exposed <= level.most_grains]
-        for part in LEVELS.values()
-    )
-    # neither over a level bed nor on a bed in space can the levels of the flow be measured
-    solved = not (bed.is_level or bed.width)
-    if solved:
-        yield from (Pair(flow, PEELING) for flow in flows)
-    if by_dem:
-        yield from (Pair(FLAT if bed.is_level else FINE, level) for level in grains)
-    if solved and by_dem:
-        used = (Pair(level("flow", flow), level("grains", name)) for flow, name in USED)
-        yield from (pair for pair in used if pair.flow in flows)
+
+    def taken(part: str) -> list[Rung]:
+        rungs = [rung for rung in RUNGS[part] if exposed <= rung.most_grains]
+        return [rung for rung in rungs if rung.takes(scene)]
+
+    # over a level bed and on a bed in space no rung of the flow can be measured
+    is_solved = not (bed.is_level or bed.width)
+    if is_solved:
+        yield from (_pair(flow, PEELING) for flow in taken(FLOW))
+    if not is_dem:
+        return
+    best = FLAT if bed.is_level else REFERENCE.flow
+    yield from (_pair(best, grains) for grains in taken(GRAINS))
+    if is_solved and exposed <= MOST_WHOLE:
+        yield from (
+            _pair(one.flow, one.grains) for one in FIDELITIES if one.takes(scene)
+        )
 
 
 def points(pairs: Mapping[str, Decision], runs: Runs) -> pd.DataFrame:
-    """A row for each scene and pair whose runs are done: cost, core-s, and thresholds, Pa."""
-    rows, floors = [], levels.floors()
+    """A row for each scene and pair that is done: cost, core-s, thresholds, Pa."""
+    rows, floors = [], spread.floors()
     for key, decision in pairs.items():
-        pile, scene, pair = runs.planned.piles[key], decision.asked, decision.levels
+        pile, scene, pair = runs.planned.piles[key], decision.asked, decision.fidelity
         if not pair or not runs.are_done(key):
             continue
         motion = pile.motion(runs.cases)
-        here_s = time_alone_s(pile, runs.cases) if pair.grains.name in METHODS else 0.0
+        here_s = 0.0 if pile.method.cases else time_alone_s(pile, runs.cases)
         names = {f"tau_{at:g}": at for at in scene.protocol.fractions}
         names |= {f"curve_{at:.2f}": at for at in CURVE.tolist()}
         speed, density = pile.speed(runs.cases), scene.fluid.density
@@ -152,15 +183,14 @@ def points(pairs: Mapping[str, Decision], runs: Runs) -> pd.DataFrame:
             "scene_id": scene.id,
             "scene": label(scene),
             **point(scene),
-            "packing": levels.packing(scene)
-            + (", level bed" if pile.bed.is_level else ""),
+            "packing": packing(scene) + (", level bed" if pile.bed.is_level else ""),
             "asked": scene.protocol.method,
-            **{f"class_{part}": levels.scene_class(part, scene) for part in LEVELS},
+            **{f"class_{part}": scene_class(part, scene) for part in RUNGS},
             "count": motion.count,
-            "flow_level": pair.flow.name,
-            "grain_level": pair.grains.name,
+            "flow_rung": pair.flow.name,
+            "grain_rung": pair.grains.name,
             "same_model": pair.flow.same_model and pair.grains.same_model,
-            "model_floor": floors.get(levels.model_class(scene), math.nan),
+            "model_floor": floors.get(spread.model_class(scene), math.nan),
             "flow_s": runs.cpu_s(
                 [run for flow in pile.model.cases for run in (*flow.needs, flow)]
             ),
@@ -176,8 +206,8 @@ def points(pairs: Mapping[str, Decision], runs: Runs) -> pd.DataFrame:
 def time_alone_s(pile: Pile, cases: Path) -> float:
     """Time of one core in which the grains of a pile move without a run of DEM, s.
 
-    It is the time of this pile alone: a packing or a threshold that another pile needed before is
-    found again.
+    It is the time of this pile alone: a packing or a threshold that another pile needed
+    before is found again.
     """
     forget()
     alone = Pile(pile.scene, pile.cases)
@@ -189,11 +219,12 @@ def time_alone_s(pile: Pile, cases: Path) -> float:
 def errors(points: pd.DataFrame) -> pd.DataFrame:
     """The points with their relative errors against the reference that their scene has.
 
-    `reference_error` is how far the reference itself moved when all of its numbers were changed.
+    `reference_error` is how far the reference itself moved when all of its numbers were
+    changed.
     """
     parts = [points.iloc[:0]]
     for _, scene in points.groupby("scene_id", sort=False):
-        rows = scene.set_index(LEVEL_PAIR)
+        rows = scene.set_index(PAIR)
         best, again = next(
             (both for both in REFERENCES if both[0] in rows.index), (None, None)
         )
@@ -223,18 +254,17 @@ def errors(points: pd.DataFrame) -> pd.DataFrame:
 
 
 def together(points: pd.DataFrame) -> pd.DataFrame:
-    """One row for each pair and packing of piles by DEM: the mean cost, the largest signed errors.
+    """One row for each pair and packing: the mean cost, the largest signed errors.
 
-    `pareto` marks the pairs that no other of their packing and model beats in both, by the largest
-    error over the four fractions; a pair that did not reach one is left out.
+    `pareto` marks the pairs that no other of their packing and model beats in both, by
+    the largest error over the four fractions; a pair that did not reach one is left
+    out.
     """
 
     def largest(values: pd.Series) -> float:
         return math.nan if values.isna().any() else float(max(values, key=abs))
 
-    rows = points[points["asked"] == "dem"].groupby(
-        ["packing", *LEVEL_PAIR], sort=False
-    )
+    rows = points[points["asked"] == "dem"].groupby(["packing", *PAIR], sort=False)
     means: dict[str, Any] = {
         "piles": ("scene_id", "size"),
         "cost_core_s": ("cost_core_s", "mean"),
@@ -259,25 +289,26 @@ def together(points: pd.DataFrame) -> pd.DataFrame:
 
 
 def known_errors(points: pd.DataFrame) -> pd.DataFrame:
-    """Known error of each level, by class of scene and fraction; `levels.measured` reads it.
+    """Known error of each rung, by class and fraction; `known.measured` reads it.
 
-    The error is the largest over the scenes, infinite where only one of level and reference reached
-    the fraction, zero where neither did. The uncertainty is how far the reference itself moved.
+    The error is the largest over the scenes, infinite where only one of rung and
+    reference reached the fraction, zero where neither did. The uncertainty is how far
+    the reference itself moved.
     """
-    beside = np.where(points["class_flow"] == levels.LEVEL_BED, FLAT.name, FINE.name)
-    grains = points[(points["flow_level"] == beside) & (points["asked"] == "dem")]
-    flow = points[(points["grain_level"] == PEELING.name) & points["same_model"]]
+    beside = np.where(points["class_flow"] == LEVEL_BED, FLAT.name, REFERENCE.name)
+    grains = points[(points["flow_rung"] == beside) & (points["asked"] == "dem")]
+    flow = points[(points["grain_rung"] == PEELING.name) & points["same_model"]]
     taus, tables = [name for name in points if str(name).startswith("tau_")], []
     key, place = (
-        ["part", "level", "scene_class", "fraction"],
+        ["part", "rung", "scene_class", "fraction"],
         ["scene_class", "fraction"],
     )
     for part, column, table, best, again in (
-        ("grains", "grain_level", grains, "reference", "soft reference"),
-        ("flow", "flow_level", flow, "fine", "finest"),
+        (GRAINS, "grain_rung", grains, REFERENCE.name, AGAIN),
+        (FLOW, "flow_rung", flow, REFERENCE.name, FINER),
     ):
         names = {
-            column: "level",
+            column: "rung",
             f"class_{part}": "scene_class",
             f"{part}_s": "cost_core_s",
         }
@@ -285,7 +316,7 @@ def known_errors(points: pd.DataFrame) -> pd.DataFrame:
         rows = rows.melt(
             ["scene_id", *key[:-1], "cost_core_s"], taus, "fraction", "tau"
         )
-        base = rows.loc[rows["level"] == best, ["scene_id", "fraction", "tau"]]
+        base = rows.loc[rows["rung"] == best, ["scene_id", "fraction", "tau"]]
         rows = rows.merge(base, on=["scene_id", "fraction"], suffixes=("", "_best"))
         neither = rows["tau"].isna() & rows["tau_best"].isna()
         error = (
@@ -299,14 +330,12 @@ def known_errors(points: pd.DataFrame) -> pd.DataFrame:
         known = (
             rows.groupby(key).agg(**largest, scenes=("scene_id", "size")).reset_index()
         )
-        shift = known.loc[known["level"] == again, [*place, "error"]]
+        shift = known.loc[known["rung"] == again, [*place, "error"]]
         known = known.merge(
             shift.rename(columns={"error": "uncertainty"}), "left", place
         )
         # a finer flow is run on small piles alone, other grains on every pile
-        tables.append(
-            known.fillna({"uncertainty": 0.0 if part == "flow" else math.inf})
-        )
+        tables.append(known.fillna({"uncertainty": 0.0 if part == FLOW else math.inf}))
     columns = [*key, "error", "uncertainty", "cost_core_s", "scenes"]
     return pd.concat(tables)[columns].sort_values(key)
 
@@ -314,53 +343,50 @@ def known_errors(points: pd.DataFrame) -> pd.DataFrame:
 def _sections(pairs: pd.DataFrame, known: pd.DataFrame) -> list[Section]:
     words, index = (
         TEXTS["ladder"],
-        ["part", "scene_class", "level", "scenes", "cost_core_s"],
+        ["part", "scene_class", "rung", "scenes", "cost_core_s"],
     )
     heads = {name: f"{name.removeprefix('error_')} %" for name in HEADS}
-    heads |= {
-        "flow_level": "flow",
-        "grain_level": "grains",
-        "scene_class": "scene class",
-    }
+    heads |= {"flow_rung": "flow", "grain_rung": "grains", "scene_class": "scene class"}
     heads["cost_core_s"] = "core-s"
     means = pairs.sort_values(["packing", "cost_core_s"]).assign(
         **(100 * pairs[[*HEADS]])
     )
-    means = means[["packing", *LEVEL_PAIR, "piles", "cost_core_s", *HEADS]].rename(
+    means = means[["packing", *PAIR, "piles", "cost_core_s", *HEADS]].rename(
         columns=heads
     )
     rows = [
         (part, each.name, each.meaning)
-        for part, levels in LEVELS.items()
-        for each in levels
+        for part, rungs in RUNGS.items()
+        for each in rungs
     ]
-    meanings = pd.DataFrame(rows, columns=["part", "level", "what it is"])
-    order = {name: place for place, name in enumerate(meanings["level"])}
+    meanings = pd.DataFrame(rows, columns=["part", "rung", "what it is"])
+    order = {name: place for place, name in enumerate(meanings["rung"])}
     errors = (100 * known.set_index([*index, "fraction"])["error"]).unstack("fraction")
     errors = errors.rename(columns="{:.0%}".format).sort_index(
         level=index[:3],
-        key=lambda keys: keys.map(order) if keys.name == "level" else keys,
+        key=lambda keys: keys.map(order) if keys.name == "rung" else keys,
     )
-    of_levels = [meanings, errors.reset_index().rename(columns=heads)]
+    of_rungs = [meanings, errors.reset_index().rename(columns=heads)]
     title, largest = "Cost against error", chart(pairs, {"largest": ""})
     charts = [Figure("speed-against-accuracy", title, words["largest"], (), largest)]
     title, each = "The error at each fraction", chart(pairs, HEADS)
     charts.append(Figure("error-at-fractions", title, words["fractions"], (), each))
-    title = "The fidelity levels, and what is known of them"
+    title = "The rungs, and what is known of them"
     return [
         Section("Speed against accuracy", words["accuracy"], charts, [means]),
-        Section(title, words["levels"], (), of_levels, [words["limit"]]),
+        Section(title, words["rungs"], (), of_rungs, [words["limit"]]),
     ]
 
 
 def chart(pairs: pd.DataFrame, columns: Mapping[str, str]) -> Canvas:
-    """Errors against cost: a row of panels for each packing, one beside it for each column.
+    """Errors against cost: a row of panels for each packing, one for each column.
 
-    A single column has the number of every pair, the front and its names; several have the numbers
-    on the front. `columns` has the heads of the panels by the columns of `together`.
+    A single column has the number of every pair, the front and its names; several have
+    the numbers on the front. `columns` has the heads of the panels by the columns of
+    `together`.
     """
-    single, names = len(columns) == 1, pairs["flow_level"] + ", " + pairs["grain_level"]
-    colours = pairs["grain_level"].map(METHODS).fillna(METHODS["DEM"])
+    single, names = len(columns) == 1, pairs["flow_rung"] + ", " + pairs["grain_rung"]
+    colours = pairs["grain_rung"].map(METHODS).fillna(METHODS["DEM"])
     table = pairs.assign(name=names, number=pd.factorize(names)[0] + 1, colour=colours)
     packings = [rows for _, rows in table.groupby("packing", sort=False)]
     height = (
@@ -414,7 +440,7 @@ def chart(pairs: pd.DataFrame, columns: Mapping[str, str]) -> Canvas:
     samples += [Patch(label=label, color=colour, lw=0) for label, colour in BANDS]
     if single:
         samples.append(
-            Line2D([], [], label="no pair of levels is cheaper and better", **FRONT)
+            Line2D([], [], label="no pair of rungs is cheaper and better", **FRONT)
         )
     style.legends(canvas, [style.entry(*method) for method in METHODS.items()], samples)
     canvas.draw_without_rendering()  # labels are placed in a finished layout

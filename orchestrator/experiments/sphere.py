@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orchestrator.bed.packing import Packing
-from orchestrator.fidelity.levels import Fields
+from orchestrator.fidelity.fidelities import Fields
 from orchestrator.grains import sheltering
 from orchestrator.grains.peeling import PLACES, RANGE, Force, ForceTable
 from orchestrator.physics.laws import CLIFT_GAUVIN, LAWS, Exposure

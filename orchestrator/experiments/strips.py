@@ -13,10 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from orchestrator.bed.packing import Packing, Places
-from orchestrator.fidelity.levels import Fields, changed
+from orchestrator.fidelity.fidelities import Fields
 from orchestrator.grains import peeling, threshold
 from orchestrator.grains.loads import Geometry
 from orchestrator.study.scene import Scene
+from orchestrator.study.study import changed
 from orchestrator.types import FloatArray
 
 MOVED = 0.1

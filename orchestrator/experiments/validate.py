@@ -19,7 +19,7 @@ from orchestrator.experiments.experiment import Experiment, Results, Runs
 from orchestrator.experiments.sphere import speed_of, sphere
 from orchestrator.experiments.strips import PERCENTILES, ROUGH, Strips
 from orchestrator.fidelity.decision import as_asked
-from orchestrator.fidelity.levels import Fields
+from orchestrator.fidelity.fidelities import Fields
 from orchestrator.flow.stress import WallStress, bubble
 from orchestrator.physics import saltation
 from orchestrator.physics.constants import GRAVITY

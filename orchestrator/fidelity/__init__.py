@@ -1,1 +1,1 @@
-"""How well a scene is answered: levels with known errors, checks by DEM, limits of the methods."""
+"""How a scene is answered, and how well: fidelities, known errors, limits."""

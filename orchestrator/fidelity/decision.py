@@ -1,69 +1,83 @@
-"""The decision how a scene is answered: a look-up by the scene and the tolerance of its study.
+"""The decision how a scene is answered: a look-up by the scene and the tolerance.
 
-The decision depends on the values of the scene's fields and on the tolerance. It depends neither on
-other scenes of the study and their order, nor on how a study file spells the values: ``auto``, the
-default of `protocol.method`, is a value like any other.
+The decision depends on the values of the scene's fields and on the tolerance. It
+depends neither on other scenes of the study and their order, nor on how a study file
+spells the values: ``auto``, the default of `protocol.method`, is a value like any
+other.
 """
 
-import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 
-from orchestrator.fidelity import levels
-from orchestrator.fidelity.levels import (
-    FLAT,
-    FLOW,
-    GRAINS,
-    LOCAL,
-    Known,
-    Level,
-    Pair,
-    changed,
-    pair_of,
-    value_of,
-)
+from orchestrator.fidelity import spread
+from orchestrator.fidelity.classes import FLOW, GRAINS, scene_class, unmeasured
+from orchestrator.fidelity.fidelities import FIDELITIES, LOCAL, Fidelity, fidelity_of
+from orchestrator.fidelity.known import UNKNOWN, Known, known
 from orchestrator.grains.loads import LONG, Geometry, has_rows_along
 from orchestrator.grains.pile import Pile
 from orchestrator.study.fields import FIELDS, PARTS
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
+from orchestrator.study.study import changed, value_of
 
-Names = tuple[str, ...]
 LEAST_HELD = (
     6.0  # waiting time, sqrt(d/g'), below which load steps are a ramp of the flow
 )
 EXACT = "the closed form is exact for a single grain in a held flow"
 LONG_BED = f"more than {LONG:g} grains long"
 ALONG = f"{LONG_BED}: closed form along the bed, checked where motion starts"
+CHOSEN = FIDELITIES[:-1]
+"""The fidelities that a choice may take: errors are measured against the last one."""
 KEPT = ("flow.speed", "flow.viscosity")
-"""Numbers of the solve that every level keeps: u*/U_e is the same at each of them (docs/flow.md).
-Their values do not ask for DEM."""
-_NUMBERS = [
-    field.name.split(".")
-    for field in FIELDS
-    if field.info.about == "answer"
-    and field.name not in ("protocol.method", "flow.model", *KEPT)
-]
-NUMBERS = {
-    f"{part}.{name}": PARTS[part].model_fields[name].default for part, name in _NUMBERS
-}
-"""Fields of mesh, contact, load steps and mobile layers, with the defaults of a lattice: a scene in
-which one has another value is answered by DEM, which uses it."""
+"""Numbers of the solve that every fidelity keeps: u*/U_e is the same at each of them
+(docs/flow.md). Their values do not ask for DEM."""
+
+
+def _numbers() -> dict[str, object]:
+    numbers = {}
+    for field in FIELDS:
+        if field.info.about != "answer" or field.name in (
+            "protocol.method",
+            "flow.model",
+            *KEPT,
+        ):
+            continue
+        part, name = field.name.split(".")
+        numbers[field.name] = PARTS[part].model_fields[name].default
+    return numbers
+
+
+NUMBERS = _numbers()
+"""Fields of mesh, contact, load steps and mobile layers, with the defaults of a
+lattice: a scene in which one has another value is answered by DEM, which uses it."""
 
 
 @dataclass(frozen=True)
 class Decision:
-    """How the scene `asked` for is answered: by the `scene`, whose method is never ``auto``.
+    """How a scene is answered.
 
-    The `levels` (None for a single grain) with their `known` error of tau_c; why; and whether these
-    levels were chosen by their known errors, in place of what the scene has written.
+    Attributes
+    ----------
+    asked
+        The scene that is asked for.
+    scene
+        The scene that answers it; its method is never ``auto``.
+    fidelity
+        The fidelity of the answer; None for a single grain.
+    known
+        The known error of tau_c.
+    why
+        The reason, in words.
+    is_chosen
+        Whether the fidelity was chosen by its known error, in place of what the scene
+        has written.
     """
 
     asked: Scene
     scene: Scene
-    levels: Pair | None
+    fidelity: Fidelity | None
     known: Known
     why: str
     is_chosen: bool = False
@@ -78,12 +92,11 @@ class Decision:
     @property
     def is_along(self) -> bool:
         """Whether the closed form along the bed answers because the bed is long."""
-        is_local = self.levels is not None and self.levels.grains is LOCAL
-        return is_local and self.asked.protocol.method == "auto"
+        return self.fidelity is LOCAL and self.asked.protocol.method == "auto"
 
     @property
     def is_unchecked(self) -> bool:
-        """Whether it is a pile for which levels without DEM were chosen."""
+        """Whether it is a pile for which a fidelity without DEM was chosen."""
         is_pile = isinstance(self.scene.bed, PileBed)
         return is_pile and self.is_chosen and self.scene.protocol.method != "dem"
 
@@ -91,23 +104,25 @@ class Decision:
 def decide(scene: Scene, tolerance: float | None) -> Decision:
     """How a resolved scene is answered.
 
-    The methods ``auto`` and, with a tolerance, ``dem`` are answered by the cheapest levels with a
-    solved flow that are known to be good enough. All other scenes are answered as they are written:
-    those whose method or flow model says how, those for which no error is known, and with ``auto``
-    those in which one of `NUMBERS` has another value than its default.
+    The methods ``auto`` and, with a tolerance, ``dem`` are answered by the cheapest
+    fidelity that is known to be good enough. All other scenes are answered as they are
+    written: those whose method or flow model says how, those for which no error is
+    known, and with ``auto`` those in which one of `NUMBERS` has another value than its
+    default.
 
     Parameters
     ----------
     scene
         A scene with one force law.
     tolerance
-        Relative error that tau_c may have, the uncertainty of its reference included. None: with
-        ``auto`` the least of `levels.floors`, half the spread of the choices that all levels share.
+        Relative error that tau_c may have, the uncertainty of its reference included.
+        None: with ``auto`` the least of `spread.floors`, half the spread of the choices
+        that all fidelities share.
 
     Returns
     -------
     Decision
-        The scene that answers, its levels, what is known of them, and why.
+        The scene that answers, its fidelity, what is known of it, and why.
     """
     if not isinstance(scene.bed, PileBed):
         return _of_grain(scene, tolerance)
@@ -115,42 +130,43 @@ def decide(scene: Scene, tolerance: float | None) -> Decision:
     if why_as_written is not None:
         return as_asked(scene, why_as_written)
     if tolerance is None:
-        most = min(levels.floors().values())
+        most = min(spread.floors().values())
         start, limit = (
             "chosen by default: ",
             f"within the model's own spread of {most:.0%}",
         )
     else:
         most, start, limit = tolerance, "", "within the tolerance"
-    pair, why = _looked_up(scene, most)
-    if pair is None:
+    fidelity, why = _looked_up(scene, most)
+    if fidelity is None:
         return as_asked(scene, why)
-    known = levels.known(pair, scene)
-    answer = pair.answer(scene)
-    return Decision(scene, answer, pair, known, f"{start}{why} {limit}", is_chosen=True)
+    return on_fidelity(scene, fidelity, f"{start}{why} {limit}", is_chosen=True)
 
 
 def as_asked(scene: Scene, why: str = "") -> Decision:
-    """The decision to answer a scene as it is written; `why` says more than its method does."""
+    """The decision to answer a scene as it is written; `why` adds to its method."""
     answer = written(scene)
     why = "; ".join(filter(None, (method_of(scene)[1], why)))
     if not isinstance(answer.bed, PileBed):
-        return Decision(scene, answer, None, levels.UNKNOWN, why)
-    pair = pair_of(answer)
-    unmeasured = levels.unmeasured(answer)
-    if unmeasured and unmeasured not in why:
-        why = f"{why}; no error is known for {unmeasured}"
-    return Decision(scene, answer, pair, levels.known(pair, answer), why)
+        return Decision(scene, answer, None, UNKNOWN, why)
+    fidelity = fidelity_of(answer)
+    beyond = unmeasured(answer)
+    if beyond and beyond not in why:
+        why = f"{why}; no error is known for {beyond}"
+    return Decision(scene, answer, fidelity, known(fidelity, answer), why)
 
 
-def on_levels(scene: Scene, pair: Pair, why: str) -> Decision:
-    """The decision to answer a pile on a pair of levels."""
-    return Decision(scene, pair.answer(scene), pair, levels.known(pair, scene), why)
+def on_fidelity(
+    scene: Scene, fidelity: Fidelity, why: str, *, is_chosen: bool = False
+) -> Decision:
+    """The decision to answer a pile by a fidelity."""
+    found = known(fidelity, scene)
+    return Decision(scene, fidelity.answer(scene), fidelity, found, why, is_chosen)
 
 
 @cache
 def written(scene: Scene) -> Scene:
-    """A scene with the method that answers it as it is written, in place of ``auto``."""
+    """A scene as it is written, with the method that answers in place of ``auto``."""
     if scene.protocol.method != "auto":
         return scene
     return changed(scene, {"protocol.method": method_of(scene)[0]})
@@ -160,8 +176,9 @@ def written(scene: Scene) -> Scene:
 def method_of(scene: Scene) -> tuple[str, str]:
     """The method that answers a scene as it is written, and why.
 
-    For ``auto`` that is DEM where it can: not on a lattice of more than `LONG` grains, nor with
-    what DEM does not know. There it is the closed form along the bed, else peeling, else pivots.
+    For ``auto`` that is DEM where it can: not on a lattice of more than `LONG` grains,
+    nor with what DEM does not know. There it is the closed form along the bed, else
+    peeling, else pivots.
     """
     method, bed = scene.protocol.method, scene.bed
     if method != "auto":
@@ -185,7 +202,7 @@ def method_of(scene: Scene) -> tuple[str, str]:
 
 
 def is_along(scene: Scene) -> bool:
-    """Whether the closed form along the bed may answer a pile, which has too many grains for DEM.
+    """Whether a pile has too many grains for DEM, and the closed form may answer it.
 
     Its rows have to lie along the bed, and each grain has to feel the flow by itself.
     """
@@ -202,7 +219,7 @@ def _is_long(scene: Scene) -> bool:
 
 
 def _of_grain(scene: Scene, tolerance: float | None) -> Decision:
-    """The decision on a single grain: with a tolerance the closed form, where it is exact."""
+    """The decision on a single grain: with a tolerance by an exact closed form."""
     as_written = as_asked(scene)
     if tolerance is None or as_written.scene.protocol.method != "dem":
         return as_written
@@ -213,11 +230,11 @@ def _of_grain(scene: Scene, tolerance: float | None) -> Decision:
             scene, "a slope beyond the entrainment angle: the closed form is off"
         )
     exact = changed(scene, {"protocol.method": "pivot"})
-    return Decision(scene, exact, None, levels.UNKNOWN, EXACT, is_chosen=True)
+    return Decision(scene, exact, None, UNKNOWN, EXACT, is_chosen=True)
 
 
 def _why_as_written(scene: Scene, tolerance: float | None) -> str | None:
-    """Why a pile is answered as it is written; None where levels may be chosen for it.
+    """Why a pile is answered as it is written; None where a fidelity may be chosen.
 
     It is empty where the method says it all.
     """
@@ -231,99 +248,75 @@ def _why_as_written(scene: Scene, tolerance: float | None) -> str | None:
             return ""
         if why := _why_not_by_default(scene):
             return why
-    # the levels approximate DEM in a held, solved flow
+    # the fidelities approximate DEM in a held, solved flow
     if scene.flow.model != _best_model(scene):
         return f"the study asks for the flow model {scene.flow.model}"
     if scene.protocol.update:
         return "no error is known for a bed that changes"
     if scene.protocol.waiting_time < LEAST_HELD:
         return "the study asks for a ramp of the flow"
-    if unmeasured := levels.unmeasured(scene):
-        return f"no error is known for {unmeasured}"
+    beyond = unmeasured(scene)
+    if beyond:
+        return f"no error is known for {beyond}"
     return None
 
 
 def _why_not_by_default(scene: Scene) -> str:
-    """Why no levels are chosen for a pile where neither method nor tolerance is given."""
+    """Why no fidelity is chosen for a pile without a method and a tolerance."""
     if scene.is_poured:
         return "a poured bed"
     for name, default in NUMBERS.items():
         if value_of(scene, name) != default:
             return f"{name} is not its default"
-    if levels.model_class(scene) not in levels.floors():
+    if spread.model_class(scene) not in spread.floors():
         return "the model's own spread on such a bed is not known"
     return ""
 
 
 def _best_model(scene: Scene) -> str:
-    """The flow model of the best levels: over a level bed no flow is solved."""
+    """The flow model of the best fidelities: over a level bed no flow is solved."""
     assert isinstance(scene.bed, PileBed)
     return "flat" if scene.bed.is_level else "solve"
 
 
-def _looked_up(scene: Scene, most: float) -> tuple[Pair | None, str]:
-    """The pair of levels that answers a pile with a known error of at most `most`, and why it."""
-    classes = (levels.classes("flow", scene), levels.classes("grains", scene))
-    flows = [level for level in FLOW if level.is_offered and level.takes(scene)]
-    if classes[0] == (levels.LEVEL_BED,):
-        flows = [FLAT]
-    grains = [level for level in GRAINS if level.is_offered and level.takes(scene)]
-    if scene.protocol.method == "auto" and _is_long(scene):
-        grains = [level for level in grains if level.sets["protocol.method"] != "dem"]
-    return _cheapest(tuple(flows), tuple(grains), classes, most)
+def _looked_up(scene: Scene, most: float) -> tuple[Fidelity | None, str]:
+    """The fidelity that answers a pile with an error of at most `most`, and why it.
 
-
-@cache  # a study has thousands of scenes of a few classes
-def _cheapest(
-    flows: Sequence[Level],
-    grains: Sequence[Level],
-    classes: tuple[Names, Names],
-    most: float,
-) -> tuple[Pair | None, str]:
-    """The cheapest pair of some levels with a known error of at most `most`, and why it is taken.
-
-    Where there is none, it is the cheapest whose error is below the uncertainty of the reference,
-    or no pair where no error is known.
+    Where there is none, it is the cheapest whose error is below the uncertainty of the
+    reference: errors below that uncertainty cannot be ranked. No fidelity where no
+    error is known.
     """
-    pairs = [Pair(*both) for both in itertools.product(flows, grains)]
-    known = {pair: levels.known_of_classes(*pair, *classes) for pair in pairs}
-    pairs = [pair for pair in pairs if math.isfinite(known[pair].total)]
-    if not pairs:
+    is_long = scene.protocol.method == "auto" and _is_long(scene)
+    errors: dict[Fidelity, Known] = {}
+    for one in CHOSEN:
+        if is_long and one.is_dem:
+            continue
+        if one.takes(scene):
+            found = known(one, scene)
+            if math.isfinite(found.total):
+                errors[one] = found
+    if not errors:
         return None, "no error is known for such a bed"
-
-    def cost(pair: Pair) -> float:
-        return known[pair].cost_core_s
-
-    within = [pair for pair in pairs if known[pair].total <= most]
-    if within:
-        return min(within, key=cost), "cheapest"
-    # errors below the uncertainty of the reference cannot be ranked, but those of flows can
-    best = min(pairs, key=lambda pair: known[pair].total)
-    exact = GRAINS[-1]
-    flow_error = {
-        pair: levels.known_of_classes(pair.flow, exact, *classes).error
-        for pair in pairs
-    }
-    alike = [
-        pair
-        for pair in pairs
-        if known[pair].error <= known[best].total
-        and flow_error[pair] <= max(most, flow_error[best])
-    ]
-    why = "cheapest whose error is below the uncertainty of the reference: none is"
-    return min(alike, key=cost), why
+    for one, error in errors.items():
+        if error.total <= most:
+            return one, f"{one.name}, the cheapest fidelity"
+    least = min(error.total for error in errors.values())
+    alike = next(one for one, error in errors.items() if error.error <= least)
+    why = "the cheapest fidelity whose error is below the uncertainty of the reference"
+    return alike, f"{alike.name}, {why}: none is"
 
 
 def _check_group(scene: Scene) -> tuple[object, ...]:
-    """What the piles have in common of which DEM checks one: slope, force law, known errors."""
-    classes = (levels.scene_class(part, scene) for part in levels.LEVELS)
+    """What piles have in common of which DEM checks one: slope, force law, errors."""
+    classes = [scene_class(part, scene) for part in (FLOW, GRAINS)]
     return (scene.bed.slope_deg, scene.forces.law, *classes)
 
 
 def checks(answers: Iterable[Decision]) -> dict[str, Decision]:
-    """The decisions on the piles by DEM that check answers without it, by the id of the asked.
+    """The piles by DEM that check answers without it, by the id of the asked scene.
 
-    Of each group it is the pile that DEM, as the scene is written, answers in the least time.
+    Of each group it is the pile that DEM, as the scene is written, answers in the least
+    time.
     """
     cheapest: dict[object, tuple[float, str, Scene]] = {}
     for answer in answers:

@@ -1,7 +1,7 @@
 """Where the methods hold: what a study refuses, and what it is warned of.
 
-Each limit was read off a map of `orchestrator stability` (``calibration/maps.csv``), whose file
-says it in words.
+Each limit was read off a map of `orchestrator stability` (``calibration/maps.csv``),
+whose file says it in words.
 """
 
 import warnings
@@ -26,7 +26,8 @@ from orchestrator.study.scene import Scene
 from orchestrator.study.study import ASKED, Study
 
 MOST_GRAINS = 1e5  # largest length of a bed with grains, diameters
-FROZEN_BED = 0.05  # relative change of a threshold up to which the flow of the whole pile acts on
+FROZEN_BED = 0.05
+"""Relative change of a threshold up to which the flow of the whole pile acts on."""
 PILE_SLOPES_DEG = (
     1.0,
     35.0,
@@ -43,7 +44,7 @@ ANGLES = "min(friction angle, 90 deg - entrainment angle)"
 
 
 class Limit(NamedTuple):
-    """A limit that a scene is beyond, and the map of it: a study is refused, or merely warned."""
+    """A limit that a scene is beyond, and its map; a study is refused or warned."""
 
     map: str
     field: str
@@ -53,7 +54,7 @@ class Limit(NamedTuple):
 
 
 def check_study(study: Study) -> None:
-    """Check every scene of a study as `check` does; messages name the file and the group."""
+    """Check every scene of a study; messages name the file and the group."""
     for group in study.groups:
         for scene in group.scenes:
             try:
@@ -67,9 +68,9 @@ def check_study(study: Study) -> None:
 def check(scene: Scene, where: str, *, grains: bool = True) -> None:
     """Refuse a scene outside of the regions in which its answer means something.
 
-    An `InputError` names the first limit that it is beyond: field, map and remedy, and `where`, the
-    scene's file. Where the answer is merely worse, a warning is given. Without `grains` only the
-    flow over a pile counts.
+    An `InputError` names the first limit that it is beyond: field, map and remedy, and
+    `where`, the scene's file. Where the answer is merely worse, a warning is given.
+    Without `grains` only the flow over a pile counts.
     """
     with suppress(UnfitError):  # which is told below
         scene = written(scene)
@@ -106,7 +107,8 @@ def exceeded(scene: Scene, *, grains: bool = True) -> Iterator[Limit]:
     if not grains:
         return
     if (not isinstance(bed, PileBed) or bed.is_wedge) and slope > limit + 1e-9:
-        what = f"{slope:g} deg is beyond {ANGLES} = {limit:g} deg: the bed rolls back without flow"
+        what = f"{slope:g} deg is beyond {ANGLES} = {limit:g} deg"
+        what += ": the bed rolls back without flow"
         yield Limit(
             "slope", "bed.slope_deg", what, "lower the slope or the entrainment angle"
         )
@@ -194,7 +196,8 @@ def _theory(scene: Scene, bed: PileBed) -> Iterator[Limit]:
     at = int(np.argmax(seen.slopes))
     slope = float(np.degrees(np.arctan(seen.slopes[at])))
     if slope > PILE_SLOPES_DEG[1] + 1e-6:
-        what = f"a bed that rises by {slope:.3g} deg at x = {seen.x[at]:.4g} m is no low one"
+        place = f"x = {seen.x[at]:.4g} m"
+        what = f"a bed that rises by {slope:.3g} deg at {place} is no low one"
         yield Limit("slope", "flow.model", what, 'choose "solve"')
 
 
@@ -204,13 +207,16 @@ def _solve(scene: Scene, bed: PileBed) -> Iterator[Limit]:
         what = "over a flat bed there is nothing to solve: u* is u*_0 everywhere"
         yield Limit("slope", "flow.model", what, 'choose "flat"')
     if z0 > cell:
-        what = f"z0 = {z0:g} m is above twice z_e = {cell / 2:g} m, the centre of the first cell"
-        remedy = "lower it, or raise flow.first_cell_height or bed.height; z_e of z0 is sound"
+        what = f"z0 = {z0:g} m is above twice z_e = {cell / 2:g} m"
+        what += ", the centre of the first cell"
+        remedy = "lower it, or raise flow.first_cell_height or bed.height"
+        remedy += "; z_e of z0 is sound"
         yield Limit("first-cell", "bed.roughness", what, remedy)
     ustar0 = float(log_law_ustar(scene.flow.speed, SPEED_HEIGHT * bed.relief, z0))
     ratio = KARMAN * ustar0 * cell / 2 / scene.solve_viscosity
     if ratio < 1:
-        what = f"not turbulent: the first cell's eddy viscosity is {ratio:.2g} of the molecular one"
+        what = "not turbulent: the first cell's eddy viscosity"
+        what += f" is {ratio:.2g} of the molecular one"
         remedy = (
             "take the field of a lower viscosity or a higher speed: u*/U_e is the same"
         )
@@ -224,7 +230,8 @@ def _solve(scene: Scene, bed: PileBed) -> Iterator[Limit]:
 def _dem(scene: Scene) -> Iterator[Limit]:
     rules, damping = scene.protocol, scene.grain.damping
     if rules.time_step > (most := largest_timestep(damping)):
-        what = f"{rules.time_step:g} sqrt(m/K) is above {most:g} at a damping of {damping:g}"
+        what = f"{rules.time_step:g} sqrt(m/K) is above {most:g}"
+        what += f" at a damping of {damping:g}"
         yield Limit(
             "timestep-damping", "protocol.time_step", what, "lower it, or the damping"
         )
@@ -234,7 +241,8 @@ def _dem(scene: Scene) -> Iterator[Limit]:
     if not isinstance(scene.bed, PileBed):
         return
     if rules.waiting_time < WAITING_TIME:
-        what = f"load steps that wait {rules.waiting_time:g} sqrt(d/g') are a ramp of the flow"
+        what = f"load steps that wait {rules.waiting_time:g} sqrt(d/g')"
+        what += " are a ramp of the flow"
         remedy = "raise it, unless a ramp is what you want"
         yield Limit("quiet-step", "protocol.waiting_time", what, remedy, refused=False)
     if (step := rules.load_increment) > COARSE_STEP:

@@ -1,13 +1,13 @@
-"""What the smoothing of a noisy profile is worth: the same bed with half and twice of it."""
+"""What the smoothing of a noisy profile is worth: the bed with half and twice of it."""
 
 import warnings
 
 from orchestrator.errors import InputError
 from orchestrator.fidelity import limits
-from orchestrator.fidelity.levels import changed
 from orchestrator.grains.loads import has_rows_along
 from orchestrator.study.parts import PileBed, UnfitError
 from orchestrator.study.scene import Scene
+from orchestrator.study.study import changed
 
 FACTORS = (0.5, 1.0, 2.0)
 """Smoothing of the beds that are compared, over the one that is used or needed."""
@@ -37,8 +37,8 @@ def compared(answer: Scene) -> dict[float, Scene]:
     dict[float, Scene]
         By each of `FACTORS` the scene with so much smoothing, by the closed form along
         the bed line, under the flow model of the answer. One that cannot be meshed or
-        smoothed is left out. Empty for a scene without noise, and for grains that have no
-        such closed form: poured ones, level rows, and those that share the stress.
+        smoothed is left out. Empty for a scene without noise, and for grains that have
+        no such closed form: poured ones, level rows, and those that share the stress.
     """
     length = length_of(answer)
     is_along = has_rows_along(answer) and answer.forces.sheltering == "none"

@@ -28,7 +28,7 @@ BRIDGED = "bridged"
 """The force law that has an answer where neither of the paper's has one."""
 ANSWERS = ("pile_threshold", "wall_stress")
 """Tables that any threshold method fills; of all others the rows by DEM are taken."""
-BESIDE = ("fraction", "flow_level", "grain_level")
+BESIDE = ("fraction", "fidelity")
 """Columns in which two rows must agree beside those of their scenes."""
 GRAIN = ("alpha_deg", "beta_deg", "d_m", "z0_over_d", "nu_m2_s", "force_law")
 """Columns in which single grains may differ; in all others the commonest combination is

@@ -1,4 +1,4 @@
-"""The tables of a page: thresholds, force laws, parameters and fidelity levels."""
+"""The tables of a page: thresholds, force laws, parameters and fidelities."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from orchestrator.fidelity import levels as fidelity
+from orchestrator.fidelity.fidelities import FIDELITIES, LOCAL, OWN_NUMBERS
 from orchestrator.grains.threshold import STEP
 from orchestrator.physics.laws import LAWS
 from orchestrator.report import labels
@@ -351,8 +351,8 @@ def _values(column: pd.Series) -> str:
     return ", ".join(texts)
 
 
-def levels(results: Results) -> pd.DataFrame | None:
-    """List the fidelity levels that answered the piles.
+def fidelities(results: Results) -> pd.DataFrame | None:
+    """List the fidelities that answered the piles.
 
     Parameters
     ----------
@@ -364,19 +364,14 @@ def levels(results: Results) -> pd.DataFrame | None:
     DataFrame or None
         Why each was chosen, and what is known of it; None without piles.
     """
-    meanings = {}
-    for part in fidelity.LEVELS.values():
-        for level in part:
-            meanings[level.name] = level.meaning
+    meanings = {one.name: one.meaning for one in (*FIDELITIES, LOCAL, OWN_NUMBERS)}
     table = results.joined("pile_threshold")
     rows = []
-    for (flow, grain, why), group in split(table, "flow_level", "grain_level", "why"):
-        names = (str(flow), str(grain))
-        meaning = "; ".join(meanings[name] for name in names if name in meanings)
+    for (name, why), group in split(table, "fidelity", "why"):
         error = 100 * group["error_estimate"].max()
         beds = group["scene_id"].nunique()
-        rows.append((f"{flow} | {grain}", meaning, why, beds, error))
+        rows.append((name, meanings[str(name)], why, beds, error))
     if not rows:
         return None
-    head = ("flow | grains", "description", "reason", "beds")
+    head = ("fidelity", "description", "reason", "beds")
     return pd.DataFrame(rows, columns=[*head, "known error of τ_c, at most, %"])

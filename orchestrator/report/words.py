@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.errors import OrchestratorError
-from orchestrator.fidelity import levels as fidelity
+from orchestrator.fidelity import spread
 from orchestrator.fidelity.limits import FROZEN_BED
 from orchestrator.physics.beside import sentences
 from orchestrator.physics.fluids import PAPER
@@ -285,24 +285,24 @@ def doubts(results: Results) -> list[str]:
     beyond = piles[piles["frozen_bed"] > FROZEN_BED]
     if len(beyond):
         said.append(caption("frozen", beyond=beyond, count=count, limit=FROZEN_BED))
-    said += _doubts_of_levels(results)
+    said += _doubts_of_fidelity(results)
     if "check" in results.tables:
         said.append(caption("checked", checks=results.tables["check"]))
     return said + _doubts_of_tolerance(results, piles)
 
 
-def _doubts_of_levels(results: Results) -> list[str]:
-    """Which levels answered what a study without a tolerance leaves open."""
+def _doubts_of_fidelity(results: Results) -> list[str]:
+    """Which fidelity answered what a study without a tolerance leaves open."""
     decisions = results.plan.decisions.values()
     chosen = [decision for decision in decisions if decision.is_chosen]
     if not chosen or results.study.tolerance is not None:
         return []
-    names = dict.fromkeys(item.levels.text for item in chosen if item.levels)
+    names = dict.fromkeys(item.fidelity.name for item in chosen if item.fidelity)
     sentence = caption(
         "defaults",
         names=", ".join(names),
         error=max(item.known.total for item in chosen),
-        floor=min(fidelity.floors().values()),
+        floor=min(spread.floors().values()),
     )
     return [sentence]
 
@@ -395,7 +395,7 @@ def contents(results: Results, failures: Mapping[str, str]) -> dict[str, Any]:
         "doubts": doubts(results),
         "short": sheets.short(results),
         "piles": sheets.piles(results),
-        "levels": sheets.levels(results),
+        "fidelities": sheets.fidelities(results),
         "remarks": remarks(results),
         "force_laws": sheets.force_laws(results),
         "parameters": sheets.parameters(results),

@@ -26,6 +26,7 @@ from orchestrator.errors import InputError
 from orchestrator.physics import fluids
 from orchestrator.study import units
 from orchestrator.study.closed_form import resolved
+from orchestrator.study.fidelities import AUTO, fields_of
 from orchestrator.study.fields import PARTS
 from orchestrator.study.parts import List, Part, PileBed, Sizes, UnfitError, percentile
 from orchestrator.study.profile import LARGEST_NUMBER, Files, decoded, read_bytes
@@ -377,10 +378,13 @@ def make_scene(
     numbers of a fluid's kind. `files` are those that the tables may name. The first thing wrong
     raises an `InputError`.
     """
+    tables = {name: dict(parts.get(name, {})) for name in PARTS}
     bed, grain, flow, fluid = (
-        dict(parts.get(n, {})) for n in ("bed", "grain", "flow", "fluid")
+        tables[name] for name in ("bed", "grain", "flow", "fluid")
     )
-    bed, kind = {**BED, **bed}, bed.get("kind", BED["kind"])
+    for key, default in BED.items():
+        bed.setdefault(key, default)
+    kind = bed["kind"]
     if kind in [*SHAPES] and bed.get("shape", kind) == kind:
         bed |= {"kind": "pile", "shape": kind}
     elif kind not in ("grain", "pile"):
@@ -389,6 +393,12 @@ def make_scene(
     is_level = bed.get("shape") == "flat" and not (
         bed.get("profile") or bed.get("obstacles")
     )
+    fidelity = tables["protocol"].pop("fidelity", AUTO)
+    if fidelity != AUTO:
+        for name, value in fields_of(fidelity, bed, where).items():
+            part, _, key = name.partition(".")
+            if not (is_level and part == "flow"):
+                tables[part].setdefault(key, value)
     if is_level:
         flow.setdefault("model", "flat")  # over a level bed there is nothing to solve
     if bed.get("packing") == "poured":
@@ -400,7 +410,7 @@ def make_scene(
     except InputError as error:
         raise InputError(error.what, f"{where}: {error.where}", error.remedy) from None
     if files and bed["kind"] == "pile" and isinstance(bed.get("profile"), str):
-        bed |= files.bed(bed, where)
+        bed.update(files.bed(bed, where))
     if files and isinstance(grain.get("sizes"), str):
         grain["sizes"] = files.sieve(grain["sizes"], where)
     try:
@@ -417,12 +427,27 @@ def make_scene(
                 is_size = isinstance(relative, int | float) and 1e-3 < relative < 1e3
                 d = grain["diameter"] / (relative if is_size else 1.0)
                 bed["roughness"] = roughness_length(bed["roughness"], d, mixture)
-        made = {"fluid": fluid, "grain": grain, "bed": bed, "flow": flow}
-        return Scene.model_validate({**parts, **made})
+        return Scene.model_validate({**parts, **tables, "fluid": fluid})
     except UnfitError as error:
         raise InputError(error.what, f"{where}: {error.field}", error.remedy) from None
     except ValidationError as error:
         raise _explained(error, where) from None
+
+
+def value_of(scene: Scene, name: str) -> Any:
+    """The value of a field, named as in a study file."""
+    return attrgetter(name)(scene)
+
+
+def changed(scene: Scene, fields: Mapping[str, Any]) -> Scene:
+    """A scene with some fields changed; an `InputError` for a value that a field cannot have."""
+    parts: dict[str, dict[str, Any]] = {
+        name: dict(getattr(scene, name)) for name in PARTS
+    }
+    for name, value in fields.items():
+        part, _, field = name.partition(".")
+        parts.setdefault(part, {})[field] = value
+    return make_scene(parts, "fields that are changed")
 
 
 def _not_toml(error: str, text: str, where: str) -> InputError:

@@ -19,7 +19,7 @@ def with_agreement(checks: pd.DataFrame, thresholds: pd.DataFrame) -> pd.DataFra
         ``shields_dem_high``.
     thresholds
         The answers, with ``shields_low`` and ``shields_high``. They hold the known error
-        of the levels.
+        of the fidelity.
 
     Returns
     -------

@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from orchestrator.errors import InputError
-from orchestrator.fidelity import levels, limits, smoothing
+from orchestrator.fidelity import limits, smoothing, spread
 from orchestrator.fidelity.decision import Decision
-from orchestrator.fidelity.levels import changed
 from orchestrator.flow.stress import bubble
 from orchestrator.grains import threshold
 from orchestrator.grains.cells import SingleGrainCase
@@ -25,7 +24,7 @@ from orchestrator.study import fields
 from orchestrator.study.closed_form import closed_form, law_holds
 from orchestrator.study.parts import UnfitError
 from orchestrator.study.scene import Scene
-from orchestrator.study.study import Study
+from orchestrator.study.study import Study, changed
 from orchestrator.types import BoolArray, FloatArray, Row
 
 POINT = ("alpha_deg", "beta_deg", "d_m", "z0_over_d", "nu_m2_s", "force_law", "regime")
@@ -481,7 +480,7 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
     Yields
     ------
     dict
-        A row for each fraction. The model's interval is of the choices that all levels
+        A row for each fraction. The model's interval is of the choices that all fidelities
         share.
     """
     pile = answer.pile
@@ -494,7 +493,7 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
     checked_x, checked_ustar0 = answer.checked
     for fraction in scene.protocol.fractions:
         found = answer.at(fraction)
-        model = levels.spread(answer.decision.asked, fraction)
+        model = spread.spread(answer.decision.asked, fraction)
         value = shields(scene, found.tau)
         smooth = _smooth_bed(scene, found.ustar0)
         low, high = _interval(scene, found, error, smooth)
@@ -527,7 +526,7 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
             "share_against_flow": found.against_the_flow,
             "row_hold": answer.row_hold,
             **_smoothing(answer),
-            **_levels(answer.decision),
+            "fidelity": _fidelity(answer.decision),
             "error_estimate": error,
             "case": pile.runs[-1].name if pile.runs else None,
         }
@@ -580,13 +579,10 @@ def _smoothing(answer: Answer) -> Row:
     return row
 
 
-def _levels(decision: Decision) -> Row:
-    """The columns of the levels that answer a pile."""
-    assert decision.levels
-    return {
-        "flow_level": decision.levels.flow.name,
-        "grain_level": decision.levels.grains.name,
-    }
+def _fidelity(decision: Decision) -> str:
+    """The name of the fidelity that answers a pile."""
+    assert decision.fidelity
+    return decision.fidelity.name
 
 
 def size_class(answer: Answer) -> Iterator[Row]:
@@ -780,7 +776,7 @@ def check(plan: Plan, cases: Path, done: Container[str]) -> Iterator[Row]:
                 **point(scene),
                 "packing": dem.bed.packing,
                 "fraction": ours.fraction,
-                **_levels(plan.decisions[asked]),
+                "fidelity": _fidelity(plan.decisions[asked]),
                 "shields": shields(scene, ours.tau),
                 "shields_dem": shields(scene, theirs.tau),
                 "shields_dem_low": shields(scene, theirs.tau_low),

@@ -221,7 +221,7 @@ def _reasons_of_pile(row: Mapping[Any, Any], tolerance: float | None) -> Iterato
     yield from _reasons_of_bed(row)
     error = row["error_estimate"]
     if pd.isna(error):
-        yield "the error of its levels on such a bed is not known"
+        yield "the error of its fidelity on such a bed is not known"
     elif tolerance and error > tolerance * (1 + 1e-9):
         yield f"known error {error:.1%} is above the tolerance of {tolerance:.3g}"
     if row["fraction"] * row["count"] < 1 - 1e-9:

@@ -9,9 +9,9 @@ import pytest
 from orchestrator.errors import InputError
 from orchestrator.experiments import budget
 from orchestrator.experiments.budget import CHOICES
-from orchestrator.fidelity.levels import changed
 from orchestrator.study import study
 from orchestrator.study.scene import Scene
+from orchestrator.study.study import changed
 
 SMALL = """
 grain = { diameter = 1e-3, sizes = { sigma_g = 1.2 } }

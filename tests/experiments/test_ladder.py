@@ -1,6 +1,7 @@
 """The ladder: what it runs beside what, errors from points that are known, and its charts."""
 
 import math
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +13,15 @@ from orchestrator import plan
 from orchestrator.bed import packing
 from orchestrator.experiments import ladder
 from orchestrator.experiments.experiment import Runs, piles
-from orchestrator.experiments.ladder import REFERENCES
-from orchestrator.fidelity.levels import FLAT, LEVEL_BED, LEVELS
+from orchestrator.experiments.ladder import REFERENCES, RUNGS
+from orchestrator.fidelity.classes import LEVEL_BED, scene_class
+from orchestrator.fidelity.fidelities import FIDELITIES, FLAT
+from orchestrator.fidelity.known import LEAST_SCENES
 from orchestrator.physics import threshold
 from orchestrator.study import study
 from orchestrator.study.parts import PileBed
 
-FAST = "1 layer, fast"
+FAST = "paper"
 TAU = {
     "tau_0.1": 1.0,
     "tau_0.3": 1.5,
@@ -29,15 +32,15 @@ TAU = {
 (REFERENCE, AGAIN), (LEVEL_REFERENCE, LEVEL_AGAIN), (FLOW_REFERENCE, FINER) = REFERENCES
 
 
-def test_every_level_is_run_and_each_pile_beside_its_reference() -> None:
+def test_every_rung_is_run_and_each_pile_beside_its_reference() -> None:
     asked = study.load("ladder")
     made = [
-        (one.asked, one.levels)
+        (one.asked, one.fidelity)
         for one in ladder.decisions(asked).values()
-        if one.levels
+        if one.fidelity
     ]
-    for part, levels in enumerate(LEVELS.values()):
-        assert {pair[part] for _, pair in made} == set(levels)
+    assert {pair.flow for _, pair in made} == set(RUNGS["flow"])
+    assert {pair.grains for _, pair in made} == set(RUNGS["grains"])
     for scene in piles(asked):
         run = {
             (pair.flow.name, pair.grains.name) for whose, pair in made if whose == scene
@@ -51,6 +54,17 @@ def test_every_level_is_run_and_each_pile_beside_its_reference() -> None:
                 (REFERENCE in run) == (AGAIN in run) == (scene.protocol.method == "dem")
             )
             assert FLOW_REFERENCE in run
+    whole = {pair.name for _, pair in made}
+    assert {f"{one.name} | {one.name}" for one in FIDELITIES} <= whole
+
+
+def test_ten_scenes_of_the_preset_or_more_are_of_each_class() -> None:
+    counts: Counter[tuple[str, str]] = Counter()
+    for scene in piles(study.load("ladder")):
+        counts["flow", scene_class("flow", scene)] += 1
+        if scene.protocol.method == "dem":
+            counts["grains", scene_class("grains", scene)] += 1
+    assert min(counts.values()) >= LEAST_SCENES
 
 
 def test_what_has_not_run_has_no_point_and_what_needs_no_run_no_error(
@@ -62,7 +76,7 @@ def test_what_has_not_run_has_no_point_and_what_needs_no_run_no_error(
     )
     pairs = ladder.decisions(study.parse(text, name="one", where="one"))
     points = ladder.points(pairs, Runs(plan.of(pairs), tmp_path, {}))
-    assert set(points["grain_level"]) == {"pivot", "peeling"}
+    assert set(points["grain_rung"]) == {"static"}
     assert ladder.errors(points).empty
 
 
@@ -103,8 +117,8 @@ def _point(pair: tuple[str, str], factor: float = 1.0, **other: Any) -> dict[str
     classes = {"class_flow": "wall", "class_grains": "aligned"}
     times = {"flow_s": 1.0, "grains_s": 1.0, "model_floor": 0.2}
     taus = {name: factor * value for name, value in TAU.items()}
-    levels = dict(zip(("flow_level", "grain_level"), pair, strict=True))
-    return {**names, **classes, **levels, **times, **taus, **other}
+    rungs = dict(zip(("flow_rung", "grain_rung"), pair, strict=True))
+    return {**names, **classes, **rungs, **times, **taus, **other}
 
 
 def _table(*more: dict[str, Any]) -> pd.DataFrame:
@@ -112,25 +126,25 @@ def _table(*more: dict[str, Any]) -> pd.DataFrame:
         _point(REFERENCE, grains_s=100.0),
         _point(AGAIN, 1.01, grains_s=50.0),
         _point(FLOW_REFERENCE, 0.98, grains_s=0.1),
-        _point(("fine", FAST), 1.03, grains_s=2.0),
-        _point(("coarse", "peeling"), 0.98 * 1.05, grains_s=0.1, flow_s=0.1),
+        _point(("reference", FAST), 1.03, grains_s=2.0),
+        _point(("quick", "static"), 0.98 * 1.05, grains_s=0.1, flow_s=0.1),
         _point(FINER, 0.98, grains_s=0.1, flow_s=9.0),
     ]
     return pd.DataFrame([*rows, *more])
 
 
 def test_errors_are_relative_to_the_reference_and_the_front_is_not_beaten() -> None:
-    table = ladder.errors(_table(_point(("coarse", FAST), **{"tau_0.5": math.nan})))
-    rows = table.set_index(["flow_level", "grain_level"])
+    table = ladder.errors(_table(_point(("quick", FAST), **{"tau_0.5": math.nan})))
+    rows = table.set_index(["flow_rung", "grain_rung"])
     assert rows["error_10"][REFERENCE] == pytest.approx(0.0)
     assert rows["error_50"][FLOW_REFERENCE] == pytest.approx(-0.02)
-    assert rows["error_curve"]["fine", FAST] == pytest.approx(0.03)
-    assert rows["cost_core_s"]["coarse", "peeling"] == pytest.approx(0.2)
-    assert math.isnan(rows["error_50"]["coarse", FAST])
+    assert rows["error_curve"]["reference", FAST] == pytest.approx(0.03)
+    assert rows["cost_core_s"]["quick", "static"] == pytest.approx(0.2)
+    assert math.isnan(rows["error_50"]["quick", FAST])
     np.testing.assert_allclose(table["reference_error"], 0.01)
-    pairs = ladder.together(table).set_index(["flow_level", "grain_level"])
+    pairs = ladder.together(table).set_index(["flow_rung", "grain_rung"])
     assert pairs["largest"][FLOW_REFERENCE] == pytest.approx(-0.02)
-    best = {("coarse", "peeling"), FLOW_REFERENCE, REFERENCE, AGAIN}
+    best = {("quick", "static"), FLOW_REFERENCE, REFERENCE, AGAIN}
     assert set(pairs.index[pairs["pareto"]]) == best
 
 
@@ -143,21 +157,21 @@ def test_known_errors_stand_beside_the_uncertainty_of_the_reference() -> None:
     table = _table(
         _point(LEVEL_REFERENCE, **over),
         _point(LEVEL_AGAIN, 1.05, **over),
-        _point(("flat", "peeling"), 1.4, **over),
+        _point(("flat", "static"), 1.4, **over),
         # over a pile the flat flow is a level of the flow
-        _point(("flat", "peeling"), 0.7),
+        _point(("flat", "static"), 0.7),
     ).reset_index(drop=True)
     # a fraction that only one of the two reaches is infinitely off
-    table.loc[table["grain_level"] == FAST, "tau_0.5"] = math.nan
-    known = ladder.known_errors(table).set_index(["scene_class", "level", "fraction"])
+    table.loc[table["grain_rung"] == FAST, "tau_0.5"] = math.nan
+    known = ladder.known_errors(table).set_index(["scene_class", "rung", "fraction"])
     for place, error, uncertainty in (
-        (("aligned", "peeling", 0.5), 0.02, 0.01),
+        (("aligned", "static", 0.5), 0.02, 0.01),
         (("aligned", "reference", 0.1), 0.0, 0.01),
         (("aligned", FAST, 0.1), 0.03, 0.01),
         (("aligned", FAST, 0.5), math.inf, 0.01),
-        (("wall", "coarse", 0.5), 0.05, 0.0),
+        (("wall", "quick", 0.5), 0.05, 0.0),
         (("wall", "flat", 0.5), 1 - 0.7 / 0.98, 0.0),
-        (("poured", "peeling", 0.5), 0.4, 0.05),
+        (("poured", "static", 0.5), 0.4, 0.05),
     ):
         row = known.loc[[place]].iloc[0]
         assert (row["error"], row["uncertainty"]) == pytest.approx((error, uncertainty))

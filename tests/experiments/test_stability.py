@@ -9,7 +9,7 @@ from matplotlib.patches import Rectangle
 
 from orchestrator.experiments import stability
 from orchestrator.experiments.stability import FOLDER, NOTICED, Map
-from orchestrator.fidelity import levels, limits
+from orchestrator.fidelity import known, limits
 
 SMALL = """
 title = "Small"
@@ -52,7 +52,7 @@ def test_verdicts_are_those_of_real_runs(tmp_path: Path) -> None:
 
 
 def test_the_limits_were_read_off_the_maps() -> None:
-    table = pd.read_csv(levels.FOLDER / "maps.csv")
+    table = pd.read_csv(known.FOLDER / "maps.csv")
     noticed = table[table["verdict"].isin(NOTICED)]
     assert noticed["caught"].all()
 

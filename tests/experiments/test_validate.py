@@ -12,12 +12,12 @@ import pytest
 from orchestrator.bed.packing import Packing
 from orchestrator.errors import InputError
 from orchestrator.experiments import strips, validate
-from orchestrator.fidelity.levels import changed
 from orchestrator.flow.stress import WallStress
 from orchestrator.physics import beside
 from orchestrator.physics.curves import Air, iversen_white
 from orchestrator.study import fields, study
 from orchestrator.study.scene import Scene
+from orchestrator.study.study import changed
 
 TOOL = Path(__file__).parents[2] / "tools" / "tested.py"
 FLUMES = ("flumes, visual", "flumes, fixed intensity", "flumes, reference transport")

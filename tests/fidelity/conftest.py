@@ -4,9 +4,9 @@ from collections.abc import Callable
 
 import pytest
 
-from orchestrator.fidelity.levels import changed
 from orchestrator.study import study
 from orchestrator.study.scene import Scene
+from orchestrator.study.study import changed
 
 MakePile = Callable[..., Scene]
 

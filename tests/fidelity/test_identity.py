@@ -81,7 +81,7 @@ def _as_integer(value: Any) -> Any:
 
 
 def answers(*listed: Group, tolerance: float | None = None) -> Answers:
-    """Of the one scene of each group: its id, the one that answers, its levels, and why."""
+    """Of the one scene of each group: its id, the one that answers, its fidelity, and why."""
     lines = [] if tolerance is None else [f"tolerance = {tolerance}"]
     lines.append(HEAD)
     for group in listed:
@@ -95,8 +95,8 @@ def answers(*listed: Group, tolerance: float | None = None) -> Answers:
     for group_of_one in asked.groups:
         (scene,) = group_of_one.scenes
         answer = decisions[scene.id]
-        levels = answer.levels.text if answer.levels else None
-        found.append((scene.id, answer.scene.id, levels, answer.why))
+        fidelity = answer.fidelity.name if answer.fidelity else None
+        found.append((scene.id, answer.scene.id, fidelity, answer.why))
     return found
 
 
@@ -151,8 +151,8 @@ def test_a_method_that_is_asked_for_answers_whatever_other_groups_leave_open() -
         answers(left_open, by_dem),
     )
     assert (first, second) == (fourth, third)
-    assert first[2] == "standard | as asked"
-    assert second[2] == "short | pivot"
+    assert first[2] == "standard"
+    assert second[2] == "paper"
     assert first[0] != second[0]
 
 

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from orchestrator import cli, pipeline
-from orchestrator.fidelity import decision, levels
-from orchestrator.fidelity.levels import LEVELS
+from orchestrator.fidelity import known
+from orchestrator.fidelity.fidelities import FIDELITIES, QUICK
 from orchestrator.study import study
 
 PILES = """
@@ -16,17 +16,17 @@ tolerance = 0.2
 grain = {{ diameter = 1e-3 }}
 protocol = {{ load_increment = 0.03, waiting_time = 6.0, final_fraction = 0.75 }}
 forces = {{ law = "high" }}
-bed = {{ kind = "pile", height = 0.01, slope_deg = 20.0, roughness = "d/30", packing = "{}" }}
+bed = {{ kind = "pile", height = 0.014, slope_deg = 20.0, roughness = "d/30", packing = "{}" }}
 [[group]]
 name = "small"
 [[group]]
 name = "larger"
-bed = {{ height = 0.012 }}
+bed = {{ height = 0.016 }}
 """
 BY_HAND = """
 [[group]]
 name = "asked for by the pivot"
-bed = { height = 0.008 }
+bed = { height = 0.015 }
 protocol = { method = "pivot" }
 """
 
@@ -41,9 +41,10 @@ def _run(packing: str, out: Path, more: str = "") -> dict[str, pd.DataFrame]:
 def test_cheap_answers_are_checked_by_one_pile_by_dem(tmp_path: Path) -> None:
     tables = _run("aligned", tmp_path)
     answers, check = tables["pile_threshold"], tables["check"]
-    assert set(answers["grain_level"]) <= {"pivot", "peeling"}
+    assert set(answers["fidelity"]) <= {"quick", "static"}
     assert (answers["error_estimate"] <= 0.2).all()
-    assert set(tables["scenes"]["why"]) == {"cheapest within the tolerance"}
+    (why,) = set(tables["scenes"]["why"])
+    assert why.endswith("the cheapest fidelity within the tolerance")
     # the smaller of the two piles stands for both
     assert check["scene_id"].nunique() == 1
     assert len(list((tmp_path / "cases").glob("pile-*"))) == 1
@@ -57,22 +58,15 @@ def test_cheap_answers_are_checked_by_one_pile_by_dem(tmp_path: Path) -> None:
 def test_an_answer_that_its_check_contradicts_is_not_usable(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # data that call the pivot of each grain good for level rows, which it is not
+    # quick by pivots, and data that call them good for level rows, which they are not
+    monkeypatch.setitem(QUICK.grains.on, "horizontal", {})
     wrong = {
-        (part, one.name, like): np.tile([[0.01], [0.0], [float(cost)]], 4)
+        (part, one.name, like): np.tile([[0.01], [0.0]], 4)
         for part, like in (("flow", "wall"), ("grains", "horizontal"))
-        for cost, one in enumerate(LEVELS[part])
-        if one.name in ("coarse", "standard", "pivot", "peeling", "2 layers, fast")
+        for one in FIDELITIES
     }
-    wrong |= {
-        (part, name, f"{like}, limiting slope"): v
-        for (part, name, like), v in wrong.items()
-    }
-    monkeypatch.setattr(levels, "measured", lambda: wrong)
-    for cached in (levels.known_of_classes, decision._cheapest):
-        monkeypatch.setattr(
-            cached.__module__ + "." + cached.__name__, cached.__wrapped__
-        )
+    monkeypatch.setattr(known, "measured", lambda: wrong)
+    monkeypatch.setattr(known, "_of_classes", known._of_classes.__wrapped__)
     tables = _run("horizontal", tmp_path, BY_HAND)
     answers = tables["pile_threshold"].merge(
         tables["scenes"][["scene_id", "group", "why"]]
@@ -81,7 +75,7 @@ def test_an_answer_that_its_check_contradicts_is_not_usable(
     small = answers[answers["group"] == "small"]
     # the smaller of the two piles is checked, and every pile keeps its answer
     assert set(check["scene_id"]) == set(small["scene_id"])
-    assert set(answers["grain_level"]) == {"pivot"}
+    assert set(tables["scenes"]["answered_method"]) == {"pivot"}
     beyond = check["shields_high"] < check["shields_dem_low"]
     assert beyond.any()
     assert (check["agree"] != beyond).all()

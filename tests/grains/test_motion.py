@@ -18,13 +18,13 @@ from orchestrator import pipeline
 from orchestrator.bed.deck import NOISE, GrainTable, read_table
 from orchestrator.errors import Exploded, Noisy, SolverError
 from orchestrator.fidelity.decision import written
-from orchestrator.fidelity.levels import changed
 from orchestrator.grains import motion, threshold
 from orchestrator.grains.loads import forces
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.runs.case import templates
 from orchestrator.study import study
+from orchestrator.study.study import changed
 
 GONE = np.nan
 SLOPE = np.radians(20.0)

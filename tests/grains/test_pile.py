@@ -8,7 +8,6 @@ import pandas as pd
 import pytest
 
 from orchestrator.errors import Exploded, InputError
-from orchestrator.fidelity.levels import changed
 from orchestrator.grains.loads import Loads
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile, flows
@@ -17,6 +16,7 @@ from orchestrator.report import poured
 from orchestrator.report.results import Results
 from orchestrator.study import study
 from orchestrator.study.closed_form import closed_form
+from orchestrator.study.study import changed
 from orchestrator.tables.rows import Answer, size_class
 from tests import small_study
 

@@ -87,7 +87,7 @@ def test_pairs_agree_in_all_else() -> None:
     assert len(ratio) == 2
     for column in (
         *fields.others([*fields.COLUMNS, *fields.ANSWERS], "alpha_deg"),
-        "flow_level",
+        "fidelity",
     ):
         if column not in ("force_law", "d_m", "seed"):
             differing = table.assign(**{column: ["a", "b", "c", "d"]})

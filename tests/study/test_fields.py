@@ -9,11 +9,12 @@ from pydantic.fields import FieldInfo
 
 from orchestrator import plan
 from orchestrator.errors import InputError
-from orchestrator.fidelity.levels import LEVELS, changed
+from orchestrator.experiments.ladder import RUNGS
 from orchestrator.study import fields, study
 from orchestrator.study.fields import Quantity
 from orchestrator.study.parts import Gusts, LogNormal
 from orchestrator.study.scene import Scene
+from orchestrator.study.study import changed
 from orchestrator.tables import COLUMNS, rows
 
 PAGE = Path(__file__).parents[2] / "docs" / "study-file.md"
@@ -125,10 +126,11 @@ def test_beds_alike_but_for_the_size_of_their_grains_are_equal(scene: Scene) -> 
     assert len({*map(repr, in_tables((scene, other), "d_m"))}) == 1
 
 
-def test_levels_change_fields_of_the_answer_alone(scene: Scene) -> None:
+def test_rungs_change_fields_of_the_answer_alone(scene: Scene) -> None:
     about = {field.name: field.info.about for field in fields.FIELDS}
-    for level in (level for part in LEVELS.values() for level in part):
-        assert {about[name] for name in level.fields(scene)} == {"answer"}
+    for rungs in RUNGS.values():
+        for rung in rungs:
+            assert {about[name] for name in rung.fields(scene)} == {"answer"}
 
 
 def test_a_field_without_effect_is_empty_and_one_left_open_is_worked_out(

@@ -1,0 +1,177 @@
+"""Classes of scenes: a known error was measured on one class and holds for it alone.
+
+The error of a fidelity has two parts, that of the flow and that of the grains. Each
+part has its classes: the flow does not depend on the packing, nor the grains on what is
+above the flow.
+"""
+
+import math
+
+from orchestrator.bed.line import of_bed
+from orchestrator.fidelity.fidelities import packing
+from orchestrator.study.closed_form import closed_form, outer_roughness
+from orchestrator.study.fields import PARTS
+from orchestrator.study.parts import PileBed
+from orchestrator.study.scene import Scene, default_first_cell_height
+from orchestrator.study.study import value_of
+
+FLOW, GRAINS = "flow", "grains"
+"""The two parts of a known error."""
+LEVEL_BED = "level bed"  # class for the flow of beds over which u* is u*_0 everywhere
+LIMITING = ", limiting slope"  # end of the name of a class
+SMALL = ", small"  # likewise
+LEAST_COUNTED = 38.0  # grains of a bed that is not small
+LIMITING_DEG = 5.0  # below the limiting slope, from which a slope belongs to it
+LEAST_DISORDER, MOST_DISORDER = (
+    0.02,
+    0.2,
+)  # largest gaps of the two classes of random gaps, d
+NEAR_ROWS = ("aligned", f"disordered up to {LEAST_DISORDER:g} d")
+CURVED_SHAPES = ("cosine", "gaussian", "rushil")
+LIFTED_TO = 1.235  # largest lift over the weight normal to the bed that was measured
+SAME_CELL = 0.02  # relative difference of the first cell that changes no known error
+AT_LEAST = ("flow.lid", "flow.upstream", "flow.downstream")  # as good where larger
+SETTINGS = (
+    *AT_LEAST,
+    "flow.turbulence_model",
+    "flow.convection_scheme",
+    "forces.averaging_length",
+    "forces.loaded_grains",
+    "forces.exposure",
+    "forces.sheltering",
+    "grain.cohesion",
+    "protocol.displacement_criterion",
+)
+
+
+def _default(name: str) -> object:
+    part, field = name.split(".")
+    return PARTS[part].model_fields[field].default
+
+
+DEFAULTS = {name: _default(name) for name in SETTINGS}
+"""Fields that move an answer and that the ladder keeps at their defaults."""
+
+
+def scene_class(part: str, scene: Scene) -> str:
+    """The class of a pile for the flow or for the grains.
+
+    For the flow it names how the stress is read, and what the flow goes over or under.
+    For the grains it names their packing, and whether lift takes them off before they
+    roll.
+    """
+    if part == FLOW:
+        return _flow_class(scene)
+    return _grain_class(scene)
+
+
+def _flow_class(scene: Scene) -> str:
+    bed, stress = scene.bed, scene.forces.stress
+    assert isinstance(bed, PileBed)
+    if bed.is_level:
+        return LEVEL_BED
+    if bed.obstacles:
+        return f"{stress}, obstacles"
+    if is_curved(bed):
+        return f"{stress}, curved forms"
+    if scene.flow.top != "boundary layer":
+        return f"{stress}, channel"
+    if stress != "wall":
+        return stress
+    if _is_random(bed):
+        return f"{stress}, random beds"
+    name = stress + LIMITING if is_limiting(scene) else stress
+    return name + SMALL if is_small(scene) else name
+
+
+def _grain_class(scene: Scene) -> str:
+    bed, name = scene.bed, packing(scene)
+    assert isinstance(bed, PileBed)
+    if name == "disordered":
+        is_slight = bed.disorder <= LEAST_DISORDER
+        name += f" up to {LEAST_DISORDER if is_slight else MOST_DISORDER:g} d"
+    is_near_row = name in NEAR_ROWS
+    if lift_over_weight(scene) > 1:
+        # a lifted grain does not roll over those beside it: slight gaps change nothing
+        return f"{'aligned' if is_near_row else name}, lifted"
+    if bed.shape == "flat" and not bed.profile:
+        return f"{name}, level bed"
+    if is_curved(bed):
+        return f"{name}, curved forms"
+    # which grain of level rows and of large gaps goes first is chaotic on any slope
+    if is_near_row and is_limiting(scene):
+        name += LIMITING
+    if bed.packing == "aligned" and is_small(scene):
+        name += SMALL
+    return name
+
+
+def is_curved(bed: PileBed) -> bool:
+    """Whether a bed has no edge where a row of grains could begin to leave."""
+    if bed.profile or bed.brink_radius or bed.windward == "curved":
+        return True
+    return bed.shape in CURVED_SHAPES
+
+
+def is_small(scene: Scene) -> bool:
+    """Whether so few grains are counted that a tenth of them is a few."""
+    bed = scene.bed
+    assert isinstance(bed, PileBed)
+    line = of_bed(bed)
+    counted = line.lengths[line.counted(bed.counts)].sum()
+    return bool(counted < LEAST_COUNTED * scene.grain.diameter)
+
+
+def _is_random(bed: PileBed) -> bool:
+    """Whether which grain goes first depends on the draw of the bed."""
+    if bed.packing == "disordered":
+        return bed.disorder > LEAST_DISORDER
+    return bed.packing == "poured"
+
+
+def is_limiting(scene: Scene) -> bool:
+    """Whether the slope is near that on which grains leave without any flow."""
+    return scene.limiting_slope_deg - scene.bed.slope_deg < LIMITING_DEG
+
+
+def lift_over_weight(scene: Scene) -> float:
+    """Lift over the weight normal to the bed when a grain would roll.
+
+    Above 1 the grain is gone before it rolls.
+    """
+    normal = scene.weight * math.cos(math.radians(scene.bed.slope_deg))
+    return float(closed_form(scene).lift) / normal
+
+
+def unmeasured(scene: Scene) -> str:
+    """The property of a pile for which nothing was measured, in words, or empty."""
+    lift = lift_over_weight(scene)
+    if lift > LIFTED_TO:
+        return f"a lift of {lift:.3g} times the weight normal to the bed"
+    if scene.flow.gusts:
+        return f"flow.gusts = {scene.flow.gusts}"
+    is_solved = scene.flow.model == "solve"
+    for name, default in DEFAULTS.items():
+        if name.startswith("flow.") and not is_solved:
+            continue
+        value = value_of(scene, name)
+        is_other = value < default if name in AT_LEAST else value != default
+        if is_other:
+            return f"{name} = {value}"
+    return _unmeasured_solve(scene) if is_solved else ""
+
+
+def _unmeasured_solve(scene: Scene) -> str:
+    """The number of a solved flow for which nothing was measured, in words."""
+    bed, roughness = scene.bed, scene.flow.roughness
+    assert isinstance(bed, PileBed)
+    default = default_first_cell_height(bed.relief, scene.solve_roughness)
+    if abs(scene.first_cell_height / default - 1) > SAME_CELL:
+        cell = scene.first_cell_height
+        return f"first cells of {cell:.3g} m in place of {default:.3g} m"
+    if not roughness:
+        return ""
+    for near in (bed.roughness, outer_roughness(scene) or bed.roughness):
+        if abs(math.log2(roughness / near)) <= 0.5 + 1e-6:
+            return ""
+    return f"flow.roughness = {roughness:.3g} m"

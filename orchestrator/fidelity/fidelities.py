@@ -1,0 +1,199 @@
+"""Fidelities: named ways to answer a pile, from cheap to dear.
+
+A fidelity changes how a scene is answered, never what it asks. It has two rungs of the
+ladder of models, one for the flow and one for the grains. ``study/fidelities.toml``
+writes each of them out.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from orchestrator.digits import rounded, whole_up
+from orchestrator.physics.constants import KARMAN
+from orchestrator.study import fidelities as named_sets
+from orchestrator.study.closed_form import closed_form, outer_roughness
+from orchestrator.study.parts import PileBed, extremes
+from orchestrator.study.scene import LEAST_WIDTH, Scene
+from orchestrator.study.study import changed, value_of
+
+Fields = Mapping[str, Any]  # values of a scene's fields, named as in a study file
+STRIP_WIDTH = (
+    5.0  # of the bed of the rung `strip`, d; more where the largest grains need it
+)
+FINER = {
+    "flow.cells_per_face": 1,
+    "flow.expansion_ratio": -1,
+    "bed.mobile_layers": 1,
+    "grain.stiffness": 1,
+    "protocol.time_step": -1,
+    "protocol.waiting_time": 1,
+    "protocol.load_increment": -1,
+}
+"""Numbers of a fidelity, and whether a larger (1) or a smaller one (-1) is finer."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rung:
+    """One way to answer the flow or the grains of a pile.
+
+    Attributes
+    ----------
+    name, meaning
+        Its name, and what it does in words.
+    sets
+        The fields of a scene that it sets.
+    on
+        By packing, the fields that it sets to something else there.
+    not_on
+        The packings that it cannot answer.
+    derived
+        The field that follows from the scene: "threshold_speed", "paper_stiffness",
+        "strip_width"; else empty.
+    same_model
+        Whether it is of the model of the reference, so that its difference is an error.
+    most_grains
+        The ladder measures it on piles of at most so many exposed grains.
+    """
+
+    name: str
+    meaning: str
+    sets: Fields = field(default_factory=dict)
+    on: Mapping[str, Fields] = field(default_factory=dict)
+    not_on: Sequence[str] = ()
+    derived: str = ""
+    same_model: bool = True
+    most_grains: float = math.inf
+
+    def takes(self, scene: Scene) -> bool:
+        """Whether it can answer a pile.
+
+        Linear theory knows boundary layers over beds without obstacles.
+        """
+        bed = scene.bed
+        assert isinstance(bed, PileBed)
+        if self.sets.get("flow.model") == "waves":
+            return scene.flow.top == "boundary layer" and not bed.obstacles
+        return packing(scene) not in self.not_on
+
+    def changes(self, scene: Scene) -> Fields:
+        """The fields that it sets where it answers: of fine sand z0, too."""
+        fields = dict(self.fields(scene))
+        if self.sets.get("flow.model", "flat") != "flat":
+            fields["flow.roughness"] = outer_roughness(scene)
+        return fields
+
+    def describes(self, scene: Scene, *, or_finer: bool = False) -> bool:
+        """Whether the scene has the numbers of this rung, or finer ones."""
+        if not self.takes(scene):
+            return False
+        for name, value in self.fields(scene).items():
+            own = value_of(scene, name)
+            if or_finer and name in FINER:
+                if FINER[name] * (own - value) < 0:
+                    return False
+            elif own != value:
+                return False
+        return True
+
+    def fields(self, scene: Scene) -> Fields:
+        """The fields that it sets in a scene."""
+        bed = scene.bed
+        assert isinstance(bed, PileBed)
+        fields = {**self.sets, **self.on.get(packing(scene), {})}
+        if self.derived == "threshold_speed":
+            ustar = float(closed_form(scene).friction_velocity)
+            speed = ustar / KARMAN * math.log1p(10 * bed.height / bed.roughness)
+            fields["flow.speed"] = float(f"{speed:.6g}")
+            fields["flow.first_cell_height"] = scene.first_cell_height
+        elif self.derived == "paper_stiffness":
+            stiffness = 1e6 * scene.grain.diameter / scene.weight  # of 1e6 N/m
+            fields["grain.stiffness"] = rounded(stiffness)
+        elif self.derived == "strip_width":
+            largest = extremes(scene.grain.sizes, scene.grain.diameter)[1]
+            least = max(STRIP_WIDTH, float(whole_up(LEAST_WIDTH * largest)))
+            fields["bed.width"] = least if scene.is_poured else 0.0
+        return fields
+
+
+@dataclass(frozen=True)
+class Fidelity:
+    """A way to answer a pile: a rung for its flow and one for its grains."""
+
+    name: str
+    meaning: str
+    flow: Rung
+    grains: Rung
+
+    @property
+    def is_dem(self) -> bool:
+        """Whether grains are moved by DEM."""
+        return bool(self.grains.sets["protocol.method"] == "dem")
+
+    def takes(self, scene: Scene) -> bool:
+        """Whether it can answer a pile."""
+        return self.flow_over(scene).takes(scene) and self.grains.takes(scene)
+
+    def flow_over(self, scene: Scene) -> Rung:
+        """Its rung for the flow; over a level bed u* is u*_0, and none is solved."""
+        assert isinstance(scene.bed, PileBed)
+        return FLAT if scene.bed.is_level else self.flow
+
+    def answer(self, scene: Scene) -> Scene:
+        """The scene as this fidelity answers it."""
+        flow = self.flow_over(scene).changes(scene)
+        return changed(scene, {**flow, **self.grains.changes(scene)})
+
+    def describes(self, scene: Scene) -> bool:
+        """Whether a scene has all of its numbers."""
+        return self.flow_over(scene).describes(scene) and self.grains.describes(scene)
+
+
+def named(name: str) -> Fidelity:
+    """A fidelity by its name."""
+    return next(one for one in FIDELITIES if one.name == name)
+
+
+def packing(scene: Scene) -> str:
+    """The packing of a pile; a poured bed in space is a "strip"."""
+    assert isinstance(scene.bed, PileBed)
+    return "strip" if scene.bed.width else scene.bed.packing
+
+
+def _load() -> tuple[Fidelity, ...]:
+    loaded = []
+    for name, row in named_sets.WRITTEN.items():
+        meaning = row["meaning"]
+        flow = Rung(name, meaning, row["flow"])
+        grains = Rung(
+            name, meaning, row["grains"], row.get("on", {}), row.get("not_on", ())
+        )
+        loaded.append(Fidelity(name, meaning, flow, grains))
+    return tuple(loaded)
+
+
+FLAT = Rung("flat", "log law on a flat bed: u*₀ everywhere", {"flow.model": "flat"})
+FIDELITIES = _load()
+"""The fidelities, from cheap to dear: the last one is the reference."""
+QUICK, REFERENCE = FIDELITIES[0], FIDELITIES[-1]
+OWN = Rung("own", "numbers of the study file")
+OWN_NUMBERS = Fidelity("own numbers", "numbers of the study file", OWN, OWN)
+"""Stands for the fidelity of a scene that has the numbers of none."""
+LOCAL = Fidelity(
+    "local",
+    "closed form along the bed line",
+    OWN,
+    Rung("local", "closed form along the bed line", {"protocol.method": "local"}),
+)
+"""A way without grains, for beds that have too many: its error is that of pivots."""
+
+
+def fidelity_of(scene: Scene) -> Fidelity:
+    """The fidelity whose numbers a pile has; `OWN_NUMBERS` where it is none."""
+    if LOCAL.grains.describes(scene):
+        return LOCAL
+    for one in FIDELITIES[::-1]:
+        if one.describes(scene):
+            return one
+    return OWN_NUMBERS

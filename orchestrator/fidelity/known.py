@@ -1,0 +1,140 @@
+"""Known errors of the fidelities: what `orchestrator ladder` measured, by class.
+
+``calibration/errors.csv`` has the largest error over the scenes of each class. A class
+has a known error where at least `LEAST_SCENES` scenes were measured.
+"""
+
+import math
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from orchestrator.fidelity.classes import (
+    FLOW,
+    GRAINS,
+    LEVEL_BED,
+    scene_class,
+    unmeasured,
+)
+from orchestrator.fidelity.fidelities import (
+    FIDELITIES,
+    FLAT,
+    LOCAL,
+    OWN,
+    OWN_NUMBERS,
+    QUICK,
+    Fidelity,
+    Rung,
+)
+from orchestrator.study.scene import Scene
+from orchestrator.types import FloatArray
+
+FOLDER = Path(__file__).with_name("calibration")
+LEAST_SCENES = 10  # of a class, for an error to be known
+UNBOUND = 10.0  # a rung that was off by so many times a threshold says nothing of it
+
+
+class Known(NamedTuple):
+    """Known relative error of tau_c against the reference.
+
+    Attributes
+    ----------
+    error
+        Largest relative difference from the reference.
+    uncertainty
+        Change of the reference itself when its own numbers were changed.
+    """
+
+    error: float
+    uncertainty: float
+
+    @property
+    def total(self) -> float:
+        """Error and uncertainty together: the root of the sum of their squares."""
+        return math.hypot(self.error, self.uncertainty)
+
+
+UNKNOWN = Known(math.inf, 0.0)
+
+
+def known(fidelity: Fidelity, scene: Scene) -> Known:
+    """Known error of a fidelity on a pile, at the fraction where it is largest.
+
+    Errors and uncertainties of flow and grains add up by their squares
+    (docs/ladder.md).
+
+    Parameters
+    ----------
+    fidelity
+        The fidelity. That of a scene with numbers of its own has, for flow and grains
+        each, the error of the dearest fidelity that is no finer.
+    scene
+        The pile as it is asked for, or as it is answered where it has its own numbers.
+
+    Returns
+    -------
+    Known
+        `UNKNOWN` where nothing was measured.
+    """
+    if unmeasured(scene):
+        return UNKNOWN
+    flow = fidelity.flow_over(scene)
+    grains = fidelity.grains
+    if fidelity in (OWN_NUMBERS, LOCAL):
+        flow = _no_finer(FLOW, scene)
+        grains = QUICK.grains if fidelity is LOCAL else _no_finer(GRAINS, scene)
+    return _of_classes(
+        flow, grains, scene_class(FLOW, scene), scene_class(GRAINS, scene)
+    )
+
+
+def _no_finer(part: str, scene: Scene) -> Rung:
+    """The dearest measured rung that is no finer than a scene; `OWN` if none is."""
+    if part == FLOW and scene_class(FLOW, scene) == LEVEL_BED:
+        return FLAT if FLAT.describes(scene) else OWN
+    name = scene_class(part, scene)
+    for one in FIDELITIES[::-1]:
+        rung = one.flow if part == FLOW else one.grains
+        if (part, rung.name, name) in measured() and rung.describes(
+            scene, or_finer=True
+        ):
+            return rung
+    return OWN
+
+
+@cache  # a study has thousands of scenes of a few classes
+def _of_classes(flow: Rung, grains: Rung, flow_class: str, grain_class: str) -> Known:
+    """Known error of two rungs on two classes; unknown where it has no bound."""
+    keys = [(GRAINS, grains.name, grain_class)]
+    if flow_class == LEVEL_BED and flow is not FLAT:
+        return UNKNOWN
+    if flow_class != LEVEL_BED:
+        keys.append((FLOW, flow.name, flow_class))
+    table = measured()
+    if not all(key in table for key in keys):
+        return UNKNOWN
+    # both parts at each fraction, and the worst fraction
+    squares = sum(table[key] ** 2 for key in keys)
+    errors, uncertainties = np.sqrt(squares)
+    worst = int(np.argmax(np.hypot(errors, uncertainties)))
+    found = Known(float(errors[worst]), float(uncertainties[worst]))
+    return found if found.total < UNBOUND else UNKNOWN
+
+
+@cache
+def measured() -> dict[tuple[str, str, str], FloatArray]:
+    """The measured errors, by part, name of the rung and class of scene.
+
+    Each is an array with the rows error and uncertainty, and a column for each
+    fraction. Classes of fewer than `LEAST_SCENES` scenes are left out.
+    """
+    table = pd.read_csv(FOLDER / "errors.csv").sort_values("fraction")
+    found: dict[tuple[str, str, str], FloatArray] = {}
+    for (part, rung, name), rows in table.groupby(["part", "rung", "scene_class"]):
+        if rows["scenes"].min() >= LEAST_SCENES:
+            numbers = rows[["error", "uncertainty"]].to_numpy(float).T
+            found[str(part), str(rung), str(name)] = numbers
+    return found

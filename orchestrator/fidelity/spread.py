@@ -1,0 +1,120 @@
+"""The spread of the model: what choices move that all fidelities share.
+
+``calibration/budget.csv`` has what `orchestrator budget` measured.
+"""
+
+import math
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from orchestrator.fidelity.known import FOLDER
+from orchestrator.study.closed_form import closed_form
+from orchestrator.study.parts import PileBed
+from orchestrator.study.scene import Scene
+
+VISCOUS, ROUGH = (
+    3.0,
+    30.0,
+)  # Re* below which a bed is smooth, and from which it is rough
+FROZEN = "frozen bed"
+"""The choice that the flow of the whole pile acts until the last grain has left."""
+STATED = (
+    "packing",
+    "roughness length",
+    "entrainment angle",
+    "friction angle",
+    "lift coefficient",
+)
+"""Choices whose values a study file states."""
+
+
+class Spread(NamedTuple):
+    """How far the choices of all fidelities lower and raise a Shields number, relative.
+
+    Attributes
+    ----------
+    low, high
+        All choices together, down and up.
+    dominant
+        The choice whose interval is the widest.
+    frozen_bed
+        How far a bed that changes moves the number at most.
+    """
+
+    low: float = math.nan
+    high: float = math.nan
+    dominant: str = ""
+    frozen_bed: float = math.nan
+
+
+def model_class(scene: Scene) -> str:
+    """The class of scenes on which the shared choices have the same effect."""
+    bed, reynolds = scene.bed, float(closed_form(scene).reynolds)
+    assert isinstance(bed, PileBed)
+    regime = (
+        "viscous"
+        if reynolds < VISCOUS
+        else "transitional"
+        if reynolds < ROUGH
+        else "rough"
+    )
+    shape = "" if bed.is_triangle else f", {'profile' if bed.profile else bed.shape}"
+    return f"{bed.packing}, {regime}{shape}"
+
+
+def spread(scene: Scene, fraction: float) -> Spread:
+    """The spread of the threshold of a pile at a fraction; NaN where not known.
+
+    What the frozen bed does is the largest of the scenes of the class; it is not known
+    of a bed that changes already, nor of a flow that is not solved.
+    """
+    of_class = _spread(model_class(scene), fraction)
+    if scene.protocol.update or scene.flow.model != "solve":
+        return of_class._replace(frozen_bed=math.nan)
+    return of_class
+
+
+@cache
+def _spread(model: str, fraction: float) -> Spread:
+    """The spread of a class, at the measured fraction that is nearest."""
+    rows = _budget().query("model_class == @model").set_index("choice")
+    apart = (rows["fraction"] - fraction).abs()
+    shares = rows.loc[apart == apart.min(), ["shields_low", "shields_high"]]
+    if shares.empty:
+        return Spread()
+    frozen_bed = float(shares.max(axis=1).get(FROZEN, math.nan))
+    return Spread(*together(shares), str(shares.sum(axis=1).idxmax()), frozen_bed)
+
+
+def together(shares: pd.DataFrame, quantity: str = "shields") -> tuple[float, float]:
+    """Shares of independent choices as one, down and up, by their squares.
+
+    Nothing falls below zero, however many choices lower it.
+    """
+    low, high = (
+        float(np.hypot.reduce(shares[f"{quantity}_{end}"])) for end in ("low", "high")
+    )
+    return min(low, 1.0), high
+
+
+@cache
+def floors() -> dict[str, float]:
+    """Error below which the model's uncertainty hides the numerics, by class.
+
+    Half the interval of the choices that no study file states, the smallest over the
+    fractions.
+    """
+    unstated = _budget()[~_budget()["choice"].isin(STATED)]
+    groups = unstated.groupby(["model_class", "fraction"])
+    halves = pd.Series({key: sum(together(part)) / 2 for key, part in groups})
+    return {
+        str(model): float(half) for model, half in halves.groupby(level=0).min().items()
+    }
+
+
+@cache
+def _budget() -> pd.DataFrame:
+    return pd.read_csv(FOLDER / "budget.csv")
