@@ -260,6 +260,7 @@ def sunk(geometry: Geometry, worn: Worn) -> BedLine:
     z = whole - np.interp(finer.x, x, depth, left=0.0, right=0.0)
     # a form wears down to the flat bed around it, unless counted grains lie as low as that
     low = np.maximum(line.z[1:], line.z[:-1]) <= ground + LEVEL
+    low |= np.minimum(line.z[1:], line.z[:-1]) < ground - LEVEL
     if not (low & line.counted(geometry.counts)).any():
         z = np.maximum(z, np.minimum(whole, ground))
     inside = (np.array(finer.x) > line.x[1]) & (np.array(finer.x) < line.x[-2])
