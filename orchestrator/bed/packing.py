@@ -435,14 +435,25 @@ def _filling(
     down = -corners @ normal / np.sin(beta)
     rows = np.arange(0, whole_up(down.max()) + 3)
     columns = np.arange(-whole_up(-along.min()) - 3, whole_up(along.max()) + 4)
-    offset = (2 * columns + rows[:, None] % 2) * np.cos(beta)
-    fall = np.broadcast_to(rows[:, None] * np.sin(beta), offset.shape)
+    beyond = {
+        number: (line.normals[number], (apex - line.corners[number]), most + 1)
+        for number, most in thick.items()
+    }
+    parts = []
+    for out, from_corner, most in beyond.values():
+        # distance of the place (row, column) over the face: a column + b row + c
+        per_column = 2 * np.cos(beta) * float(direction @ out)
+        at_first = from_corner @ out - surface
+        at_first = at_first - rows * np.sin(beta) * float(normal @ out)
+        at_first = at_first + rows % 2 * np.cos(beta) * float(direction @ out)
+        parts.append(_columns_within(at_first, per_column, most, columns))
+    row, column = np.unique(np.concatenate(parts), axis=0).T
+    offset = (2 * column + row % 2) * np.cos(beta)
+    fall = row * np.sin(beta)
     is_near = np.zeros(offset.shape, bool)
-    for number, most in thick.items():
-        out = line.normals[number]
+    for out, from_corner, most in beyond.values():
         over_apex = offset * (direction @ out) - fall * (normal @ out)
-        over = over_apex + (apex - line.corners[number]) @ out - surface
-        is_near |= np.abs(over) < most + 1
+        is_near |= np.abs(over_apex + from_corner @ out - surface) < most
     into = np.outer(offset[is_near], direction)
     points = apex + into - np.outer(fall[is_near], normal)
     if not lattice.uneven:
@@ -452,6 +463,29 @@ def _filling(
     upper = apex + _disordered(count, layers, lattice) @ np.vstack([direction, normal])
     is_lower = (apex - points) @ normal > (layers + 0.5) * np.sin(beta)
     return np.vstack([upper, points[is_lower]])
+
+
+def _columns_within(
+    first: FloatArray, step: float, most: float, columns: IntArray
+) -> IntArray:
+    """Row and column of all places that are within a distance of a face, and some more.
+
+    The distance in column 0 of each row is `first`, and from one column to the next it
+    grows by `step`. Of a pile of thousands of grains these are few of all its places.
+    """
+    low = np.full(len(first), columns[0])
+    high = np.full(len(first), columns[-1])
+    if abs(step) < TIE:  # the rows go along the face
+        high = np.where(np.abs(first) < most + 1, high, columns[0] - 1)
+    else:
+        middle = -first / step
+        reach = most / abs(step) + 2
+        low = np.clip(np.floor(middle - reach), columns[0], columns[-1] + 1).astype(int)
+        high = np.clip(np.ceil(middle + reach), columns[0] - 1, columns[-1]).astype(int)
+    counts = np.maximum(high - low + 1, 0)
+    row = np.repeat(np.arange(len(first)), counts)
+    into = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    return np.column_stack([row, low[row] + into])
 
 
 def _disordered(columns: int, layers: int, lattice: Lattice) -> FloatArray:

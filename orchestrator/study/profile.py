@@ -29,6 +29,7 @@ GAP, DENSE = 20.0, 20
 """A step along x this many times the middle one is a gap, in a profile of so many points."""
 STEEPEST_DEG = 60.0  # slope beyond which no mesh of vertical grid lines follows the bed
 RESOLVED = 4  # corners of a smoothed line in its smoothing length
+LOWEST = 1e-6  # least of the two lengths below, over that of the line
 OVER = (
     0.5  # each of the two lengths whose means give the slope of a line, over its height
 )
@@ -72,7 +73,9 @@ def steepest_deg(profile: Profile, height: float) -> float:
         The slope, degrees; 0 of a line that rises nowhere.
     """
     x, z = np.array(profile.x), np.array(profile.z)
-    length = min(OVER * height, (x[-1] - x[0]) / 4)
+    # round-off says nothing of the slope of a line that is hardly high
+    length = max(OVER * height, LOWEST * (x[-1] - x[0]))
+    length = min(length, (x[-1] - x[0]) / 4)
     areas = np.concatenate([[0.0], np.cumsum((z[1:] + z[:-1]) / 2 * np.diff(x))])
     slopes = np.diff(z) / np.diff(x)
 

@@ -16,7 +16,6 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
-from operator import attrgetter
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -178,6 +177,8 @@ ASKED = (
     "fluid.gravity",
     "bed.slope_deg",
     "bed.entrainment_angle_deg",
+    "bed.lee_slope_deg",
+    "flow.depth",
     "forces.lift_coefficient",
 )
 """The fields that are asked about where their numbers are usual in another unit."""
@@ -185,7 +186,12 @@ ASKED = (
 
 def _values_of(scenes: Sequence[Scene]) -> dict[str, list[float]]:
     """The values of the fields `ASKED` in some scenes."""
-    values = {name: [*map(attrgetter(name), scenes)] for name in ASKED}
+    values: dict[str, list[float]] = {}
+    for name in ASKED:
+        part, _, field = name.partition(".")
+        each = [getattr(getattr(scene, part), field, None) for scene in scenes]
+        # what is left open is no number, and a bed of one grain has no lee side
+        values[name] = [value for value in each if value is not None]
     # the diameter of a sieve table follows from its rows, the slope of a profile from its points
     single = [
         scene.grain for scene in scenes if not isinstance(scene.grain.sizes, tuple)

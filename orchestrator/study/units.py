@@ -70,6 +70,14 @@ UNITS = (
         "{0:g}: did you mean Saffman's for the radius",
         0.25,
     ),
+    Unit(
+        "bed.lee_slope_deg",
+        0.05,
+        0.62,
+        "{0:g} deg: did you mean {0:g} rad",
+        TO_SI["rad"],
+    ),
+    Unit("flow.depth", 250.0, math.inf, "{0:g} m: did you mean {0:g} mm", 1e-3),
     Unit("fluid.gravity", 50.0, math.inf, "{0:g} m/s2: did you mean {0:g} cm/s2", 0.01),
 )
 COHESIVE_BELOW = (6e-5, 1e-4)

@@ -228,3 +228,10 @@ def test_the_slope_of_a_straight_side_is_its_own(
     side = 0.02 / math.tan(math.radians(slope_deg))
     bed = scene_of(tmp_path, points("0,0", f"{side!r},0.02", f"{2 * side!r},0")).bed
     assert bed.slope_deg == slope_deg
+
+
+def test_a_profile_that_is_level_but_for_round_off_is_refused_for_its_height(
+    tmp_path: Path,
+) -> None:
+    with pytest.raises(InputError, match=r"bed\.height: 0\.0 is not accepted"):
+        scene_of(tmp_path, points("0,0", "0.05,1e-13", "0.1,0"))

@@ -59,6 +59,12 @@ ASKED = {
     f"{SAND}{PILE.replace('15.0', '0.2618')}": "0.2618 rad, bed.slope_deg = 15?",
     f"{SAND}bed.entrainment_angle_deg = 1.05": "bed.entrainment_angle_deg = 60.16?",
     f"{SAND}forces.lift_coefficient = 6.46": "forces.lift_coefficient = 1.615?",
+    f"{SAND}bed = {{ kind = 'dune', slope_deg = 15.0, lee_slope_deg = 0.52 }}": (
+        "0.52 rad, bed.lee_slope_deg = 29.79?"
+    ),
+    f"{SAND}{PILE}flow = {{ top = 'open water', depth = 400.0 }}": (
+        "400 mm, flow.depth = 0.4?"
+    ),
     f"{SAND}fluid.gravity = 981.0": "981 cm/s2, fluid.gravity = 9.81?",
     "grain.diameter = 1e-3\nfluid.viscosity = 1.8": "1.8 Pa s, is unusual for 1 kg/m3",
     "grain.diameter = 1e-3\nfluid.density = 1000.0\ngrain.density = 2e3": "0.01 Pa s, is un",
