@@ -64,7 +64,7 @@ def test_the_last_of_the_load_steps_is_not_one_of_the_last_digits() -> None:
     for first in np.linspace(0.01, 0.9, 500).tolist():
         last = first * 1.05
         for near in (np.nextafter(last, 0), last, np.nextafter(last, 1)):
-            assert len(deck.flows(first, near, 0.05)) == 3
+            assert len(deck.rising_flows(first, near, 0.05)) == 3
 
 
 SCENE = """

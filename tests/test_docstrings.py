@@ -27,8 +27,10 @@ PHYSICS = (
 """Modules whose public functions have an example each."""
 DESCRIBED = (
     *PHYSICS,
+    "orchestrator.bed.deck",
     "orchestrator.bed.line",
     "orchestrator.bed.packing",
+    "orchestrator.bed.poured",
     "orchestrator.benchmark.checks",
     "orchestrator.benchmark.export",
     "orchestrator.benchmark.mechanics",

@@ -1,4 +1,4 @@
-"""The decks of LIGGGHTS: contact law, protocol and cost, the files written and the dumps read."""
+"""The decks of LIGGGHTS: contact law, protocol and cost, files written and dumps read."""
 
 import math
 from collections.abc import Mapping
@@ -51,41 +51,60 @@ MEANING = {
     "ranks": "processes that share the grains; Allrun reads it",
 }
 """Parameters of the decks, with their units."""
-GONE, FIXED, MOBILE, COUNTED, PUSHED = 0, 1, 2, 3, 4
-"""Grain types of the deck: fixed; mobile; mobile and exposed: counted, or pushed only. Those that
-have gone are in no deck."""
-SAMPLING_INTERVAL = 0.5  # time between two samples of the grains, sqrt(d/g')
+GONE = 0
+"""Kind of the grains that have gone: they are in no deck."""
+FIXED = 1
+"""Grain type of the deck: fixed."""
+MOBILE = 2
+"""Grain type: mobile and not exposed."""
+COUNTED = 3
+"""Grain type: mobile, exposed and counted."""
+PUSHED = 4
+"""Grain type: mobile, exposed and not counted."""
+SAMPLING_INTERVAL = 0.5
+"""Time between two samples of the grains, sqrt(d/g')."""
 REST_ENERGY = 1e-6
-"""Kinetic energy of all mobile grains that have not passed the displacement criterion, W d, below
-which a load step ends, if it falls. Of 1476 thresholds of 369 piles, 1438 lie in the same load step
-as with the waiting time alone, 23 in one beside it, 15 further off: most on level and disordered
-rows, where round-off decides. Of 1079 single grains none moves in another load step."""
+"""Kinetic energy of all mobile grains that have not passed the displacement criterion,
+W d, below which a load step ends, if it falls. Of 1476 thresholds of 369 piles, 1438 lie
+in the same load step as with the waiting time alone, 23 in one beside it, 15 further off:
+most on level and disordered rows, where round-off decides. Of 1079 single grains none
+moves in another load step."""
 SETTLE = 10.0
 """Time in which the bed settles before the first load step, at least, sqrt(d/g')."""
 MOST_SETTLE = 400.0
 """Time after which a bed that does not lie yet is given up, sqrt(d/g')."""
 NOISE = 0.01
-"""Most kinetic energy of a mobile grain at rest, over W^2/K, which is twice what its weight stores
-in a spring. Beyond it trials at 0 to 0.9 of damping and 0.05 to 1.2 of time step gave other
-thresholds; at a damping of 0.1 and a time step of 0.3 it is 1e-5."""
+"""Most kinetic energy of a mobile grain at rest, over W^2/K, which is twice what its
+weight stores in a spring. Beyond it trials at 0 to 0.9 of damping and 0.05 to 1.2 of time
+step gave other thresholds; at a damping of 0.1 and a time step of 0.3 it is 1e-5."""
 POURED_DRAG = 2.0
-"""Drag of a still fluid in which a poured bed settles, m sqrt(g'/d): its springs may be softer than
-those of the pouring, and without a drag a pile of 25 degrees was not at rest at the end."""
+"""Drag of a still fluid in which a poured bed settles, m sqrt(g'/d): its springs may be
+softer than those of the pouring, and without a drag a pile of 25 degrees was not at rest
+at the end."""
 SETTLE_FLOW = math.sqrt(0.5)
-"""Flow of the settling over that of the first load step: about half of its force. Without any, a
-bed at its limiting slope would not come to rest."""
-STEADY = np.ones(1)  # the gusts of a deck without any
-START = (
-    0.9  # flow of the first load step over that of the first threshold by the pivot law
-)
+"""Flow of the settling over that of the first load step: about half of its force. Without
+any, a bed at its limiting slope would not come to rest."""
+STEADY = np.ones(1)
+"""The gusts of a deck without any."""
+START = 0.9
+"""Flow of the first load step over that of the first threshold by the pivot law."""
 BEYOND = 1.2
-"""The last load step's flow over that at which the pivot law says that enough grains have moved."""
+"""The last load step's flow over that at which the pivot law says that enough grains have
+moved."""
 STIR = 0.02
-"""A counted grain that is no further from its place lies there, d: it is left out of the dump.
-With a small displacement criterion, or small grains, it is less."""
+"""A counted grain that is no further from its place lies there, d: it is left out of the
+dump. With a small displacement criterion, or small grains, it is less."""
 AWAY = 10.0
-"""A counted grain that has come so far along the bed is gone, d: those that it could still meet
-have left before it."""
+"""A counted grain that has come so far along the bed is gone, d: those that it could
+still meet have left before it."""
+LATTICE_RATE = 4.5e7
+"""Grain-steps a second on lattices, measured with 30 to 770 counted grains."""
+POURED_RATE = 6e6
+"""Grain-steps a second on poured beds."""
+SLOWED_BY = 700.0
+"""Exposed grains of a poured bed that double its load steps: the more are exposed, the
+more often one passes before all have waited. Load steps of 2000 took four times as long
+as those of 100."""
 
 
 def protocol(
@@ -95,10 +114,25 @@ def protocol(
     smallest: float = 1,
     gusts: Gusts | None = None,
 ) -> dict[str, float | int]:
-    """Variables of the contact law, of the settling, and of how the deck holds a load step.
+    """List the variables of the contact law, of the settling, and of the load steps.
 
-    The load steps end early when no more than `enough` counted grains have not moved. `smallest` is
-    the diameter of the smallest grain that may move, d. A gust lasts a whole number of samples.
+    Parameters
+    ----------
+    grain
+        The grains of the scene.
+    rules
+        The protocol of the scene.
+    enough
+        The load steps end early when no more counted grains have not moved.
+    smallest
+        Diameter of the smallest grain that may move, d.
+    gusts
+        The gusts of the flow; one lasts a whole number of samples.
+
+    Returns
+    -------
+    dict of str to number
+        Variables of the deck, see `MEANING`.
     """
     event = gusts.duration if gusts else SAMPLING_INTERVAL
     samples = max(round(event / SAMPLING_INTERVAL), 1)
@@ -123,11 +157,22 @@ def protocol(
     }
 
 
-def flows(first: float, last: float, step: float) -> FloatArray:
-    """The flow of the settling, then those of load steps, each higher by a relative `step`.
+def rising_flows(first: float, last: float, step: float) -> FloatArray:
+    """List the flow of the settling, then those of load steps.
 
-    The last load step reaches at least the flow `last`. All have the nine digits that the
-    deck reads.
+    Parameters
+    ----------
+    first
+        The flow of the first load step.
+    last
+        The last load step reaches at least this flow.
+    step
+        By how much each load step is higher, relative.
+
+    Returns
+    -------
+    FloatArray
+        The flows, with the nine digits that the deck reads.
     """
     count = 1 + digits.whole_up(math.log(last / first) / math.log1p(step))
     rising = first * (1 + step) ** np.arange(count)
@@ -142,17 +187,36 @@ def cost_s(
     grain: Grain,
     exposed: float = math.nan,
 ) -> float:
-    """Expected time of one core for a deck, s; `exposed` is how many grains a poured bed exposes.
+    """Estimate the time of one core for a deck.
 
-    Lattices, measured with 30 to 770 counted grains: load steps end at rest after a time `rest`,
-    sqrt(d/g'), at the latest after twice the waiting time; 4.5e7 grain-steps a second. Poured beds:
-    6e6, and the more grains are exposed, the more often one passes before all have waited: load
-    steps of 2000 took four times as long as those of 100. Their smallest grain sets the time step.
+    Parameters
+    ----------
+    load_steps
+        Number of load steps.
+    grains
+        Number of grains.
+    rest
+        Time until a load step of a lattice ends at rest, sqrt(d/g'); it ends at the
+        latest after twice the waiting time.
+    rules, grain
+        The protocol and the grains of the scene. The smallest grain of a poured bed sets
+        the time step.
+    exposed
+        Number of grains that a poured bed exposes; NaN for a lattice.
+
+    Returns
+    -------
+    float
+        The time, s.
     """
-    length, rate = min(rest, 2 * rules.waiting_time), 4.5e7
-    if not math.isnan(exposed):
-        small = math.pow(extremes(grain.sizes, grain.diameter)[0], 1.5)
-        length, rate = rules.waiting_time * (1 + exposed / 700) / small, 6e6
+    if math.isnan(exposed):
+        length = min(rest, 2 * rules.waiting_time)
+        rate = LATTICE_RATE
+    else:
+        smallest, _ = extremes(grain.sizes, grain.diameter)
+        small = math.pow(smallest, 1.5)
+        length = rules.waiting_time * (1 + exposed / SLOWED_BY) / small
+        rate = POURED_RATE
     steps = load_steps * length * math.sqrt(grain.stiffness) / rules.time_step
     return 0.1 + steps * grains / rate
 
@@ -197,26 +261,40 @@ def write(
     ranks: int = 1,
     gusts: FloatArray = STEADY,
 ) -> None:
-    """Write grains, parameters, flows and forces into a copy of the template ``liggghts/bed``.
+    """Write the files of a deck into a copy of the template ``liggghts/bed``.
 
-    Each parameter becomes a variable of the deck. `flows` has the flow of the settling, then of
-    each of s load steps, `force` the flow's force on each grain at these flows, N, shape
-    (s + 1, n, 2); only pushed grains feel one. `margin` is the distance from the outermost grains
-    to the walls of the box, m; beyond them a grain is gone. `ranks` processes share the grains. By
-    `gusts` the force is multiplied: in the settling, then for each load step in each event and
-    after the last.
+    Parameters
+    ----------
+    directory
+        The copy.
+    grains
+        The n grains.
+    parameters
+        Variables of the deck, see `MEANING`.
+    flows
+        The flow of the settling, then of each of s load steps.
+    force
+        The flow's force on each grain at these flows, N, shape (s + 1, n, 2); only
+        pushed grains feel one.
+    margin
+        Distance from the outermost grains to the walls of the box, m; beyond them a
+        grain is gone.
+    ranks
+        Processes that share the grains.
+    gusts
+        Factors of the force: in the settling, then for each load step in each event and
+        after the last.
     """
     present = np.flatnonzero(grains.kind != GONE)
     places = grains.position[present]
     bounds = np.array([places.min(axis=0) - margin, places.max(axis=0) + margin])
     if grains.width:
-        bounds[:, 1] = 0.0, grains.width * grains.diameter
-    diameters = grains.diameter * grains.sizes
+        bounds[:, 1] = (0.0, grains.width * grains.diameter)
     write_grains(
         directory,
         grains.position,
         grains.kind,
-        diameters,
+        grains.diameter * grains.sizes,
         grains.density,
         bounds,
         present,
@@ -234,7 +312,15 @@ def write(
 
 
 def write_numbers(path: Path, values: FloatArray) -> None:
-    """Write numbers, one a line."""
+    """Write numbers, one a line.
+
+    Parameters
+    ----------
+    path
+        The file.
+    values
+        The numbers.
+    """
     path.write_text("".join(f"{digits.text(each)}\n" for each in values.tolist()))
 
 
@@ -249,13 +335,23 @@ def _write_sets(path: Path, grains: IntArray, sets: FloatArray) -> None:
 def write_parameters(
     directory: Path, values: Mapping[str, float | int | tuple[float, ...]]
 ) -> None:
-    """Write ``parameters.liggghts``: a variable for each number, an index for each tuple."""
+    """Write ``parameters.liggghts``.
+
+    Parameters
+    ----------
+    directory
+        The directory of the deck.
+    values
+        A number for each variable, a tuple for each index.
+    """
     lines = []
     for name, value in values.items():
         if isinstance(value, tuple):
             text = f"index {' '.join(map(digits.text, value))}"
+        elif isinstance(value, int):
+            text = f"equal {value}"
         else:
-            text = f"equal {value if isinstance(value, int) else digits.text(value)}"
+            text = f"equal {digits.text(value)}"
         lines.append(f"variable        {name} {text}  # {MEANING[name]}\n")
     (directory / "parameters.liggghts").write_text("".join(lines))
 
@@ -269,72 +365,133 @@ def write_grains(
     bounds: FloatArray,
     order: IntArray,
 ) -> None:
-    """Write ``grains.data``, SI, with nine digits.
+    """Write ``grains.data``, in SI units with nine digits.
 
-    Positions have the shape (n, 3), `bounds` (2, 3); `order` has the numbers of those
-    written. The bounds are so far from the grains that rounding loses none.
+    Parameters
+    ----------
+    directory
+        The directory of the deck.
+    position
+        Centres, m, shape (n, 3).
+    kind
+        Grain types, shape (n,).
+    diameters
+        Diameters, m, shape (n,).
+    density
+        Density of every grain, kg/m3.
+    bounds
+        Lower and upper ends of the box, m, shape (2, 3): so far from the grains that
+        rounding loses none.
+    order
+        Numbers of the grains that are written, in their order.
     """
     row = "%d %d" + 5 * f" {digits.FORMAT}" + "\n"
-    box = "".join(
-        f"{digits.text(low)} {digits.text(high)} {axis}lo {axis}hi\n"
-        for axis, low, high in zip("xyz", *bounds.tolist(), strict=True)
-    )
-    columns = (values[order].tolist() for values in (kind, diameters, position))
-    rows = "".join(
-        row % (place + 1, number, diameter, density, *centre)
-        for place, number, diameter, centre in zip(
-            order.tolist(), *columns, strict=True
-        )
-    )
-    head = f"grains: id type diameter density x y z\n\n{len(order)} atoms\n4 atom types\n\n"
-    (directory / "grains.data").write_text(f"{head}{box}\nAtoms\n\n{rows}")
+    numbers = order.tolist()
+    kinds = kind[order].tolist()
+    sizes = diameters[order].tolist()
+    centres = position[order].tolist()
+    rows = []
+    for number, of_kind, size, centre in zip(
+        numbers, kinds, sizes, centres, strict=True
+    ):
+        rows.append(row % (number + 1, of_kind, size, density, *centre))
+    box = []
+    for axis, low, high in zip("xyz", *bounds.tolist(), strict=True):
+        box.append(f"{digits.text(low)} {digits.text(high)} {axis}lo {axis}hi\n")
+    head = "grains: id type diameter density x y z\n\n"
+    counts = f"{len(order)} atoms\n4 atom types\n\n"
+    text = f"{head}{counts}{''.join(box)}\nAtoms\n\n{''.join(rows)}"
+    (directory / "grains.data").write_text(text)
 
 
 def read_texts(path: Path, rows: int = 1) -> dict[str, NDArray[Any]]:
-    """The texts in each column of a CSV of the deck or of `collect`, which quotes none.
+    """Read the texts of a CSV of the deck or of `collect`, which quotes none.
 
-    A SolverError if it is not whole or has less rows.
+    Parameters
+    ----------
+    path
+        The file.
+    rows
+        Least number of its rows.
+
+    Returns
+    -------
+    dict of str to ndarray
+        The texts of each column.
+
+    Raises
+    ------
+    SolverError
+        If it is not whole or has less rows.
     """
     try:
         head, *lines = path.read_text(encoding="ascii").split("\n")
-        if len(lines) <= rows or lines.pop():
+        is_short = len(lines) <= rows
+        if is_short or lines.pop():
             raise ValueError("it is cut short")
         columns = np.array([line.split(",") for line in lines]).T
         return dict(zip(head.split(","), columns, strict=True))
     except (OSError, ValueError) as error:
-        what, remedy = (
-            f"the table cannot be read: {error}",
-            "run the same command again",
-        )
+        what = f"the table cannot be read: {error}"
+        remedy = "run the same command again"
         raise SolverError(what, where=str(path), remedy=remedy) from None
 
 
 def read_table(path: Path, rows: int = 1) -> pd.DataFrame:
-    """The numbers of such a CSV, to the last digit; NaN where one is missing."""
-    columns = read_texts(path, rows).items()
-    return pd.DataFrame(
-        {n: np.where(c == "", "nan", c).astype(float) for n, c in columns}
-    )
+    """Read the numbers of such a CSV, to the last digit.
+
+    Parameters
+    ----------
+    path
+        The file.
+    rows
+        Least number of its rows.
+
+    Returns
+    -------
+    DataFrame
+        The numbers; NaN where one is missing.
+    """
+    columns = {}
+    for name, texts in read_texts(path, rows).items():
+        columns[name] = np.where(texts == "", "nan", texts).astype(float)
+    return pd.DataFrame(columns)
 
 
 def read_dump(path: Path, columns: tuple[str, ...]) -> tuple[IntArray, pd.DataFrame]:
-    """Read a text dump of some columns: the time step of each frame, and a row for each grain.
+    """Read a text dump.
 
-    Frames without a grain have a time step too; each row has that of its frame in ``step``. Raises
-    a SolverError if the file is missing, cut short or not a dump of these columns.
+    Parameters
+    ----------
+    path
+        The file.
+    columns
+        Names of its columns.
+
+    Returns
+    -------
+    steps
+        The time step of each frame, also of one without a grain.
+    rows
+        A row for each grain of each frame, with its time step in ``step``.
+
+    Raises
+    ------
+    SolverError
+        If the file is missing, cut short or not a dump of these columns.
     """
     try:
         text = path.read_text(encoding="ascii")
-        heads = [frame.split("\n", 8) for frame in text.split("ITEM: TIMESTEP\n")[1:]]
-        steps, counts = (np.array([int(head[row]) for head in heads]) for row in (0, 2))
-        body = StringIO("".join(head[8] for head in heads))
-        rows = pd.read_csv(
-            body, sep=r"\s+", names=list(columns), header=None, low_memory=False
-        )
-        whole = text.endswith("\n") and len(rows) == counts.sum()
-        if not whole or rows.isna().any(axis=None):
+        frames = [frame.split("\n", 8) for frame in text.split("ITEM: TIMESTEP\n")[1:]]
+        steps = np.array([int(frame[0]) for frame in frames])
+        counts = np.array([int(frame[2]) for frame in frames])
+        body = StringIO("".join(frame[8] for frame in frames))
+        names = list(columns)
+        rows = pd.read_csv(body, sep=r"\s+", names=names, header=None, low_memory=False)
+        is_whole = text.endswith("\n") and len(rows) == counts.sum()
+        if not is_whole or rows.isna().any(axis=None):
             raise ValueError("it is cut short or has NaN")
     except (OSError, ValueError, IndexError) as error:
-        what, remedy = f"the dump cannot be read: {error}", "run the case again"
-        raise SolverError(what, where=str(path), remedy=remedy) from None
+        what = f"the dump cannot be read: {error}"
+        raise SolverError(what, where=str(path), remedy="run the case again") from None
     return steps, rows.assign(step=np.repeat(steps, counts))

@@ -22,45 +22,81 @@ from orchestrator.solvers import liggghts
 from orchestrator.study.parts import LogNormal, Range, Sizes
 from orchestrator.types import BoolArray, FloatArray
 
-HEAP = 2.0  # height of the grains over the line that are cut away, d
-FILLED, FILLED_IN_SPACE = 0.83, 0.6
-"""Part of the area, and of the volume of a strip, that settled grains fill; it only decides how
-many are poured."""
+HEAP = 2.0
+"""Height of the grains over the line that are cut away, d."""
+FILLED = 0.83
+"""Part of the area that settled grains fill; it only decides how many are poured."""
+FILLED_IN_SPACE = 0.6
+"""The same of the volume of a strip."""
 LOOSE = 0.3
-"""Room of a grain in the air, beside it and over it, in its own diameters: as little as leaves no
-order among equal grains, so that they fall no further than need be."""
-COLUMNS = 20  # columns in a diameter by which free room is looked for
-DIAMETER, DENSITY, GRAVITY = 1e-3, 2500.0, 9.81
-"""The reference grain of the deck, SI: in units of d, W and sqrt(d/g) a bed has no scale."""
+"""Room of a grain in the air, beside it and over it, in its own diameters: as little as
+leaves no order among equal grains, so that they fall no further than need be."""
+COLUMNS = 20
+"""Columns in a diameter by which free room is looked for."""
+DIAMETER = 1e-3
+"""Diameter of the reference grain of the deck, m: in units of d, W and sqrt(d/g) a bed
+has no scale."""
+DENSITY = 2500.0
+"""Its density, kg/m3."""
+GRAVITY = 9.81
+"""Acceleration of gravity in the deck, m/s2."""
 WEIGHT = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY
+"""Weight of the reference grain, N."""
 CONTACT = {"damping": 0.1, "time_step": 0.2}
 """With more damping, or a longer step, equal spheres jitter: they settle into crystals."""
-STIFFNESS, DRAG, CALM = (1e3, 1e4, 1e4), (0.0, 5.0, 1.0), (1e-2, 1e-4, 1e-6)
-"""Stiffness K d/W of each stage, its drag over m sqrt(g/d), and the kinetic energy of a grain, over
-W d, at which it ends. The grains fall on soft springs. Then a drag takes the energy of waves that
-run up and down the bed, which contacts alone take off slowly. When the bed is cut, a small drag is
-enough and lets grains roll into their pockets. The last energy is 1e-2 W^2/K, which is rest to
-other decks too: in a long bed there is always a grain that still rolls somewhere."""
-LONGEST = 400  # time that the grains have in a stage, sqrt(d/g')
-SETTLING, DUMP, BED = "settling.csv", "poured.dump", "bed.csv"
-LEAST_LENGTH = 3.0  # least length of the forms of a poured bed, d
+STIFFNESS = (1e3, 1e4, 1e4)
+"""Stiffness K d/W of each stage. The grains fall on soft springs."""
+DRAG = (0.0, 5.0, 1.0)
+"""Drag of each stage, m sqrt(g/d). After the fall a drag takes the energy of waves that
+run up and down the bed, which contacts alone take off slowly. When the bed is cut, a
+small drag is enough and lets grains roll into their pockets."""
+CALM = (1e-2, 1e-4, 1e-6)
+"""Kinetic energy of a grain at which each stage ends, W d. The last is 1e-2 W^2/K, which
+is rest to other decks too: in a long bed there is always a grain that still rolls
+somewhere."""
+LONGEST = 400
+"""Time that the grains have in a stage, sqrt(d/g')."""
+SETTLING = "settling.csv"
+DUMP = "poured.dump"
+BED = "bed.csv"
+LEAST_LENGTH = 3.0
+"""Least length of the forms of a poured bed, d."""
 MOST_GRAINS = 100_000
 """Most grains of a poured bed: some hundred megabytes, and half an hour of one core."""
-LAYER = np.sin(np.pi / 3)  # thickness of a layer, d: as of a lattice
-NEAR = 0.5  # fixed grains whose surfaces are nearer than this to a mobile one's are in the case, d
-LOCAL = (
-    5.0  # length of bed before and behind a grain that its height is compared with, d
-)
+LAYER = np.sin(np.pi / 3)
+"""Thickness of a layer, d: as of a lattice."""
+NEAR = 0.5
+"""Fixed grains whose surfaces are nearer than this to a mobile one's are in the case, d."""
+LOCAL = 5.0
+"""Length of bed before and behind a grain that its height is compared with, d."""
 
 
 def drawn(
     sizes: Sizes | None, diameter: float, count: int, seed: int, dimensions: int
 ) -> FloatArray:
-    """Diameters of some grains over one diameter, in random order, shape (count,).
+    """Draw the diameters of grains.
 
-    They are evenly spread over the distribution by number: no bed has more of a size by chance. In
-    3 dimensions a size has its part of the volume. In 2 it has that part of the area, as on the
-    face of any bed and on every cut through it.
+    They are evenly spread over the distribution by number: no bed has more of a size by
+    chance. In 3 dimensions a size has its part of the volume. In 2 it has that part of
+    the area, as on the face of any bed and on every cut through it.
+
+    Parameters
+    ----------
+    sizes
+        The distribution; None for equal grains.
+    diameter
+        The diameter that the result is over, m.
+    count
+        Number of grains.
+    seed
+        Seed of their order.
+    dimensions
+        2 or 3.
+
+    Returns
+    -------
+    FloatArray
+        Diameters in random order, shape (count,).
     """
     if sizes is None:
         return np.ones(count)
@@ -79,13 +115,28 @@ def drawn(
 
 @dataclass(frozen=True)
 class PouredBed(Case):
-    """The run that pours a bed into a mould of a bed line; all scenes with this bed share it.
+    """The run that pours a bed into a mould of a bed line.
 
-    Lengths are in d. `depth` is that of the row of fixed grains under the line, along the vertical;
-    `surface` the height over the line, normal to it, above which no centre lies after the cut;
-    `sizes` those of the grains, None for equal ones; `diameter` the d of a sieve table, m, else 1,
-    for such a bed has no scale. The seed chooses one bed of many; `width` is that of a strip with
-    periodic sides, 0 in one plane.
+    All scenes with this bed share it. Lengths are in d.
+
+    Attributes
+    ----------
+    line
+        The bed line.
+    depth
+        Depth of the row of fixed grains under the line, along the vertical.
+    surface
+        Height over the line, normal to it, above which no centre lies after the cut.
+    sizes
+        The sizes of the grains; None for equal ones.
+    diameter
+        The d of a sieve table, m; else 1, for such a bed has no scale.
+    friction_angle_deg
+        Friction angle of the grains, degrees.
+    seed
+        Chooses one bed of many.
+    width
+        Width of a strip with periodic sides; 0 in one plane.
     """
 
     line: BedLine
@@ -107,19 +158,22 @@ class PouredBed(Case):
     @property
     def parameters(self) -> dict[str, Any]:
         """The bed line, what is poured, and the seed."""
-        fields = ("depth", "surface", "diameter", "friction_angle_deg", "seed", "width")
         sizes = self.sizes if isinstance(self.sizes, tuple | None) else str(self.sizes)
-        values = {name: getattr(self, name) for name in fields}
         return {
             "x": list(self.line.x),
             "z": list(self.line.z),
             "sizes": sizes,
-            **values,
+            "depth": self.depth,
+            "surface": self.surface,
+            "diameter": self.diameter,
+            "friction_angle_deg": self.friction_angle_deg,
+            "seed": self.seed,
+            "width": self.width,
         }
 
     @property
     def cost_s(self) -> float:
-        """Expected time of one core, s; in the plane fitted to beds of 1,000 to 20,000 grains."""
+        """Expected time of one core, s; fitted to planes of 1,000 to 20,000 grains."""
         if self.width:
             return 1 + self._count * 15_000 / 6e6
         return float(0.1 + 0.7 * (self._count / 1000) ** 1.7)
@@ -130,30 +184,43 @@ class PouredBed(Case):
         return liggghts.ranks(self._count)
 
     def check_size(self) -> None:
-        """Refuse a mould without room for a bed, or with more grains than a machine bears."""
+        """Refuse a mould that is too short or too large.
+
+        Raises
+        ------
+        InputError
+            If it has no room for a bed, or more grains than a machine bears.
+        """
         length = self.line.x[-2] - self.line.x[1]
         if length < LEAST_LENGTH * (1 - 1e-9):
-            what = f"a poured bed of {length:.3g} grains has no pockets that are those of a bed"
+            bed = f"a poured bed of {length:.3g} grains"
+            what = f"{bed} has no pockets that are those of a bed"
             raise InputError(what, "bed.length", f"at least {LEAST_LENGTH:g} diameters")
         if self._count > MOST_GRAINS:
-            what = f"about {self._count:.2g} grains would be poured, more than {MOST_GRAINS:g}"
-            remedy = (
-                "a shorter bed, larger grains, or less of bed.poured_depth or bed.width"
-            )
+            grains = f"about {self._count:.2g} grains"
+            what = f"{grains} would be poured, more than {MOST_GRAINS:g}"
+            less = "less of bed.poured_depth or bed.width"
+            remedy = f"a shorter bed, larger grains, or {less}"
             raise InputError(what, where="bed.packing", remedy=remedy)
 
     @cached_property
     def _count(self) -> int:
         """Number of grains that rain into the mould."""
-        sizes, (start, end) = self._drawn(1000, 0), self.ends
-        mean = float(np.pi * np.mean(sizes**3 / 6 if self.width else sizes**2 / 4))
-        part = FILLED_IN_SPACE * self.width if self.width else FILLED
+        sizes = self._drawn(1000, 0)
+        start, end = self.ends
         area = (self.depth + self.surface + HEAP) * (end - start)
+        if self.width:
+            mean = float(np.pi * np.mean(sizes**3 / 6))
+            part = FILLED_IN_SPACE * self.width
+        else:
+            mean = float(np.pi * np.mean(sizes**2 / 4))
+            part = FILLED
         return digits.whole_up(area * part / mean)
 
     def _drawn(self, count: int, seed: int) -> FloatArray:
         """Diameters of so many of its grains, d."""
-        return drawn(self.sizes, self.diameter, count, seed, 3 if self.width else 2)
+        dimensions = 3 if self.width else 2
+        return drawn(self.sizes, self.diameter, count, seed, dimensions)
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -165,7 +232,8 @@ class PouredBed(Case):
     def floor(self) -> FloatArray:
         """Centres of the fixed grains: along the line one diameter apart, shape (m, 3).
 
-        Those of a strip lie in two layers, each over the gaps of the other: nothing falls through.
+        Those of a strip lie in two layers, each over the gaps of the other: nothing falls
+        through.
         """
         corners_x, corners_z = self.line.corners.T
         along = np.concatenate([[0.0], np.cumsum(self.line.lengths)])
@@ -179,23 +247,32 @@ class PouredBed(Case):
         rows = digits.whole_up(self.width)
         y = np.tile(np.arange(rows) * self.width / rows, len(x))
         upper = np.column_stack([np.repeat(x, rows), y, np.repeat(z, rows)])
-        return np.vstack(
-            [upper, upper + np.array([0.5, self.width / rows / 2, -np.sqrt(0.5)])]
-        )
+        to_the_gaps = np.array([0.5, self.width / rows / 2, -np.sqrt(0.5)])
+        return np.vstack([upper, upper + to_the_gaps])
 
     def rain(self, sizes: FloatArray) -> FloatArray:
-        """Places in the air, (n, 3), of grains of n sizes (d): rows in which no two touch."""
-        chance = np.random.default_rng(self.seed).uniform(
-            size=(len(sizes), 3 if self.width else 2)
-        )
+        """Find places in the air: rows in which no two grains touch.
+
+        Parameters
+        ----------
+        sizes
+            Diameters of n grains, d.
+
+        Returns
+        -------
+        FloatArray
+            X, y and z of the centres, d, shape (n, 3).
+        """
+        rng = np.random.default_rng(self.seed)
+        chance = rng.uniform(size=(len(sizes), 3 if self.width else 2))
         places = np.zeros((len(sizes), 3))
         # with no room to the sides each lane would stay a bed in a plane
         lanes = max(int(self.width / ((1 + LOOSE) * float(sizes.max()))), 1)
         for lane in range(lanes):
             grains = slice(lane, None, lanes)
-            places[grains, 0], places[grains, 2] = self._lane(
-                sizes[grains], chance[grains]
-            ).T
+            in_lane = self._lane(sizes[grains], chance[grains])
+            places[grains, 0] = in_lane[:, 0]
+            places[grains, 2] = in_lane[:, 1]
             if self.width:
                 wide = self.width / lanes
                 aside = (chance[grains, 2] - 0.5) * (wide - sizes[grains])
@@ -204,11 +281,16 @@ class PouredBed(Case):
 
     def _lane(self, sizes: FloatArray, chance: FloatArray) -> FloatArray:
         """X and z of grains that rain in one lane, shape (n, 2)."""
-        (start, end), room, margin = self.ends, (1 + LOOSE) * sizes, float(sizes.max())
+        start, end = self.ends
+        room = (1 + LOOSE) * sizes
+        margin = float(sizes.max())
+        left = start - margin
         tops = np.full(int((end - start + 2 * margin) * COLUMNS) + 2, -np.inf)
 
         def columns(place: float, radius: float) -> slice:
-            low, high = (place + side * radius - (start - margin) for side in (-1, 1))
+            """The columns over a grain."""
+            low = place - radius - left
+            high = place + radius - left
             return slice(int(low * COLUMNS), int(high * COLUMNS) + 1)
 
         for x, _, z in self.floor:
@@ -216,16 +298,15 @@ class PouredBed(Case):
             tops[under] = np.maximum(tops[under], z + 0.5)
         places = np.empty((len(sizes), 2))
         x = start + room[0] * chance[0, 0]
-        for number, (size, wide) in enumerate(
-            zip(sizes.tolist(), room.tolist(), strict=True)
-        ):
+        rain = zip(sizes.tolist(), room.tolist(), strict=True)
+        for number, (size, wide) in enumerate(rain):
             beside, over = LOOSE * size * chance[number, :2]
             if x + wide > end:
                 x = start + wide * chance[number, 0]
             place = x + beside + size / 2
             under = columns(place, size / 2)
             height = tops[under].max() + over + size / 2
-            places[number] = place, height
+            places[number] = (place, height)
             tops[under] = np.maximum(tops[under], height + size / 2)
             x += wide
         return places
@@ -237,78 +318,81 @@ class PouredBed(Case):
     @cached_property
     def grains(self) -> tuple[FloatArray, FloatArray]:
         """Centres of all grains, the fixed first, and their diameters, d."""
-        floor, sizes = self.floor, self._drawn(self._count, self.seed)
-        return np.vstack([floor, self.rain(sizes)]), np.append(
-            np.ones(len(floor)), sizes
-        )
+        floor = self.floor
+        sizes = self._drawn(self._count, self.seed)
+        centres = np.vstack([floor, self.rain(sizes)])
+        return centres, np.append(np.ones(len(floor)), sizes)
 
     def write(self, directory: Path, cases: Path) -> None:
         """Write the grains in the air, the walls and the cut."""
         start, end = self.ends
         centres, sizes = self.grains
-        grain = {
+        parameters: dict[str, float | int | tuple[float, ...]] = {
             "diameter": DIAMETER,
             "smallest": float(sizes.min()),
             "density": DENSITY,
-        }
-        contact = {
             "gravity": GRAVITY,
             "friction": tan(radians(self.friction_angle_deg)),
             **CONTACT,
-        }
-        walls = {
             "upstream": start * DIAMETER,
             "downstream": end * DIAMETER,
             "most_looks": LONGEST,
+            "width": self.width,
+            "ranks": self.ranks,
+            "stiffness": STIFFNESS,
+            "drag": DRAG,
+            "calm": CALM,
         }
-        sharing = {"width": self.width, "ranks": self.ranks}
-        stages = {"stiffness": STIFFNESS, "drag": DRAG, "calm": CALM}
-        deck.write_parameters(
-            directory, {**grain, **contact, **walls, **sharing, **stages}
-        )
-        (x, z), (run, rise) = self.line.corners.T, self.line.tangents.T
-        x, raised = x * DIAMETER, (z[:-1] + self.surface / run) * DIAMETER
-        cut = {"x0": x[:-1], "x1": x[1:], "z0": raised, "slope": rise / run}
-        for name, values in cut.items():
-            deck.write_numbers(directory / f"cut.{name}.txt", values)
+        deck.write_parameters(directory, parameters)
+        self._write_cut(directory)
         margin = float(sizes.max()) + 1
         bounds = np.array([centres.min(axis=0) - margin, centres.max(axis=0) + margin])
         if self.width:
-            bounds[:, 1] = 0.0, self.width
+            bounds[:, 1] = (0.0, self.width)
+        is_floor = np.arange(len(sizes)) < len(self.floor)
         deck.write_grains(
             directory,
             centres * DIAMETER,
-            np.where(np.arange(len(sizes)) < len(self.floor), 1, 2),
+            np.where(is_floor, 1, 2),
             sizes * DIAMETER,
             DENSITY,
             bounds * DIAMETER,
-            # neighbours along the bed are near in memory: a fifth less time for 20,000 grains
+            # neighbours along the bed are near in memory: a fifth less time for 20,000
             np.argsort(centres[:, 0], kind="stable"),
         )
+
+    def _write_cut(self, directory: Path) -> None:
+        """Write the line above which grains are cut away, a file for each column."""
+        x, z = self.line.corners.T
+        run, rise = self.line.tangents.T
+        x = x * DIAMETER
+        raised = (z[:-1] + self.surface / run) * DIAMETER
+        cut = {"x0": x[:-1], "x1": x[1:], "z0": raised, "slope": rise / run}
+        for name, values in cut.items():
+            deck.write_numbers(directory / f"cut.{name}.txt", values)
 
     def collect(self, directory: Path) -> None:
         """See that the bed came to rest, and write its grains to ``bed.csv``."""
         liggghts.check_log(directory)
         where = str(directory / SETTLING)
         last = deck.read_table(directory / SETTLING).groupby("stage").last()
-        energy = (
-            last["ke"] / last["grains"].clip(lower=1) / (WEIGHT * DIAMETER)
-        ).to_numpy()
+        mean_energy = last["ke"] / last["grains"].clip(lower=1)
+        energy = (mean_energy / (WEIGHT * DIAMETER)).to_numpy()
         if len(last) < len(CALM) or not (last["grains"] > 0).all():
             what = "no grain of the poured bed is left"
-            raise SolverError(
-                what, where, "a gentler slope, or more of bed.poured_depth"
-            )
+            remedy = "a gentler slope, or more of bed.poured_depth"
+            raise SolverError(what, where, remedy)
         if not np.all(energy < CALM):
-            what = f"the poured bed does not come to rest: {energy[-1]:.2g} W d a grain"
-            raise Noisy(
-                what, where, "a gentler slope, or a larger grain.friction_angle_deg"
-            )
+            grain = f"{energy[-1]:.2g} W d a grain"
+            what = f"the poured bed does not come to rest: {grain}"
+            remedy = "a gentler slope, or a larger grain.friction_angle_deg"
+            raise Noisy(what, where, remedy)
         _, rows = deck.read_dump(directory / DUMP, ("id", "x", "y", "z"))
         number = rows["id"].to_numpy(np.int64) - 1
+        _, sizes = self.grains
         bed = pd.DataFrame({f"{axis}_over_d": rows[axis] / DIAMETER for axis in "xyz"})
-        fixed = (number < len(self.floor)).astype(int)
-        bed = bed.assign(size=self.grains[1][number], fixed=fixed)
+        bed["size"] = sizes[number]
+        bed["fixed"] = (number < len(self.floor)).astype(int)
         bed.to_csv(directory / BED, index=False, float_format=digits.FORMAT)
 
 
@@ -320,45 +404,65 @@ def read(
     mobile_layers: int,
     width: float = 0.0,
 ) -> Packing:
-    """The packing of a finished case `PouredBed`; lengths in d.
+    """Read the packing of a finished case `PouredBed`; lengths in d.
 
-    `line` is the bed line of the flow, `counts` says which exposed grains are counted, as
-    `BedLine.counted` takes it, `surface` is the height of the highest centres over the line. Raises
-    an InputError if no grain is counted.
+    Parameters
+    ----------
+    directory
+        The directory of the case.
+    line
+        The bed line of the flow.
+    counts
+        Which exposed grains are counted, as `BedLine.counted` takes it.
+    surface
+        Height of the highest centres over the line.
+    mobile_layers
+        Layers that may move.
+    width
+        Width of a strip; 0 in one plane.
+
+    Returns
+    -------
+    Packing
+        The mobile grains and the fixed ones near them.
+
+    Raises
+    ------
+    InputError
+        If no grain is counted.
     """
     rows = deck.read_table(directory / BED)
-    centres, sizes = (
-        rows[["x_over_d", "z_over_d"]].to_numpy(float),
-        rows["size"].to_numpy(float),
-    )
-    mobile = rows["fixed"].to_numpy() == 0
+    centres = rows[["x_over_d", "z_over_d"]].to_numpy(float)
+    sizes = rows["size"].to_numpy(float)
+    is_poured = rows["fixed"].to_numpy() == 0
     segment, along = line.nearest(centres)
     height = line.over(centres, segment)
     places = Places.of(centres, rows["y_over_d"].to_numpy(float), width)
     y = places.xyz[:, 1]
-    flat = np.column_stack([along, np.zeros_like(along)])
-    free = unshadowed(Places.of(flat, y, width), height, sizes / 2) & mobile
+    flat = Places.of(np.column_stack([along, np.zeros_like(along)]), y, width)
+    is_free = unshadowed(flat, height, sizes / 2) & is_poured
     on_form = (segment > 0) & (segment < len(line.lengths) - 1)
-    mobile &= ((surface - height < (mobile_layers - 0.5) * LAYER) | free) & on_form
-    counted = free & line.counted(counts)[segment] & within(centres[:, 0], counts)
+    is_near_top = surface - height < (mobile_layers - 0.5) * LAYER
+    mobile = is_poured & (is_near_top | is_free) & on_form
+    counted = is_free & line.counted(counts)[segment] & within(centres[:, 0], counts)
     if not counted.any():
         what = "no grain of the poured bed is exposed where grains are counted"
-        raise InputError(
-            what, "bed.counted", "choose another part of the bed, or another bed.seed"
-        )
+        remedy = "choose another part of the bed, or another bed.seed"
+        raise InputError(what, "bed.counted", remedy)
     first, second, apart = places.pairs(float(sizes.max()) + NEAR)
     gap = np.linalg.norm(apart, axis=1) - (sizes[first] + sizes[second]) / 2
-    near = mobile.copy()
-    near[first[mobile[second] & (gap < NEAR)]] = True
-    # along the bed; the fixed ones last, for a deck must not lose the grain of its highest id
+    is_near = mobile.copy()
+    is_near[first[mobile[second] & (gap < NEAR)]] = True
+    # along the bed; the fixed ones last, for a deck must not lose the grain of its
+    # highest id
     kept = np.lexsort((along, ~mobile))
-    kept = kept[near[kept]]
+    kept = kept[is_near[kept]]
     return Packing(
         centres=centres[kept],
         sizes=sizes[kept],
         mobile=mobile[kept],
         windward=counted[kept],
-        lee=(free & on_form & ~counted)[kept],
+        lee=(is_free & on_form & ~counted)[kept],
         arc_length=along[kept],
         across=y[kept],
         width=width,
@@ -368,13 +472,28 @@ def read(
 def standing(
     along: FloatArray, height: FloatArray, sizes: FloatArray, exposed: BoolArray
 ) -> FloatArray:
-    """How much higher each grain's lowest point lies than that of a mean exposed grain, d, (n,).
+    """Find how much higher each grain's lowest point is than that of a mean exposed grain.
 
-    The mean is that of the exposed centres within `LOCAL` along the bed, less half of d. `along`
-    and `height` have the centres' places along the bed line and over it.
+    The mean is that of the exposed centres within `LOCAL` along the bed, less half of d.
+
+    Parameters
+    ----------
+    along, height
+        Places of the centres along the bed line and over it, d, shape (n,).
+    sizes
+        Diameters, d, shape (n,).
+    exposed
+        Which grains are exposed, shape (n,).
+
+    Returns
+    -------
+    FloatArray
+        The heights, d, shape (n,); 0 for grains that are not exposed.
     """
     order = np.argsort(along[exposed], kind="stable")
-    place, sums = along[exposed][order], np.append(0, np.cumsum(height[exposed][order]))
-    first, last = (np.searchsorted(place, along + side * LOCAL) for side in (-1, 1))
+    place = along[exposed][order]
+    sums = np.append(0, np.cumsum(height[exposed][order]))
+    first = np.searchsorted(place, along - LOCAL)
+    last = np.searchsorted(place, along + LOCAL)
     level = (sums[last] - sums[first]) / np.maximum(last - first, 1)
     return np.asarray(np.where(exposed, height - sizes / 2 - (level - 0.5), 0.0))

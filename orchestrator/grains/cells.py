@@ -179,7 +179,7 @@ def cell(scene: Scene) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def flows(scene: Scene) -> FloatArray:
     """Friction velocity of the settling and of each load step, over that of the closed form."""
-    return deck.flows(deck.START, LAST, scene.protocol.load_increment)
+    return deck.rising_flows(deck.START, LAST, scene.protocol.load_increment)
 
 
 def force(scene: Scene, rising: FloatArray) -> FloatArray:

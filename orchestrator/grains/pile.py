@@ -374,7 +374,7 @@ class PileCase(GrainCase):
             # the run goes on from the flow that the one before has reached
             thresholds, step = loads.leaving(), rules.load_increment
             last = thresholds[np.isfinite(thresholds)].max(initial=reached)
-            rising = deck.flows(
+            rising = deck.rising_flows(
                 reached, max(deck.BEYOND * last, reached * (1 + step)), step
             )
             if scene.is_poured:
@@ -485,7 +485,7 @@ def flows(loads: Loads) -> FloatArray:
     last = max(last, first)
     # gusts that are too short do nothing: then the mean stress moves the grains
     beyond = deck.BEYOND * np.sqrt(geometry.scene.gust)
-    return deck.flows(deck.START * first, beyond * last, rules.load_increment)
+    return deck.rising_flows(deck.START * first, beyond * last, rules.load_increment)
 
 
 def in_time(gusts: Gusts, loads: Loads, rising: FloatArray) -> FloatArray:

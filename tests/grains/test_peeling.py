@@ -208,7 +208,9 @@ def test_dem_moves_a_grain_out_of_its_pocket_at_the_closed_form(tmp_path: Path) 
     kind = np.tile([deck.FIXED] * 3 + [deck.COUNTED], len(TURNED))
     along, sizes = _loading().along, np.ones(len(places.xyz))
     grains = deck.GrainTable(places.xyz * d, kind, along, sizes, d, 2500.0, WIDTH)
-    rising = deck.flows(0.95 * np.sqrt(_drag(0)), 1.02 * np.sqrt(_drag(60)), 0.002)
+    rising = deck.rising_flows(
+        0.95 * np.sqrt(_drag(0)), 1.02 * np.sqrt(_drag(60)), 0.002
+    )
     force = _loading().at(rising)
     moved = _moved_by_dem(
         tmp_path / "b", grains, force, Protocol(waiting_time=8), rising=rising
