@@ -223,22 +223,34 @@ def cost_s(
 
 @dataclass(frozen=True)
 class GrainTable:
-    """The n grains of a deck; the id of a grain is its place, from 1."""
+    """The n grains of a deck; the id of a grain is its place, from 1.
+
+    Attributes
+    ----------
+    position
+        X, y, z of the centres, m, shape (n, 3).
+    kind
+        One of GONE, FIXED, MOBILE, COUNTED, PUSHED, shape (n,).
+    along
+        Unit vector downstream along the bed, in which displacement is counted, shape
+        (n, 2).
+    sizes
+        Diameter of each grain over `diameter`, shape (n,).
+    diameter
+        The diameter d of the deck's units, m.
+    density
+        Density of every grain, kg/m3.
+    width
+        Width of a strip with periodic sides, d; 0 for grains in planes.
+    """
 
     position: FloatArray
-    """x, y, z of the centres, m, shape (n, 3)."""
     kind: IntArray
-    """One of GONE, FIXED, MOBILE, COUNTED, PUSHED, shape (n,)."""
     along: FloatArray
-    """Unit vector downstream along the bed, in which displacement is counted, shape (n, 2)."""
     sizes: FloatArray
-    """Diameter of each grain over `diameter`, shape (n,)."""
     diameter: float
-    """The diameter d of the deck's units, m."""
     density: float
-    """Density of every grain, kg/m3."""
     width: float = 0.0
-    """Width of a strip with periodic sides, d; 0 for grains in planes."""
 
     @property
     def counted_ids(self) -> IntArray:

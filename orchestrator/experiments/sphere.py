@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from orchestrator.bed.packing import Packing
 from orchestrator.fidelity.fidelities import Fields
 from orchestrator.grains import sheltering
-from orchestrator.grains.peeling import PLACES, RANGE, Force, ForceTable
+from orchestrator.grains.peeling import FINE_TABLE, RANGE, Force, ForceTable
 from orchestrator.physics.laws import CLIFT_GAUVIN, LAWS, Exposure
 from orchestrator.physics.threshold import weight
 from orchestrator.types import FloatArray
@@ -70,7 +70,7 @@ def sphere(fields: Fields, galileo: float, *, clear: bool) -> float:
         return LAW.lift(ustar, around(ustar))
 
     submerged = np.pi / 6 * galileo**2
-    ustar = UNIT * galileo * np.geomspace(*RANGE, PLACES)
+    ustar = UNIT * galileo * np.geomspace(*RANGE, FINE_TABLE)
     (table,) = ForceTable.of(drag, lift, np.array([submerged]), ustar)
     pivot = SADDLE if clear else POCKET
     threshold = table.reaching(np.cos(pivot), np.sin(pivot), np.sin(pivot))

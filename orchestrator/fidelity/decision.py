@@ -15,7 +15,7 @@ from orchestrator.fidelity import spread
 from orchestrator.fidelity.classes import FLOW, GRAINS, scene_class, unmeasured
 from orchestrator.fidelity.fidelities import FIDELITIES, LOCAL, Fidelity, fidelity_of
 from orchestrator.fidelity.known import UNKNOWN, Known, known
-from orchestrator.grains.loads import LONG, Geometry, has_rows_along
+from orchestrator.grains.loads import LONGEST_PACKED, Geometry, has_rows_along
 from orchestrator.grains.pile import Pile
 from orchestrator.study.fields import FIELDS, PARTS
 from orchestrator.study.parts import PileBed
@@ -26,7 +26,7 @@ LEAST_HELD = (
     6.0  # waiting time, sqrt(d/g'), below which load steps are a ramp of the flow
 )
 EXACT = "the closed form is exact for a single grain in a held flow"
-LONG_BED = f"more than {LONG:g} grains long"
+LONG_BED = f"more than {LONGEST_PACKED:g} grains long"
 ALONG = f"{LONG_BED}: closed form along the bed, checked where motion starts"
 CHOSEN = FIDELITIES[:-1]
 """The fidelities that a choice may take: errors are measured against the last one."""
@@ -176,7 +176,7 @@ def written(scene: Scene) -> Scene:
 def method_of(scene: Scene) -> tuple[str, str]:
     """The method that answers a scene as it is written, and why.
 
-    For ``auto`` that is DEM where it can: not on a lattice of more than `LONG` grains,
+    For ``auto`` that is DEM where it can: not on a lattice of more than `LONGEST_PACKED` grains,
     nor with what DEM does not know. There it is the closed form along the bed, else
     peeling, else pivots.
     """
@@ -215,7 +215,7 @@ def is_along(scene: Scene) -> bool:
 def _is_long(scene: Scene) -> bool:
     """Whether it is a lattice of too many grains for DEM."""
     is_lattice = isinstance(scene.bed, PileBed) and not scene.is_poured
-    return is_lattice and Geometry(scene).length > LONG
+    return is_lattice and Geometry(scene).length > LONGEST_PACKED
 
 
 def _of_grain(scene: Scene, tolerance: float | None) -> Decision:

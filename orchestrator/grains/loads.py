@@ -19,7 +19,14 @@ from orchestrator.flow.case import FlowCase
 from orchestrator.flow.model import FlowModel
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains import peeling, sheltering
-from orchestrator.grains.peeling import FEWER, PLACES, RANGE, Force, ForceTable, Loading
+from orchestrator.grains.peeling import (
+    COARSE_TABLE,
+    FINE_TABLE,
+    RANGE,
+    Force,
+    ForceTable,
+    Loading,
+)
 from orchestrator.grains.sheltering import Shelter
 from orchestrator.physics import threshold
 from orchestrator.physics.laws import LAWS, Exposure
@@ -30,36 +37,48 @@ from orchestrator.study.parts import PileBed, Range, UnfitError
 from orchestrator.study.scene import Scene
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
-TOE = 0.05  # part of the windward face, from its foot, that `forces.loaded_grains` may leave out
-KINDS = (
-    20  # kinds of grains in a bed beyond which their tables of forces have fewer places
-)
-LONG = 5000.0
-"""Length of a bed, d, beyond which a range that is counted is packed alone, and of which no grain
-is packed where no method is asked for."""
+TOE = 0.05
+"""Part of the windward face, from its foot, that `forces.loaded_grains` may leave out."""
+KINDS = 20
+"""Kinds of grains in a bed beyond which their tables of forces have fewer places."""
+LONGEST_PACKED = 5000.0
+"""Length of a bed, d, beyond which a range that is counted is packed alone, and of which
+no grain is packed where no method is asked for."""
 MARGIN = 20.0
-"""Fixed bed before and behind the grains of such a range, d: twice the way of a grain that goes."""
+"""Fixed bed before and behind the grains of such a range, d: twice the way of a grain
+that goes."""
 LOOSE = 1e-4
-"""Threshold over that of the scene's grain, below which a grain lies loose: at the limiting slope
-round-off leaves it 1e-8. Tables of forces begin there."""
+"""Threshold over that of the scene's grain, below which a grain lies loose: at the
+limiting slope round-off leaves it 1e-8. Tables of forces begin there."""
 DECIMALS = 7
-"""Decimals of the lengths, in d, that a poured bed depends on: beds of another scale share it."""
+"""Decimals of the lengths, in d, that a poured bed depends on: beds of another scale share
+it."""
 
 _covered = cache(packing.cover)
 
 
 @cache
 def _poured(state: tuple[int, ...], directory: Path, *shown: Any) -> Packing:
-    """The packing of a poured bed by `poured.read`, from its file in the state that it has."""
+    """The packing of a poured bed by `poured.read`, from its file in a state."""
     return poured.read(directory, *shown)
 
 
 def has_rows_along(scene: Scene) -> bool:
-    """Whether the grains of a pile lie in rows along its bed line, all in like pockets.
+    """Tell whether the grains of a pile lie in rows along its bed line, in like pockets.
 
-    The closed form along the bed line (`protocol.method` "local") then answers as pivots do.
-    Level rows make stairs of a slope, where each step holds the grains of the one below it,
-    and each grain of a poured bed has a pocket of its own.
+    The closed form along the bed line (`protocol.method` "local") then answers as pivots
+    do. Level rows make stairs of a slope, where each step holds the grains of the one
+    below it, and each grain of a poured bed has a pocket of its own.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+
+    Returns
+    -------
+    bool
+        Whether they do.
     """
     if not isinstance(scene.bed, PileBed):
         return False
@@ -70,7 +89,8 @@ def has_rows_along(scene: Scene) -> bool:
 def _packed(ground: BedLine, lattice: Lattice, line: BedLine) -> Packing:
     """A pile of two faces on a bed line: obstacles before it make the way along that longer."""
     packed = packing.pile(ground, lattice)
-    return replace(packed, arc_length=line.nearest(packed.centres)[1])
+    _, arc_length = line.nearest(packed.centres)
+    return replace(packed, arc_length=arc_length)
 
 
 def forget() -> None:
@@ -89,13 +109,27 @@ def forces(
     gaps: ArrayLike | None = None,
     level: Force = np.zeros_like,
 ) -> tuple[Force, Force]:
-    """Drag and lift on exposed grains of a resolved scene.
+    """Make drag and lift on exposed grains of a resolved scene.
 
-    `sizes` are diameters over that of the scene; `gaps` are heights of the grains' lowest points
-    above the bed's level, m, by default z0; `level` is the height above that (m) at which the flow
-    begins, a function of the friction velocity (m/s), by default 0.
+    Parameters
+    ----------
+    scene
+        The scene.
+    sizes
+        Diameters over that of the scene.
+    gaps
+        Heights of the grains' lowest points above the bed's level, m; by default z0.
+    level
+        Height above that, m, at which the flow begins, a function of the friction
+        velocity, m/s; by default 0.
+
+    Returns
+    -------
+    drag, lift
+        Forces, N, as functions of local friction velocities, m/s.
     """
-    law, grain = LAWS[scene.forces.law], single_grain(scene)
+    law = LAWS[scene.forces.law]
+    grain = single_grain(scene)
     given = (grain.diameter * np.asarray(sizes, float), *grain[1:5])
     heights = np.asarray(grain.roughness if gaps is None else gaps, float)
 
@@ -108,20 +142,34 @@ def forces(
     return drag, lift
 
 
-def on_slopes(scene: Scene, slopes_deg: FloatArray) -> FloatArray:
-    """Friction velocity at which the grain of a scene would leave on other slopes, m/s.
+def _constant(value: FloatArray, ustar: ArrayLike) -> FloatArray:
+    """The level at the friction velocities at which it was computed."""
+    del ustar
+    return value
 
-    It is 0 on slopes down which a grain rolls by itself, the limiting slope among them.
+
+def on_slopes(scene: Scene, slopes_deg: FloatArray) -> FloatArray:
+    """Find the friction velocity at which the grain of a scene would leave on other slopes.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    slopes_deg
+        Slopes, degrees, shape (N,).
+
+    Returns
+    -------
+    FloatArray
+        Friction velocities, m/s, shape (N,); 0 on slopes down which a grain rolls by
+        itself, the limiting slope among them.
     """
     slopes, place = np.unique(np.round(slopes_deg, 9), return_inverse=True)
     grain = single_grain(scene)
     grains = [grain._replace(slope_deg=slope) for slope in slopes.tolist()]
-    each = [
-        answer.friction_velocity for answer in thresholds_of(scene.forces.law, grains)
-    ]
-    speeds = np.nan_to_num(np.array(each, float), nan=0.0, posinf=np.inf) / np.sqrt(
-        scene.gust
-    )
+    found = thresholds_of(scene.forces.law, grains)
+    peaks = np.array([each.friction_velocity for each in found], float)
+    speeds = np.nan_to_num(peaks, nan=0.0, posinf=np.inf) / np.sqrt(scene.gust)
     is_loose = speeds < LOOSE * float(closed_form(scene).friction_velocity)
     return np.where(is_loose, 0.0, speeds)[place]
 
@@ -130,8 +178,16 @@ def on_slopes(scene: Scene, slopes_deg: FloatArray) -> FloatArray:
 class Geometry:
     """The bed of a scene with a pile: its line, its n grains, and what no flow changes.
 
-    `cases` is the directory of the finished runs; only the grains of a poured bed are read there.
-    Grains are packed on the whole bed, or on a `part` of it, a range of x in diameters.
+    Attributes
+    ----------
+    scene
+        The scene.
+    cases
+        The directory of the finished runs; only the grains of a poured bed, and the flow
+        over a profile, are read there.
+    part
+        The part of the bed on which grains are packed, a range of x in diameters; by
+        default all.
     """
 
     scene: Scene
@@ -162,19 +218,26 @@ class Geometry:
     @property
     def counts(self) -> str | Range:
         """Which exposed grains are counted; a range of x in diameters."""
-        counts, d = self.bed.counts, self.scene.grain.diameter
-        return counts if isinstance(counts, str) else (counts[0] / d, counts[1] / d)
+        counts = self.bed.counts
+        if isinstance(counts, str):
+            return counts
+        d = self.scene.grain.diameter
+        start, end = counts
+        return start / d, end / d
 
     @cached_property
     def packed_line(self) -> BedLine:
-        """The part of the bed line with grains, d: all but of a long bed with a counted range."""
-        line, part = self.line, self.part
-        is_long = line.x[-2] - line.x[1] > LONG
+        """The part of the bed line with grains, d: of a long bed the counted range."""
+        line = self.line
+        part = self.part
+        is_long = line.x[-2] - line.x[1] > LONGEST_PACKED
         if part is None and is_long and not self.scene.is_poured:
-            part = None if isinstance(self.counts, str) else self.counts
+            counts = self.counts
+            part = None if isinstance(counts, str) else counts
         if part is None:
             return line
-        return line.part(part[0] - MARGIN, part[1] + MARGIN, APRON)
+        start, end = part
+        return line.part(start - MARGIN, end + MARGIN, APRON)
 
     @property
     def is_part(self) -> bool:
@@ -184,8 +247,9 @@ class Geometry:
     @property
     def length(self) -> float:
         """Length of bed that has grains, d."""
-        by_grains = self.scene.protocol.method != "local"
-        return (self.packed_line.x[-2] - self.packed_line.x[1]) * by_grains
+        if self.scene.protocol.method == "local":
+            return 0.0
+        return self.packed_line.x[-2] - self.packed_line.x[1]
 
     @property
     def surface(self) -> float:
@@ -197,11 +261,13 @@ class Geometry:
         """The run that pours the bed, if one does."""
         if not self.scene.is_poured:
             return ()
-        line, grain = self.line, self.scene.grain
-        # the bed does not depend on how far the flow's domain goes on before and behind it
-        ends = (max(line.x[0], line.x[1] - APRON), min(line.x[-1], line.x[-2] + APRON))
-        x = tuple(round(v, DECIMALS) for v in (ends[0], *line.x[1:-1], ends[1]))
-        z = tuple(round(v, DECIMALS) for v in line.z)
+        line = self.line
+        grain = self.scene.grain
+        # the bed does not depend on how far the flow's domain goes on before and behind
+        start = max(line.x[0], line.x[1] - APRON)
+        end = min(line.x[-1], line.x[-2] + APRON)
+        x = tuple(round(place, DECIMALS) for place in (start, *line.x[1:-1], end))
+        z = tuple(round(height, DECIMALS) for height in line.z)
         bed = PouredBed(
             line=replace(line, x=x, z=z),
             depth=self.bed.poured_depth,
@@ -217,29 +283,35 @@ class Geometry:
 
     @cached_property
     def packing(self) -> Packing:
-        """The grains' places, in diameters; scenes that differ in their forces alone share them.
+        """The grains' places, in diameters.
 
-        By the method "local" they are places along the bed line, as many as a figure shows. On the
-        windward sides of a profile none is counted where the flow runs back.
+        Scenes that differ in their forces alone share them. By the method "local" they are
+        places along the bed line, as many as a figure shows. On the windward sides of a
+        profile none is counted where the flow runs back.
         """
         packed = self._packing
-        if self.turned and self.cases is not None:
-            ahead = self.felt(self.model.stress(self.cases), packed.arc_length) > 0
-            windward, lee = (
-                packed.windward & ahead,
-                packed.lee | packed.windward & ~ahead,
-            )
-            packed = replace(packed, windward=windward, lee=lee)
-        return packed
+        if not self.turned or self.cases is None:
+            return packed
+        is_ahead = self.felt(self.model.stress(self.cases), packed.arc_length) > 0
+        return replace(
+            packed,
+            windward=packed.windward & is_ahead,
+            lee=packed.lee | packed.windward & ~is_ahead,
+        )
 
     @property
     def turned(self) -> bool:
-        """Whether the flow has a say in which sides are windward: noise rises in a wake as well."""
+        """Whether the flow has a say in which sides are windward.
+
+        The noise of a profile rises in a wake as well.
+        """
         return self.bed.profile is not None and self.bed.counts == "windward"
 
     @cached_property
     def _packing(self) -> Packing:
-        bed, d = self.bed, self.scene.grain.diameter
+        """The packing, on whichever sides the flow runs back."""
+        bed = self.bed
+        d = self.scene.grain.diameter
         if self.scene.protocol.method == "local":
             return packing.along(self.line, self.counts)
         for run in self.pouring:
@@ -284,7 +356,8 @@ class Geometry:
     @cached_property
     def _shadows(self) -> tuple[IntArray, IntArray]:
         """Pairs of grains: one that is hidden, and one that hides it."""
-        packed, (along, height) = self.packing, self._placing
+        packed = self.packing
+        along, height = self._placing
         flat = np.column_stack([along, np.zeros_like(along)])
         places = Places.of(flat, packed.places.xyz[:, 1], packed.width)
         return packing.shadows(places, height, packed.sizes / 2)
@@ -295,23 +368,46 @@ class Geometry:
         return self.scene.forces.sheltering == "balanced"
 
     def exposed(self, present: BoolArray) -> BoolArray:
-        """Which grains meet the flow while some are present, shape (n,).
+        """Find the grains that meet the flow while some are present.
 
-        Where the grains share its stress these are those, too, that others hid that have gone.
+        Where the grains share its stress these are those, too, that others hid that have
+        gone.
+
+        Parameters
+        ----------
+        present
+            Which grains have not left, shape (n,).
+
+        Returns
+        -------
+        BoolArray
+            Which of them meet the flow, shape (n,).
         """
         packed = self.packing
         first = packed.windward | packed.lee
         if not self.is_balanced or present.all():
             return np.asarray(first & present)
-        (hidden, hiding), count = self._shadows, len(present)
-        freed = np.bincount(hidden, minlength=count) > 0
-        freed &= np.bincount(hidden[present[hiding]], minlength=count) == 0
-        return np.asarray((first | freed) & present)
+        hidden, hiding = self._shadows
+        count = len(present)
+        was_hidden = np.bincount(hidden, minlength=count) > 0
+        is_hidden = np.bincount(hidden[present[hiding]], minlength=count) > 0
+        return np.asarray((first | was_hidden & ~is_hidden) & present)
 
     def gaps(self, exposed: BoolArray) -> FloatArray:
-        """Height of each grain's lowest point over the level where the flow begins, m, shape (n,).
+        """Find how high each grain's lowest point is over where the flow begins.
 
-        By `forces.exposure` it is z0, or follows from the grain's own height over the local bed.
+        By `forces.exposure` it is z0, or follows from the grain's own height over the
+        local bed.
+
+        Parameters
+        ----------
+        exposed
+            Which grains are exposed, shape (n,).
+
+        Returns
+        -------
+        FloatArray
+            The heights, m, shape (n,).
         """
         z0 = np.full(len(exposed), self.bed.roughness)
         if self.scene.forces.exposure == "alike":
@@ -322,51 +418,87 @@ class Geometry:
     @cached_property
     def patches(self) -> tuple[IntArray, FloatArray]:
         """Number of each grain's patch, and the areas of the patches, d^2."""
-        length = (
-            self.scene.forces.averaging_length
-            * self.bed.relief
-            / self.scene.grain.diameter
-        )
+        length = self.scene.forces.averaging_length * self.bed.relief
+        length /= self.scene.grain.diameter
         return sheltering.patches(self.packing, max(1.0, length))
 
     def sheltered(self, exposed: BoolArray, chosen: BoolArray) -> Shelter:
-        """The levels at which the flow begins on the patches of some of the exposed grains."""
-        scene, (patch, areas), d = self.scene, self.patches, self.scene.grain.diameter
+        """Find the levels at which the flow begins on the patches of exposed grains.
+
+        Parameters
+        ----------
+        exposed
+            Which grains are exposed, shape (n,).
+        chosen
+            Those whose patches are asked about, shape (n,).
+
+        Returns
+        -------
+        Shelter
+            The levels.
+        """
+        scene = self.scene
+        patch, areas = self.patches
 
         def drag(ustar: FloatArray, sizes: FloatArray, gaps: FloatArray) -> FloatArray:
-            return forces(scene, sizes, gaps)[0](ustar)
+            """Drag on grains of sizes and gaps."""
+            law, _ = forces(scene, sizes, gaps)
+            return law(ustar)
 
-        given = patch[chosen], self.packing.sizes[chosen], self.gaps(exposed)[chosen]
-        unit, density = float(closed_form(scene).friction_velocity), scene.fluid.density
         return sheltering.balanced(
-            drag, *given, areas * d**2, diameter=d, unit=unit, density=density
+            drag,
+            patch[chosen],
+            self.packing.sizes[chosen],
+            self.gaps(exposed)[chosen],
+            areas * scene.grain.diameter**2,
+            diameter=scene.grain.diameter,
+            unit=float(closed_form(scene).friction_velocity),
+            density=scene.fluid.density,
         )
 
     def force_tables(
         self, exposed: BoolArray, only: int | None = None
     ) -> dict[int, ForceTable]:
-        """Force tables of exposed grains that may move, over their own weight, by their numbers.
+        """Make force tables of exposed grains that may move, over their own weight.
 
-        `only` those on the patch of one grain.
+        Parameters
+        ----------
+        exposed
+            Which grains are exposed, shape (n,).
+        only
+            The grain whose patch is asked about; by default all.
+
+        Returns
+        -------
+        dict of int to ForceTable
+            The tables by the numbers of the grains.
         """
-        scene, unit = self.scene, float(closed_form(self.scene).friction_velocity)
-        patch, _ = (
-            self.patches if self.is_balanced else (np.zeros(len(exposed), int), None)
-        )
+        scene = self.scene
+        patch = np.zeros(len(exposed), int)
+        if self.is_balanced:
+            patch, _ = self.patches
         chosen = exposed if only is None else exposed & (patch == patch[only])
         pushed = chosen & self.packing.mobile
-        columns = self.packing.sizes, self.gaps(exposed), patch
+        columns = (self.packing.sizes, self.gaps(exposed), patch)
         rows = np.column_stack([column[pushed] for column in columns])
-        kinds, place = np.unique(rows, axis=0, return_inverse=True)
-        sizes, gaps, patch = kinds[:, :1], kinds[:, 1:2], kinds[:, 2:].astype(int)
+        # grains that are alike share a table
+        kinds, kind_of = np.unique(rows, axis=0, return_inverse=True)
+        sizes = kinds[:, :1]
+        gaps = kinds[:, 1:2]
+        patch_of = kinds[:, 2].astype(int)
         level: Force = np.zeros_like
-        ustar = unit * np.geomspace(*RANGE, PLACES if len(kinds) <= KINDS else FEWER)
         if self.is_balanced:
             shelter = self.sheltered(exposed, chosen)
-            ustar, level = shelter.ustar, lambda _: shelter.levels.T[patch[:, 0]]
-        laws = forces(scene, sizes, gaps, level)
-        tables = ForceTable.of(*laws, scene.weight * sizes[:, 0] ** 3, ustar)
-        each = zip(np.flatnonzero(pushed).tolist(), place.tolist(), strict=True)
+            ustar = shelter.ustar
+            level = partial(_constant, shelter.levels.T[patch_of])
+        else:
+            places = FINE_TABLE if len(kinds) <= KINDS else COARSE_TABLE
+            unit = float(closed_form(scene).friction_velocity)
+            ustar = unit * np.geomspace(*RANGE, places)
+        drag, lift = forces(scene, sizes, gaps, level)
+        tables = ForceTable.of(drag, lift, scene.weight * sizes[:, 0] ** 3, ustar)
+        numbers = np.flatnonzero(pushed).tolist()
+        each = zip(numbers, kind_of.tolist(), strict=True)
         return {number: tables[kind] for number, kind in each}
 
     @cached_property
@@ -385,46 +517,97 @@ class Geometry:
         line: BedLine | None = None,
         present: BoolArray | None = None,
     ) -> "Loads":
-        """The grains under the stress along the bed line, or along the line it has worn down to.
+        """Put the grains under a stress.
 
-        `present`, shape (n,), has the grains that have not left yet; by default all.
+        Parameters
+        ----------
+        stress
+            The stress along the bed line.
+        line
+            The line that the bed has worn down to, if it has.
+        present
+            Which grains have not left yet, shape (n,); by default all.
+
+        Returns
+        -------
+        Loads
+            The grains under the stress.
         """
         s = self.packing.arc_length
         if line is not None:
             x = np.interp(s, self.line.arc_lengths, self.line.x)
             s = np.interp(x, line.x, line.arc_lengths)
         ratio = np.where(self._unloaded, 0, self.felt(stress, s))
-        return Loads(
-            self, ratio, np.ones(len(ratio), bool) if present is None else present
-        )
+        if present is None:
+            present = np.ones(len(ratio), bool)
+        return Loads(self, ratio, present)
 
     def felt(self, stress: WallStress, s: FloatArray) -> FloatArray:
-        """Signed friction velocity over u*_0 of the mean stress around some arc lengths, d."""
-        how, d = self.scene.forces, self.scene.grain.diameter
-        length = max(d, how.averaging_length * self.bed.relief)
-        tau = stress.mean_over(s * d, length, how.stress)
+        """Average a stress as grains feel it.
+
+        Parameters
+        ----------
+        stress
+            The stress along the bed line.
+        s
+            Arc lengths, d.
+
+        Returns
+        -------
+        FloatArray
+            Signed friction velocity over u*_0 of the mean stress around each.
+        """
+        rules = self.scene.forces
+        d = self.scene.grain.diameter
+        length = max(d, rules.averaging_length * self.bed.relief)
+        tau = stress.mean_over(s * d, length, rules.stress)
         return digits.all_rounded(np.sign(tau) * np.sqrt(np.abs(tau)))
 
     def around(self, x: float) -> Self:
-        """The same bed by pivots, with grains on a part of it alone, of `LONG` around x in m."""
-        line, counts = self.line, self.counts
-        start, end = line.x[1], line.x[-2]
+        """Take the same bed by pivots, with grains on a part of it alone.
+
+        Parameters
+        ----------
+        x
+            The middle of a part of `LONGEST_PACKED`, m.
+
+        Returns
+        -------
+        Geometry
+            The bed.
+        """
+        counts = self.counts
+        start = self.line.x[1]
+        end = self.line.x[-2]
         if not isinstance(counts, str):
-            start, end = max(start, counts[0]), min(end, counts[1])
-        if end - start > LONG:
+            start = max(start, counts[0])
+            end = min(end, counts[1])
+        if end - start > LONGEST_PACKED:
             place = x / self.scene.grain.diameter
-            start, end = max(start, place - LONG / 2), min(end, place + LONG / 2)
+            start = max(start, place - LONGEST_PACKED / 2)
+            end = min(end, place + LONGEST_PACKED / 2)
         parts = {name: getattr(self.scene, name) for name in Scene.model_fields}
         parts["protocol"] = self.scene.protocol.model_copy(update={"method": "pivot"})
         return type(self)(Scene(**parts), self.cases, (start, end))
 
     def row_hold(self, cases: Path) -> float:
-        """By how much the grains of a lattice's rows hold one another, a ratio of at least 1.
+        """Find by how much the grains of a lattice's rows hold one another.
 
-        The flow (u*_0) at which the first counted grain leaves by peeling, over the least at which
-        one of them moves by itself. It is 1 on a poured bed and on a pile of two faces, whose rows
-        end at the crest. Where no method has packed the bed, grains are packed around the place
-        where motion starts; NaN if none can lie there.
+        It is 1 on a poured bed and on a pile of two faces, whose rows end at the crest.
+        Where no method has packed the bed, grains are packed around the place where motion
+        starts.
+
+        Parameters
+        ----------
+        cases
+            The directory of the finished runs.
+
+        Returns
+        -------
+        float
+            The flow (u*_0) at which the first counted grain leaves by peeling, over the
+            least at which one of them moves by itself, at least 1; NaN if no grain can lie
+            there.
         """
         if self.scene.is_poured or self.bed.is_wedge:
             return 1.0
@@ -441,13 +624,25 @@ class Geometry:
             return math.nan
 
     def loads(self, cases: Path) -> "Loads":
-        """The grains under the flow of the whole bed, from the directory of the finished runs."""
+        """Put the grains under the flow of the whole bed.
+
+        Parameters
+        ----------
+        cases
+            The directory of the finished runs.
+
+        Returns
+        -------
+        Loads
+            The grains under the flow.
+        """
         return self.under(self.model.stress(cases))
 
     @property
     def _unloaded(self) -> BoolArray:
         """Grains that go without the flow's force though they are exposed."""
-        windward, s = self.packing.windward, self.packing.arc_length
+        windward = self.packing.windward
+        s = self.packing.arc_length
         if self.scene.forces.loaded_grains == "all but crest":
             return np.asarray(windward & (s == s[windward].max()))
         if self.scene.forces.loaded_grains == "all but toe":
@@ -457,10 +652,16 @@ class Geometry:
 
 @dataclass(frozen=True)
 class Loads:
-    """The n grains of a bed under a flow, and the flows at which they move by their geometry.
+    """The n grains of a bed under a flow, and the flows at which they move by geometry.
 
-    `ratio`, (n,), is the signed friction velocity of the mean stress around each over u*_0;
-    `present`, (n,), has those that have not left yet.
+    Attributes
+    ----------
+    geometry
+        The bed.
+    ratio
+        Signed friction velocity of the mean stress around each over u*_0, shape (n,).
+    present
+        Those that have not left yet, shape (n,).
     """
 
     geometry: Geometry
@@ -478,7 +679,8 @@ class Loads:
         bed = self.geometry
         level: Force = np.zeros_like
         if bed.is_balanced:
-            patch, shelter = bed.patches[0], bed.sheltered(self.exposed, self.exposed)
+            patch, _ = bed.patches
+            shelter = bed.sheltered(self.exposed, self.exposed)
             level = partial(shelter.level, patch=patch)
         drag, lift = forces(bed.scene, bed.packing.sizes, bed.gaps(self.exposed), level)
         normals = np.column_stack([-bed.tangents[:, 1], bed.tangents[:, 0]])
@@ -498,28 +700,36 @@ class Loads:
         return np.where(self.ratio < 0, -1.0, 1.0)[:, None] * self.geometry.tangents
 
     def alone(self) -> FloatArray:
-        """Undisturbed friction velocity at which each counted grain moves by itself, m/s, (N,).
+        """Find the flow at which each counted grain moves by itself.
 
-        In a lattice where its stress reaches that of Eq. 3 or 5, in a poured bed where it begins to
-        roll out of its own pocket. Where the flow runs back it pushes the grain upstream. Infinite
-        for grains without flow; an InputError if no grain feels one.
+        In a lattice where its stress reaches that of Eq. 3 or 5, in a poured bed where it
+        begins to roll out of its own pocket. Where the flow runs back it pushes the grain
+        upstream.
+
+        Returns
+        -------
+        FloatArray
+            Undisturbed friction velocities, m/s, shape (N,); infinite for grains without
+            flow.
+
+        Raises
+        ------
+        InputError
+            If no grain feels a flow.
         """
-        bed, counted = self.geometry, self.geometry.packing.windward
-        speed = self.ratio[counted]
-        if not np.any(speed != 0):
-            where, remedy = (
-                f"scene {bed.scene.id}: flow",
-                "the mesh or the stress is wrong",
-            )
-            raise InputError(
-                "no counted grain feels a flow", where=where, remedy=remedy
-            )
+        bed = self.geometry
+        packed = bed.packing
+        counted = packed.windward
+        if not np.any(self.ratio[counted] != 0):
+            what = "no counted grain feels a flow"
+            where = f"scene {bed.scene.id}: flow"
+            raise InputError(what, where, "the mesh or the stress is wrong")
         if bed.pouring:
-            places, sizes = bed.packing.places, bed.packing.sizes
-            loading = replace(
-                self.loading, ratio=np.where(counted, self.loading.ratio, 0.0)
+            ratio = np.where(counted, self.loading.ratio, 0.0)
+            loading = replace(self.loading, ratio=ratio)
+            flows = peeling.pivots(
+                packed.places, packed.sizes, loading, self.tables, bed.scene.bond
             )
-            flows = peeling.pivots(places, sizes, loading, self.tables, bed.scene.bond)
             return digits.all_rounded(flows[counted])
         if bed.is_balanced:
             return self._undisturbed(self._by_tables())
@@ -528,14 +738,13 @@ class Loads:
     @property
     def _slopes_deg(self) -> FloatArray:
         """Slope that the flow goes up at each counted grain, degrees, shape (N,)."""
-        bed, counted = self.geometry, self.geometry.packing.windward
-        slopes = np.degrees(
-            np.arctan2(bed.tangents[counted, 1], bed.tangents[counted, 0])
-        )
+        counted = self.geometry.packing.windward
+        x, z = self.geometry.tangents[counted].T
+        slopes = np.degrees(np.arctan2(z, x))
         return np.asarray(np.where(self.ratio[counted] < 0, -slopes, slopes))
 
     def _undisturbed(self, local: FloatArray) -> FloatArray:
-        """The undisturbed friction velocity to local ones of the counted grains, m/s, (N,)."""
+        """Undisturbed friction velocity to local ones of counted grains, m/s, (N,)."""
         ratio = np.abs(self.ratio[self.geometry.packing.windward])
         flows = np.full(len(ratio), np.inf)
         return digits.all_rounded(np.divide(local, ratio, out=flows, where=ratio > 0))
@@ -543,84 +752,109 @@ class Loads:
     def _by_tables(self) -> FloatArray:
         """Local mean u* (m/s) at which each counted grain of a lattice rolls on its slope.
 
-        By drag and lift of the tables of forces, as in peeling, without a torque of the law.
+        By drag and lift of the tables of forces, as in peeling, without a torque of the
+        law.
         """
-        bed, scene = self.geometry, self.geometry.scene
-        beta, tables = np.radians(scene.pocket_angle_deg), self.tables
-        goals = np.cos(np.radians(self._slopes_deg) - beta) + scene.bond * np.sin(
-            2 * beta
-        )
-        arms = float(np.sin(beta)), float(np.cos(beta))
-        numbers = np.flatnonzero(bed.packing.windward)
-        each = zip(numbers.tolist(), goals.tolist(), strict=True)
-        local = [tables[number].reaching(*arms, goal) for number, goal in each]
+        scene = self.geometry.scene
+        beta = np.radians(scene.pocket_angle_deg)
+        drag_arm = float(np.sin(beta))
+        lift_arm = float(np.cos(beta))
+        held = scene.bond * np.sin(2 * beta)
+        goals = np.cos(np.radians(self._slopes_deg) - beta) + held
+        numbers = np.flatnonzero(self.geometry.packing.windward).tolist()
+        local = []
+        for number, goal in zip(numbers, goals.tolist(), strict=True):
+            local.append(self.tables[number].reaching(drag_arm, lift_arm, goal))
         return np.asarray(np.array(local) / np.sqrt(scene.gust))
 
     def leaving(self) -> FloatArray:
-        """Undisturbed friction velocity at which each counted grain leaves by peeling, m/s, (N,).
+        """Find the flow at which each counted grain leaves by peeling.
 
-        Where the grains share the stress, those that are left share it anew after each that leaves;
-        under DEM, whose forces a run keeps, they do not.
+        Where the grains share the stress, those that are left share it anew after each
+        that leaves; under DEM, whose forces a run keeps, they do not.
+
+        Returns
+        -------
+        FloatArray
+            Undisturbed friction velocities, m/s, shape (N,).
         """
-        bed, packed, loading, renew = (
-            self.geometry,
-            self.geometry.packing,
-            self.loading,
-            None,
-        )
+        bed = self.geometry
+        packed = bed.packing
+        loading = self.loading
+        renew = None
         if bed.is_balanced and bed.scene.protocol.method == "peeling":
             there = self.present.copy()
             ratio = np.where(packed.mobile, self.ratio * np.sqrt(bed.scene.gust), 0.0)
             loading = replace(loading, ratio=ratio)
 
             def renew(gone: int) -> dict[int, ForceTable]:
+                """The tables on the patch of a grain that has gone."""
                 there[gone] = False
                 return bed.force_tables(bed.exposed(there), gone)
 
-        given = packed.places, packed.sizes, loading, self.tables
-        criterion, bond = bed.scene.protocol.displacement_criterion, bed.scene.bond
-        flows = peeling.flows(*given, criterion, self.present, bond, renew)
+        flows = peeling.leaving(
+            packed.places,
+            packed.sizes,
+            loading,
+            self.tables,
+            bed.scene.protocol.displacement_criterion,
+            self.present,
+            bed.scene.bond,
+            renew,
+        )
         return digits.all_rounded(flows[packed.windward])
 
     def lifting(self, rolling: FloatArray) -> FloatArray:
-        """Undisturbed friction velocity at which lift takes each counted grain off, m/s, (N,).
+        """Find the flow at which lift takes each counted grain off.
 
-        It then bears the weight normal to the bed, and what the contacts of a pocket pull. Infinite
-        for a grain that leaves before, at the flow `rolling`, (N,).
+        It then bears the weight normal to the bed, and what the contacts of a pocket pull.
+
+        Parameters
+        ----------
+        rolling
+            Flow at which each grain leaves by rolling, m/s, shape (N,).
+
+        Returns
+        -------
+        FloatArray
+            Undisturbed friction velocities, m/s, shape (N,); infinite for a grain that
+            leaves before.
         """
-        bed, scene, counted = (
-            self.geometry,
-            self.geometry.scene,
-            self.geometry.packing.windward,
-        )
-        hold = (
-            2 * scene.bond * np.sin(np.radians(scene.pocket_angle_deg))
-            + bed.tangents[:, 0]
-        )
+        bed = self.geometry
+        scene = bed.scene
+        counted = bed.packing.windward
+        pulled = 2 * scene.bond * np.sin(np.radians(scene.pocket_angle_deg))
+        hold = pulled + bed.tangents[:, 0]
         hold *= scene.weight * bed.packing.sizes**3
         ratio = np.abs(self.ratio) * np.sqrt(scene.gust)
-        last = np.full(
-            len(ratio), RANGE[1] * float(closed_form(scene).friction_velocity)
-        )
+        highest = RANGE[1] * float(closed_form(scene).friction_velocity)
+        last = np.full(len(ratio), highest)
         with np.errstate(divide="ignore", invalid="ignore"):
             last[counted] = np.minimum(rolling * ratio[counted], last[counted])
             # to climb straight up is to lift
-            lifted = counted & (self.loading.lift(last) > hold / LIFT_OFF)
-            if not lifted.any():
+            is_lifted = counted & (self.loading.lift(last) > hold / LIFT_OFF)
+            if not is_lifted.any():
                 return np.full_like(rolling, np.inf)
-            bounds = RANGE[0] * last, LIFT_OFF * last
-            local = root(lambda ustar: self.loading.lift(ustar) - hold, *bounds)
-            flows = np.where(lifted, local / ratio, np.inf)[counted]
-        return np.where(
-            np.isfinite(flows), np.minimum(digits.all_rounded(flows), rolling), np.inf
-        )
+            low = RANGE[0] * last
+            high = LIFT_OFF * last
+            local = root(lambda ustar: self.loading.lift(ustar) - hold, low, high)
+            flows = np.where(is_lifted, local / ratio, np.inf)[counted]
+        first = np.minimum(digits.all_rounded(flows), rolling)
+        return np.where(np.isfinite(flows), first, np.inf)
 
     def row_hold(self) -> float:
-        """The flow (u*_0) at which the first counted grain leaves by peeling over that of pivots.
+        """Find by how much the grains of a lattice's rows hold one another.
 
-        Grains that lie loose say nothing of it. It is infinite where the row never lets one go.
+        Grains that lie loose say nothing of it.
+
+        Returns
+        -------
+        float
+            The flow (u*_0) at which the first counted grain leaves by peeling over that of
+            pivots; infinite where the row never lets one go.
         """
-        alone, leaving = self._undisturbed(self._by_tables()), self.leaving()
+        alone = self._undisturbed(self._by_tables())
+        leaving = self.leaving()
         first_alone = _least(np.minimum(alone, self.lifting(alone)))
         first = _least(np.minimum(leaving, self.lifting(leaving)))
         if math.isinf(first_alone):

@@ -1,7 +1,8 @@
 """Motion of the counted grains of a deck: which moved, at which flow, and how.
 
-The counting rule is described in docs/benchmark.md, "The counting rule". The deck in.bed has the
-same criterion to know when a load step may end, and its counts are compared with those here.
+The counting rule is described in docs/benchmark.md, "The counting rule". The deck in.bed
+has the same criterion to know when a load step may end, and its counts are compared with
+those here.
 """
 
 from collections.abc import Sequence
@@ -26,28 +27,36 @@ from orchestrator.digits import FORMAT
 from orchestrator.errors import Exploded, Noisy, SolverError
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
-SETTLING, SAMPLES = "settling.csv", "samples.csv"
-LOAD_STEPS, MOTION = "load_steps.csv", "motion.csv"
-PASSAGE, BED = "passage.dump", "bed.dump"
+SETTLING = "settling.csv"
+SAMPLES = "samples.csv"
+LOAD_STEPS = "load_steps.csv"
+MOTION = "motion.csv"
+PASSAGE = "passage.dump"
+BED = "bed.dump"
 PASSAGE_COLUMNS = ("id", "x", "z", "vx", "vz", "omegay", "y")
 BED_COLUMNS = ("id", "type", "x", "z", "vx", "vz", "omegay")
-MODES = ("none", "rolled", "slid", "lifted")  # how a grain moved
+MODES = ("none", "rolled", "slid", "lifted")
+"""How a grain moved."""
 LIFTED = 0.3
-"""A grain has lifted when it rises by this over its bed, d: to roll over a neighbour takes 0.13 at
-an entrainment angle of 60 degrees."""
-ROLLED = 0.5  # a grain rolls when its spin makes at least this part of its speed, else it slides
-WINDOW = 5  # samples from the passage of the criterion on in which a grain may lift: 2 sqrt(d/g')
-LAST = 5  # samples in a row in which a bed at rest has less energy than `NOISE`
+"""A grain has lifted when it rises by this over its bed, d: to roll over a neighbour takes
+0.13 at an entrainment angle of 60 degrees."""
+ROLLED = 0.5
+"""A grain rolls when its spin makes at least this part of its speed, else it slides."""
+WINDOW = 5
+"""Samples from the passage of the criterion on in which a grain may lift: 2 sqrt(d/g')."""
+LAST = 5
+"""Samples in a row in which a bed at rest has less energy than `NOISE`."""
 GROWS = 2.0
-"""The energy of a bed that does not come to rest grows when the last quarter of the settling has
-more than this times that of the second."""
-BURST = 10.0  # kinetic energy per grain, over W d, that no fall of a grain can give it
+"""The energy of a bed that does not come to rest grows when the last quarter of the
+settling has more than this times that of the second."""
+BURST = 10.0
+"""Kinetic energy per grain, over W d, that no fall of a grain can give it."""
 REMEDY = (
     "a smaller protocol.time_step or grain.damping, or look for grains that overlap"
 )
 POURED_REMEDY = (
-    "another bed.seed, a gentler slope, or a larger grain.friction_angle_deg; the springs "
-    "of a poured bed are at most of grain.stiffness = 1e5"
+    "another bed.seed, a gentler slope, or a larger grain.friction_angle_deg; the "
+    "springs of a poured bed are at most of grain.stiffness = 1e5"
 )
 """Of poured beds. Grains that have come to rest on a slope roll off it when the springs
 or the fixed grains under them are others; a smaller time step changes nothing."""
@@ -57,78 +66,140 @@ or the fixed grains under them are others; a smaller time step changes nothing."
 class Motion:
     """The motion of the N counted grains of a deck.
 
-    `flow`, never falling, has the shape (levels + 1,), all others have the shape (N,).
+    Attributes
+    ----------
+    flow
+        The flow of each load step, in the deck's unit, which never falls; first that of
+        the settling; shape (levels + 1,).
+    level
+        Load step (index into `flow`) in which a grain moved by the counting rule; 0 for
+        never; shape (N,).
+    fallen
+        Load step in which a grain was first the criterion upstream of its place; 0 for
+        never; shape (N,).
+    carried
+        Whether it was gone before it was seen beyond the displacement criterion: carried
+        off; shape (N,).
+    mode
+        How it moved: index into `MODES`; shape (N,).
+    exact
+        Whether a grain moves at its level's very flow, as by a formula; else between the
+        load step before and that one.
     """
 
     flow: FloatArray
-    """The flow of each load step, in the deck's unit; first that of the settling."""
     level: IntArray
-    """Load step (index into `flow`) in which a grain moved by the counting rule; 0 for never."""
     fallen: IntArray
-    """Load step in which a grain was first the criterion upstream of its place; 0 for never."""
     carried: BoolArray
-    """Whether it was gone before it was seen beyond the displacement criterion: carried off."""
     mode: IntArray
-    """How it moved: index into `MODES`."""
     exact: bool = False
-    """Whether a grain moves at its level's very flow, as by a formula; else between the load step
-    before and that one."""
 
     @classmethod
     def of_flows(
         cls, rolling: FloatArray, lifting: FloatArray | float = np.inf
     ) -> "Motion":
-        """The motion of grains that roll or are lifted at given flows, (N,); infinite for never."""
+        """Make the motion of grains that roll or are lifted at given flows.
+
+        Parameters
+        ----------
+        rolling, lifting
+            The flows, shape (N,); infinite for never.
+
+        Returns
+        -------
+        Motion
+            The motion.
+        """
         flows = np.minimum(rolling, lifting)
+        moves = np.isfinite(flows)
         # to be lifted straight over a neighbour is to be lifted
-        moves, carried = np.isfinite(flows), np.isfinite(lifting) & (lifting <= rolling)
+        carried = np.isfinite(lifting) & (lifting <= rolling)
         levels = np.unique(flows[moves])
-        # before the first level nothing moves
-        flow = (
-            np.concatenate([levels[:1] * SETTLE_FLOW, levels])
-            if len(levels)
-            else np.zeros(1)
-        )
+        flow = np.zeros(1)
+        if len(levels):
+            # before the first level nothing moves
+            flow = np.concatenate([levels[:1] * SETTLE_FLOW, levels])
         level = np.where(moves, np.searchsorted(levels, flows) + 1, 0)
-        mode = np.select(
-            [carried, moves], [MODES.index("lifted"), MODES.index("rolled")], 0
-        )
+        modes = [MODES.index("lifted"), MODES.index("rolled")]
+        mode = np.select([carried, moves], modes, 0)
         return cls(flow, level, np.zeros_like(level), carried, mode, exact=True)
 
     @classmethod
     def chained(cls, runs: "Sequence[tuple[BoolArray, Motion]]") -> "Motion":
-        """The motion in runs that go on from one another: of each which of the N it counts."""
-        whole = cls.of_flows(np.full(len(runs[0][0]), np.inf))
-        level, fallen, carried, mode = (
-            whole.level,
-            whole.fallen,
-            whole.carried,
-            whole.mode,
-        )
-        flow, before = [runs[0][1].flow[:1]], 0
+        """Join the motion in runs that go on from one another.
+
+        Parameters
+        ----------
+        runs
+            For each run which of the N grains it counts, and its motion.
+
+        Returns
+        -------
+        Motion
+            The motion of all grains.
+        """
+        everyone, first_run = runs[0]
+        level = np.zeros(len(everyone), np.int64)
+        fallen = np.zeros(len(everyone), np.int64)
+        carried = np.zeros(len(everyone), bool)
+        mode = np.zeros(len(everyone), np.int64)
+        flow = [first_run.flow[:1]]
+        before = 0
         for counted, run in runs:
             level[counted] = np.where(run.level > 0, run.level + before, 0)
-            first = (fallen[counted] == 0) & (run.fallen > 0)
-            fallen[counted] = np.where(first, run.fallen + before, fallen[counted])
-            carried[counted], mode[counted] = run.carried, run.mode
+            falls_first = (fallen[counted] == 0) & (run.fallen > 0)
+            fallen[counted] = np.where(
+                falls_first, run.fallen + before, fallen[counted]
+            )
+            carried[counted] = run.carried
+            mode[counted] = run.mode
             flow.append(run.flow[1:])
             before += len(run.flow) - 1
         return cls(np.concatenate(flow), level, fallen, carried, mode)
 
     def of(self, chosen: BoolArray) -> "Motion":
-        """The motion of some of the counted grains under the same flows."""
-        parts = ("level", "fallen", "carried", "mode")
-        return replace(self, **{name: getattr(self, name)[chosen] for name in parts})
+        """Take the motion of some of the counted grains under the same flows.
+
+        Parameters
+        ----------
+        chosen
+            Which grains, shape (N,).
+
+        Returns
+        -------
+        Motion
+            Their motion.
+        """
+        return replace(
+            self,
+            level=self.level[chosen],
+            fallen=self.fallen[chosen],
+            carried=self.carried[chosen],
+            mode=self.mode[chosen],
+        )
 
     @cached_property
     def low(self) -> FloatArray:
-        """For each level the highest flow that is known to be below it, shape (levels + 1,)."""
+        """For each level the highest flow known to be below it, shape (levels + 1,)."""
+        if self.exact:
+            return self.flow
         # two load steps of one flow are before and after the bed has changed
         lower = np.searchsorted(self.flow, self.flow) - 1
-        return self.flow if self.exact else self.flow[np.maximum(lower, 0)]
+        return np.asarray(self.flow[np.maximum(lower, 0)])
 
     def moved_by(self, level: int) -> BoolArray:
-        """Which grains have moved by the end of a load step."""
+        """Find the grains that have moved by the end of a load step.
+
+        Parameters
+        ----------
+        level
+            The load step.
+
+        Returns
+        -------
+        BoolArray
+            Which grains, shape (N,).
+        """
         return (self.level > 0) & (self.level <= level)
 
     @property
@@ -148,12 +219,12 @@ class Motion:
 
     @property
     def fallen_upstream(self) -> IntArray:
-        """How many had been the displacement criterion upstream by then, shape (levels + 1,)."""
+        """How many had been the criterion upstream by then, shape (levels + 1,)."""
         return self._by_load_step(self.fallen)
 
     @cached_property
     def carried_off(self) -> IntArray:
-        """How many of those that had moved by then were carried off, shape (levels + 1,)."""
+        """How many of those that had moved were carried off, shape (levels + 1,)."""
         return self._by_load_step(np.where(self.carried, self.level, 0))
 
     def _by_load_step(self, level: IntArray) -> IntArray:
@@ -163,7 +234,15 @@ class Motion:
         return np.cumsum(counts)
 
     def to_csv(self, directory: Path, grains: GrainTable) -> None:
-        """Write ``load_steps.csv`` and ``motion.csv``, which `from_csv` reads."""
+        """Write ``load_steps.csv`` and ``motion.csv``, which `from_csv` reads.
+
+        Parameters
+        ----------
+        directory
+            Where to.
+        grains
+            The grains of the deck.
+        """
         load_steps = {
             "load_step": np.arange(len(self.flow)),
             "flow": self.flow,
@@ -185,7 +264,18 @@ class Motion:
 
     @classmethod
     def from_csv(cls, directory: Path) -> "Motion":
-        """Read what `to_csv` wrote."""
+        """Read what `to_csv` wrote.
+
+        Parameters
+        ----------
+        directory
+            Where from.
+
+        Returns
+        -------
+        Motion
+            The motion.
+        """
         grains = read_texts(directory / MOTION)
         return cls(
             flow=read_texts(directory / LOAD_STEPS)["flow"].astype(float),
@@ -197,11 +287,16 @@ class Motion:
 
 
 class Track(NamedTuple):
-    """The counted grains at each sample; arrays of shape (T, N), NaN for a grain that is gone.
+    """The N counted grains at each of T samples; NaN for a grain that is gone.
 
-    `travel`, `rise` and `aside` are the displacement since the settling in the grain's own
-    diameter: along the bed as the flow goes, normal to it, and across the flow to either side.
-    `roll` is the speed of the surface by spinning over that of the centre: 1 for pure rolling.
+    Attributes
+    ----------
+    travel, rise, aside
+        Displacement since the settling in the grain's own diameter: along the bed as the
+        flow goes, normal to it, and across the flow to either side; shape (T, N).
+    roll
+        Speed of the surface by spinning over that of the centre: 1 for pure rolling;
+        shape (T, N).
     """
 
     travel: FloatArray
@@ -211,14 +306,23 @@ class Track(NamedTuple):
 
 
 class Count(NamedTuple):
-    """Motion of N counted grains by each of T samples, shape (T, N); a grain stays counted."""
+    """Motion of N counted grains by each of T samples; a grain stays counted.
+
+    Attributes
+    ----------
+    moved
+        Displaced downstream or aside by the criterion at a sample, or carried off; shape
+        (T, N).
+    fallen
+        Displaced upstream by it; such a grain has not moved, but may yet.
+    carried
+        Gone without having been seen beyond the criterion: the flow lifted it off the
+        pile.
+    """
 
     moved: BoolArray
-    """Displaced downstream or aside by the criterion at a sample, or carried off."""
     fallen: BoolArray
-    """Displaced upstream by it; such a grain has not moved, but may yet."""
     carried: BoolArray
-    """Gone without having been seen beyond the criterion: the flow lifted it off the pile."""
 
 
 def count(
@@ -228,16 +332,26 @@ def count(
     falls_out: bool,
     aside: FloatArray | float = 0.0,
 ) -> Count:
-    """Apply the counting rule to `Track.travel` and `Track.aside`, with a criterion in d.
+    """Apply the counting rule.
 
-    `falls_out` says whether a grain that is gone and was not seen beyond the criterion fell
-    upstream: from the two neighbours of a single grain it did, for no bed is behind them; only lift
-    can have taken it from a pile.
+    Parameters
+    ----------
+    travel, aside
+        As in `Track`.
+    criterion
+        The displacement criterion, d.
+    falls_out
+        Whether a grain that is gone and was not seen beyond the criterion fell upstream:
+        from the two neighbours of a single grain it did, for no bed is behind them; only
+        lift can have taken it from a pile.
+
+    Returns
+    -------
+    Count
+        Which grains have moved by each sample.
     """
-    ahead, back = (
-        _ever((travel >= criterion) | (aside >= criterion)),
-        _ever(travel <= -criterion),
-    )
+    ahead = _ever((travel >= criterion) | (aside >= criterion))
+    back = _ever(travel <= -criterion)
     vanished = _ever(np.isnan(travel) & ~ahead)
     if falls_out:
         return Count(ahead, back | vanished, np.zeros_like(vanished))
@@ -245,15 +359,33 @@ def count(
 
 
 def _ever(happened: BoolArray) -> BoolArray:
+    """What has happened by each sample."""
     return np.logical_or.accumulate(happened, axis=0)
 
 
 def read(
     directory: Path, grains: GrainTable, criterion: float, *, falls_out: bool
 ) -> Motion:
-    """Read the deck's tables of a finished run; the other arguments are those of `count`.
+    """Read the deck's tables of a finished run.
 
-    Raises a SolverError if a table is cut short, grains were lost, or the counts do not reconcile.
+    Parameters
+    ----------
+    directory
+        The directory of the run.
+    grains
+        The grains of the deck.
+    criterion, falls_out
+        As in `count`.
+
+    Returns
+    -------
+    Motion
+        The motion of the counted grains.
+
+    Raises
+    ------
+    SolverError
+        If a table is cut short, grains were lost, or the counts do not reconcile.
     """
     samples = read_table(directory / SAMPLES)
     track = read_track(directory, grains, samples)
@@ -261,20 +393,27 @@ def read(
     passed = _ever((track.travel >= criterion) | (track.aside >= criterion))
     lying = (~np.isnan(track.travel) & ~passed).sum(axis=1)
     fallen = (track.travel <= -criterion).sum(axis=1)
-    agree = (samples["lying"] == lying) & (samples["fallen"] == fallen)
-    if not agree.all():
-        what = f"the counts do not reconcile at sample {int(agree.argmin()) + 1}"
+    agrees = (samples["lying"] == lying) & (samples["fallen"] == fallen)
+    if not agrees.all():
+        what = f"the counts do not reconcile at sample {int(agrees.argmin()) + 1}"
         remedy = "grains were lost, or the tables are of different runs"
         raise SolverError(what, where=str(directory / SAMPLES), remedy=remedy)
     counts = count(track.travel, criterion, falls_out=falls_out, aside=track.aside)
     load_step = samples["load_step"].to_numpy(np.int64)
     flow = samples.groupby("load_step")["flow"].first().to_numpy(float)
-    level, fallen = (
-        np.where(happened.any(axis=0), load_step[happened.argmax(axis=0)], 0)
-        for happened in (counts.moved, counts.fallen)
+    return Motion(
+        flow=np.concatenate([[SETTLE_FLOW * flow[0]], flow]),
+        level=_first_step(counts.moved, load_step),
+        fallen=_first_step(counts.fallen, load_step),
+        carried=counts.carried[-1],
+        mode=_mode(track, counts),
     )
-    whole = np.concatenate([[SETTLE_FLOW * flow[0]], flow])
-    return Motion(whole, level, fallen, counts.carried[-1], _mode(track, counts))
+
+
+def _first_step(happened: BoolArray, load_step: IntArray) -> IntArray:
+    """The load step of the first sample at which it happened to each grain; 0 for never."""
+    first = load_step[happened.argmax(axis=0)]
+    return np.where(happened.any(axis=0), first, 0)
 
 
 def _mode(track: Track, counts: Count) -> IntArray:
@@ -297,12 +436,34 @@ def _mode(track: Track, counts: Count) -> IntArray:
 
 
 def read_track(directory: Path, grains: GrainTable, samples: pd.DataFrame) -> Track:
-    """Read what the counted grains did at each sample, from ``passage.dump`` and ``bed.dump``.
+    """Read what the counted grains did at each sample.
 
-    A counted grain that the first does not list, and that the second has at the end of the load
-    step, is at rest where it had settled. `samples` is the deck's table of samples, T rows.
+    A counted grain that ``passage.dump`` does not list, and that ``bed.dump`` has at the
+    end of the load step, is at rest where it had settled.
+
+    Parameters
+    ----------
+    directory
+        The directory of the run.
+    grains
+        The grains of the deck.
+    samples
+        The deck's table of samples, T rows.
+
+    Returns
+    -------
+    Track
+        The N counted grains.
+
+    Raises
+    ------
+    Exploded
+        If every counted grain was lost.
+    SolverError
+        If a dump is of another run.
     """
-    ids, path = grains.counted_ids, directory / PASSAGE
+    ids = grains.counted_ids
+    path = directory / PASSAGE
     steps, rows = read_dump(path, PASSAGE_COLUMNS)
     if rows.empty:
         remedy = "a smaller protocol.time_step, or look for grains that overlap"
@@ -312,26 +473,34 @@ def read_track(directory: Path, grains: GrainTable, samples: pd.DataFrame) -> Tr
     if not rows["id"].isin(ids).all():
         raise _of_another_run(path, "it lists grains that are not counted")
     state = np.full((len(PASSAGE_COLUMNS) - 1, len(steps), len(ids)), np.nan)
-    row, column = np.searchsorted(steps, rows["step"]), np.searchsorted(ids, rows["id"])
+    sample = np.searchsorted(steps, rows["step"])
+    grain = np.searchsorted(ids, rows["id"])
     for values, name in zip(state, PASSAGE_COLUMNS[1:], strict=True):
-        values[row, column] = rows[name]
-    listed = ~np.isnan(state[0, 1:])
-    resting = ~listed & _present(listed, directory, ids, samples)
-    for values, still in zip(
-        state, (*state[:2, 0], 0.0, 0.0, 0.0, state[5, 0]), strict=True
+        values[sample, grain] = rows[name]
+    is_listed = ~np.isnan(state[0, 1:])
+    is_resting = ~is_listed & _present(is_listed, directory, ids, samples)
+    x, z, vx, vz, spin, y = state
+    for values, at_rest in (
+        (x, x[0]),
+        (z, z[0]),
+        (vx, 0.0),
+        (vz, 0.0),
+        (spin, 0.0),
+        (y, y[0]),
     ):
-        np.copyto(values[1:], still, where=resting)
-    diameter, along = grains.diameter * grains.sizes[ids - 1], grains.along[ids - 1].T
-    right, up = (state[:2, 1:] - state[:2, :1]) / diameter
-    vx, vz, spin, y = state[2:, 1:]
+        np.copyto(values[1:], at_rest, where=is_resting)
+    diameter = grains.diameter * grains.sizes[ids - 1]
+    along_x, along_z = grains.along[ids - 1].T
+    right = (x[1:] - x[0]) / diameter
+    up = (z[1:] - z[0]) / diameter
+    sideways = across(y[1:] - y[0], grains.diameter * grains.width)
     with np.errstate(invalid="ignore", divide="ignore"):
-        roll = np.abs(spin) * diameter / 2 / np.hypot(vx, vz)
+        roll = np.abs(spin[1:]) * diameter / 2 / np.hypot(vx[1:], vz[1:])
     return Track(
-        travel=right * along[0] + up * along[1],
+        travel=right * along_x + up * along_z,
         # out of the bed, whichever way is along it
-        rise=np.sign(along[0]) * (up * along[0] - right * along[1]),
-        aside=np.abs(across(y - state[5, :1], grains.diameter * grains.width))
-        / diameter,
+        rise=np.sign(along_x) * (up * along_x - right * along_z),
+        aside=np.abs(sideways) / diameter,
         roll=roll,
     )
 
@@ -339,27 +508,29 @@ def read_track(directory: Path, grains: GrainTable, samples: pd.DataFrame) -> Tr
 def _present(
     listed: BoolArray, directory: Path, ids: IntArray, samples: pd.DataFrame
 ) -> BoolArray:
-    """Which grains were there at each sample: listed ones, or seen later in the load step."""
+    """Which grains were there at each sample: listed then, or later in the load step."""
     steps, rows = read_dump(directory / BED, BED_COLUMNS)
     load_step = samples["load_step"].to_numpy(np.int64)
     last = np.append(np.flatnonzero(np.diff(load_step)), len(load_step) - 1)
     if not np.array_equal(steps, samples["step"].to_numpy()[last]):
-        raise _of_another_run(
-            directory / BED, "its frames are not the ends of the load steps"
-        )
+        what = "its frames are not the ends of the load steps"
+        raise _of_another_run(directory / BED, what)
     rows = rows[rows["id"].isin(ids)]
-    left = np.zeros((len(steps), len(ids)), bool)
-    left[np.searchsorted(steps, rows["step"]), np.searchsorted(ids, rows["id"])] = True
+    is_left = np.zeros((len(steps), len(ids)), bool)
+    frame = np.searchsorted(steps, rows["step"])
+    is_left[frame, np.searchsorted(ids, rows["id"])] = True
     present = listed.copy()
-    for at_the_end, first, end in zip(
-        left, [0, *(last[:-1] + 1)], last + 1, strict=True
-    ):
-        group = listed[first:end]
-        present[first:end] = np.logical_or.accumulate(group[::-1])[::-1] | at_the_end
+    first = 0
+    for at_the_end, end in zip(is_left, last + 1, strict=True):
+        of_step = listed[first:end]
+        is_seen_later = np.logical_or.accumulate(of_step[::-1])[::-1]
+        present[first:end] = is_seen_later | at_the_end
+        first = end
     return present
 
 
 def _of_another_run(path: Path, what: str) -> SolverError:
+    """The refusal of a dump that is of another run."""
     return SolverError(what, where=str(path), remedy="run the case again")
 
 
@@ -372,23 +543,37 @@ def check_rest(
     all_rest: bool,
     remedy: str = REMEDY,
 ) -> None:
-    """See that a bed of grains came to rest before the flow rose, judged by their energy.
+    """See that a bed of grains came to rest before the flow rose, by their energy.
 
-    The weight W is in N, the stiffness is K d/W. All grains of a pile must come to rest; of cells
-    some grains may fall out. The errors name the remedy. Raises `Exploded` if the energy is no number, grows, or has driven
-    grains away, `Noisy` if the grains keep moving.
+    Parameters
+    ----------
+    directory
+        The directory of the run.
+    grains
+        The grains of the deck.
+    weight
+        Weight W of a grain, N.
+    stiffness
+        Stiffness of a contact, K d/W.
+    all_rest
+        Whether all grains must come to rest, as of a pile; of cells some may fall out.
+    remedy
+        What the errors name as the remedy.
+
+    Raises
+    ------
+    Exploded
+        If the energy is no number, grows, or has driven grains away.
+    Noisy
+        If the grains keep moving.
     """
-    settling, where = (
-        read_table(directory / SETTLING, rows=4),
-        str(directory / SETTLING),
-    )
-    energy = (
-        settling["ke"].to_numpy(float)
-        / grains.mobile_count
-        / (weight * grains.diameter)
-    )
+    where = str(directory / SETTLING)
+    settling = read_table(directory / SETTLING, rows=4)
+    mean = settling["ke"].to_numpy(float) / grains.mobile_count
+    energy = mean / (weight * grains.diameter)
     if not energy.max() < BURST:
-        what = f"the bed burst as it settled: {energy.max():.2g} W d of kinetic energy per grain"
+        grain = f"{energy.max():.2g} W d of kinetic energy per grain"
+        what = f"the bed burst as it settled: {grain}"
         raise Exploded(what, where=where, remedy=remedy)
     if not all_rest:
         return
@@ -401,12 +586,11 @@ def check_rest(
     if last < NOISE:
         return
     text = f"{last:.2g} W^2/K of kinetic energy per grain after settling"
-    quarters = [float(quarter.mean()) for quarter in np.array_split(energy, 4)]
-    if quarters[3] > GROWS * quarters[1]:
-        ratio = quarters[3] / quarters[1]
-        what = f"the energy of the bed at rest grows: {text}, {ratio:.1f} times the earlier"
+    _, second, _, fourth = (float(part.mean()) for part in np.array_split(energy, 4))
+    if fourth > GROWS * second:
+        times = f"{fourth / second:.1f} times the earlier"
+        what = f"the energy of the bed at rest grows: {text}, {times}"
         raise Exploded(what, where=where, remedy=remedy)
-    what = (
-        f"the bed does not come to rest: {text}; {NOISE:g} is the most of a bed at rest"
-    )
+    limit = f"{NOISE:g} is the most of a bed at rest"
+    what = f"the bed does not come to rest: {text}; {limit}"
     raise Noisy(what, where=where, remedy=remedy)

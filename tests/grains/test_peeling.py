@@ -35,7 +35,7 @@ def _law(lift: float) -> tuple[Force, Force]:
 
 
 def _tables(count: int, lift: float = 0.0, unit: float = 1.0) -> dict[int, ForceTable]:
-    ustar = unit * np.geomspace(*peeling.RANGE, peeling.PLACES)
+    ustar = unit * np.geomspace(*peeling.RANGE, peeling.FINE_TABLE)
     return dict(enumerate(ForceTable.of(*_law(lift), np.ones(count), ustar)))
 
 
@@ -45,7 +45,7 @@ def _flows(
     """The flow at which each grain leaves; those of a ratio of 0 feel none, and are fixed."""
     loading = Loading(*_law(lift), ratio, *_along(slope_deg, len(centres)))
     tables = {i: table for i, table in _tables(len(centres), lift).items() if ratio[i]}
-    return peeling.flows(
+    return peeling.leaving(
         Places.of(centres), np.ones(len(centres)), loading, tables, 0.3
     )
 
@@ -73,7 +73,7 @@ def test_a_grain_of_another_size_leaves_at_the_angle_of_its_own_pocket(
     )
     loading = Loading(*_law(0.0), np.array([1.0, 0, 0]), *_along(0.0, 3))
     bed = Places.of(centres), sizes, loading, _tables(3)
-    alone, leaving = peeling.pivots(*bed)[0], peeling.flows(*bed, criterion=0.3)[0]
+    alone, leaving = peeling.pivots(*bed)[0], peeling.leaving(*bed, criterion=0.3)[0]
     assert leaving == alone == pytest.approx(math.sqrt(0.5 / half), rel=1e-9)
 
 

@@ -123,12 +123,12 @@ def test_cohesion_is_shao_and_lu_s(gamma: float, method: str) -> None:
         find = (
             peeling.pivots
             if method == "pivot"
-            else partial(peeling.flows, criterion=0.3)
+            else partial(peeling.leaving, criterion=0.3)
         )
         centres = np.array([[0.0, math.cos(phi)], [-0.5, 0], [0.5, 0]])
         ways = np.tile(np.eye(2), (3, 1, 1)).transpose(1, 0, 2)
         loading = Loading(np.square, np.zeros_like, np.array([1.0, 0, 0]), *ways)
-        ustar = np.geomspace(*peeling.RANGE, peeling.PLACES)
+        ustar = np.geomspace(*peeling.RANGE, peeling.FINE_TABLE)
         tables = dict(
             enumerate(ForceTable.of(np.square, np.zeros_like, np.ones(3), ustar))
         )
