@@ -176,7 +176,8 @@ def written(scene: Scene) -> Scene:
 def method_of(scene: Scene) -> tuple[str, str]:
     """The method that answers a scene as it is written, and why.
 
-    For ``auto`` that is DEM where it can: not on a lattice of more than `LONGEST_PACKED` grains,
+    For ``auto`` that is DEM where it can: not on a lattice of more than
+    `LONGEST_PACKED` grains,
     nor with what DEM does not know. There it is the closed form along the bed, else
     peeling, else pivots.
     """
