@@ -29,7 +29,7 @@ bed = {{ slope_deg = 15.0 }}
 [[group]]
 name = "pile"
 bed = {{ kind = "pile", slope_deg = 15.0, height = 0.01, mobile_layers = 1 }}
-protocol = {{ load_increment = 0.05 }}
+protocol = {{ load_increment = 0.03 }}
 grain = {{ diameter = 1e-3 }}
 # </pre><b>
 """
