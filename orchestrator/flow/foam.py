@@ -93,24 +93,62 @@ def write_poly_mesh(mesh: Any, directory: Path, types: Mapping[str, str]) -> Flo
         (owner[outer], owner[inner])
     )  # as OpenFOAM orders the faces of cells
     chosen, neighbour = [inner[inside]], owner[outer[inside]]
-    boundary, start = [], len(neighbour)
+    sizes = {}
     for name, quads in patches.items():
         chosen.append(np.sort(order[np.searchsorted(keys[order], key(quads))]))
-        entries = f"type {types.get(name, 'patch')}; nFaces {len(quads)}"
-        boundary.append(f"    {name} {{ {entries}; startFace {start}; }}\n")
-        start += len(quads)
+        sizes[name] = len(quads)
     at = np.concatenate(chosen)
-    (directory / "constant/polyMesh").mkdir(parents=True)
+    write_faces(directory, points, faces[at], owner[at], neighbour, sizes, types)
+    return np.asarray(middles[columns])
+
+
+def write_faces(
+    directory: Path,
+    points: FloatArray,
+    faces: IntArray,
+    owner: IntArray,
+    neighbour: IntArray,
+    patches: Mapping[str, int],
+    types: Mapping[str, str],
+) -> None:
+    """Write the ``constant/polyMesh`` of a case, which has none yet.
+
+    Parameters
+    ----------
+    directory
+        Directory of the case.
+    points
+        Corners of the cells, m, shape (n, 3).
+    faces
+        The four points of each side of a cell, seen against the clock from where its
+        owner is not; the inner ones first, in OpenFOAM's order, then those of each
+        patch.
+    owner
+        Cell of each face.
+    neighbour
+        The other cell of each inner face.
+    patches
+        Numbers of faces by the names of the patches, in their order.
+    types
+        Types of patches with their entries; one that is not named is a "patch".
+    """
+    boundary = []
+    start = len(neighbour)
+    for name, count in patches.items():
+        entries = f"type {types.get(name, 'patch')}; nFaces {count}"
+        boundary.append(f"    {name} {{ {entries}; startFace {start}; }}\n")
+        start += count
+    folder = directory / "constant/polyMesh"
+    folder.mkdir(parents=True)
     for name, kind, text in (
         ("points", "vectorField", listed(points, VECTOR)),
-        ("faces", "faceList", listed(faces[at], "4(%d %d %d %d)")),
-        ("owner", "labelList", listed(owner[at], "%d")),
+        ("faces", "faceList", listed(faces, "4(%d %d %d %d)")),
+        ("owner", "labelList", listed(owner, "%d")),
         ("neighbour", "labelList", listed(neighbour, "%d")),
         ("boundary", "polyBoundaryMesh", f"{len(boundary)}\n(\n{''.join(boundary)})\n"),
     ):
         whole = f"{_HEAD.format(kind, name)}{text}\n{_END}\n"
-        (directory / "constant/polyMesh" / name).write_text(whole, encoding="utf-8")
-    return np.asarray(middles[columns])
+        (folder / name).write_text(whole, encoding="utf-8")
 
 
 def start_from(path: Path, values: FloatArray, digits: int = DIGITS) -> None:
