@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,13 @@ from orchestrator.flow.stress import WallStress
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.types import FloatArray, IntArray
 
-BED_FLOW, COLUMN_FLOW = "bed_flow.csv", "column_flow.csv"
-"""What is read of a solved flow, as the template's ``wallShearStress.awk`` describes it."""
+BED_FLOW = "bed_flow.csv"
+"""Stress and speed of each face of the bed, by ``wallShearStress.awk``."""
+COLUMN_FLOW = "column_flow.csv"
+"""Mean speed in the column before the inlet, by the same program."""
 READ_ERROR = 1e-5
-"""Most that these tables may be off the fields, of the largest value: they have six digits."""
+"""Most that these tables may be off the fields, of the largest value: they have six
+digits."""
 SIDES = np.array(
     [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
 )
@@ -30,75 +33,112 @@ VECTOR = f"({FORMAT} {FORMAT} {FORMAT})"
 INTERPOLATED_DIGITS = 6
 """Digits of a field that is interpolated from another flow: fewer than those which the
 fields of two processors share."""
-_HEAD = "FoamFile\n{{\n    version 2.0;\n    format ascii;\n    class {};\n    object {};\n}}\n\n"
+_HEAD = (
+    "FoamFile\n{{\n    version 2.0;\n    format ascii;\n"
+    "    class {};\n    object {};\n}}\n\n"
+)
 _END = "// ***"
 _WITHOUT_BRACKETS = str.maketrans("()", "  ")
 
 
 def listed(values: FloatArray | IntArray, item: str) -> str:
-    """A list with an item of a format such as ``"4(%d %d %d %d)"`` for each value or row."""
+    """Write a list of OpenFOAM.
+
+    Parameters
+    ----------
+    values
+        A value or a row for each item.
+    item
+        Format of an item.
+
+    Returns
+    -------
+    str
+        The list.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> print(listed(np.array([[1, 2], [3, 4]]), "2(%d %d)"), end="")
+    2
+    (
+    2(1 2)
+    2(3 4)
+    )
+    """
     text = f"{item}\n" * len(values) % tuple(values.ravel().tolist())
     return f"{len(values)}\n(\n{text})\n"
 
 
 def read_list(path: Path, after: str = "", kind: type = float) -> NDArray[Any]:
-    """The first list of a file, or the first behind some text, shape (n, numbers of an item).
+    """Read the first list of a file, or the first behind some text.
 
-    Whole numbers, of the kind int, are read seven times as fast as others. Raises a SolverError if
-    the file is missing or not whole.
+    Parameters
+    ----------
+    path
+        The file.
+    after
+        The text.
+    kind
+        Type of the numbers; whole numbers are read seven times as fast as others.
+
+    Returns
+    -------
+    ndarray
+        The numbers, shape (n, numbers of an item).
+
+    Raises
+    ------
+    SolverError
+        If the file is missing or not whole.
     """
-    text = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
-    start = text.find("\n(\n", max(text.find(after), 0)) if after in text else -1
+    text = ""
+    if path.is_file():
+        text = path.read_text(encoding="utf-8", errors="replace")
+    start = -1
+    if after in text:
+        start = text.find("\n(\n", text.find(after))
     if start < 0 or _END not in text[-100:]:
         what = f"the results are not whole: {path.name}"
-        raise SolverError(
-            what, where=str(path), remedy="is the disk full? Run the case again"
-        )
+        remedy = "is the disk full? Run the case again"
+        raise SolverError(what, where=str(path), remedy=remedy)
     count = int(text[:start].rsplit(maxsplit=1)[-1])
-    numbers = text[start + 3 : text.find("\n)", start)].translate(_WITHOUT_BRACKETS)
+    end = text.find("\n)", start)
+    numbers = text[start + 3 : end].translate(_WITHOUT_BRACKETS)
     return np.fromstring(numbers, kind, sep=" ").reshape(count, -1)
 
 
 def write_poly_mesh(mesh: Any, directory: Path, types: Mapping[str, str]) -> FloatArray:
-    """Write the ``constant/polyMesh`` of a case from a `meshio.Mesh` of hexahedra one cell thick.
+    """Write the ``constant/polyMesh`` of a case.
 
-    Its cell sets become the patches, of the given types with their entries, else "patch"; ``bed``
-    has one face for each column of cells. Returned are the middles of the cells in their order, m:
-    downstream, in a column upwards; shape (columns, cells of a column, 3).
+    Parameters
+    ----------
+    mesh
+        A `meshio.Mesh` of hexahedra, one cell thick. Its cell sets become the patches;
+        ``bed`` has one face for each column of cells.
+    directory
+        The case.
+    types
+        Type of a patch with its entries; a patch that is left out is a "patch".
+
+    Returns
+    -------
+    FloatArray
+        Middles of the cells in their order, m: downstream, in a column upwards; shape
+        (columns, cells of a column, 3).
     """
-    points, cells, quads = (
-        mesh.points,
-        mesh.cells_dict["hexahedron"],
-        mesh.cells_dict["quad"],
-    )
-    patches = {name: quads[rows["quad"]] for name, rows in mesh.cell_sets_dict.items()}
+    points = mesh.points
+    cells = mesh.cells_dict["hexahedron"]
+    patches = {}
+    for name, rows in mesh.cell_sets_dict.items():
+        patches[name] = mesh.cells_dict["quad"][rows["quad"]]
     middles = points[cells].mean(axis=1)
-    columns = np.argsort(middles[:, 0]).reshape(len(patches["bed"]), -1)
-    columns = np.take_along_axis(
-        columns, np.argsort(middles[columns, 2], axis=1), axis=1
+    columns = _columns(middles, len(patches["bed"]))
+    faces = _Faces.of(cells[columns.ravel()], patches, len(points))
+    sizes = {name: len(quads) for name, quads in patches.items()}
+    write_faces(
+        directory, points, faces.corners, faces.owner, faces.neighbour, sizes, types
     )
-    faces = cells[columns.ravel()][:, SIDES].reshape(-1, 4)
-    owner = np.repeat(np.arange(len(cells)), len(SIDES))
-
-    def key(corners: IntArray) -> IntArray:
-        """A number for the lowest three corners, which no other side has."""
-        a, b, c, _ = np.sort(corners, axis=1).T
-        return np.asarray((a * len(points) + b) * len(points) + c)
-
-    keys = key(faces)
-    order = np.argsort(keys, kind="stable")
-    twins = np.flatnonzero(keys[order][1:] == keys[order][:-1])
-    inner, outer = order[twins], order[twins + 1]
-    inside = np.lexsort(
-        (owner[outer], owner[inner])
-    )  # as OpenFOAM orders the faces of cells
-    chosen, neighbour = [inner[inside]], owner[outer[inside]]
-    sizes = {}
-    for name, quads in patches.items():
-        chosen.append(np.sort(order[np.searchsorted(keys[order], key(quads))]))
-        sizes[name] = len(quads)
-    at = np.concatenate(chosen)
-    write_faces(directory, points, faces[at], owner[at], neighbour, sizes, types)
     return np.asarray(middles[columns])
 
 
@@ -138,40 +178,119 @@ def write_faces(
         entries = f"type {types.get(name, 'patch')}; nFaces {count}"
         boundary.append(f"    {name} {{ {entries}; startFace {start}; }}\n")
         start += count
+    patch_list = f"{len(boundary)}\n(\n{''.join(boundary)})\n"
     folder = directory / "constant/polyMesh"
     folder.mkdir(parents=True)
-    for name, kind, text in (
-        ("points", "vectorField", listed(points, VECTOR)),
-        ("faces", "faceList", listed(faces, "4(%d %d %d %d)")),
-        ("owner", "labelList", listed(owner, "%d")),
-        ("neighbour", "labelList", listed(neighbour, "%d")),
-        ("boundary", "polyBoundaryMesh", f"{len(boundary)}\n(\n{''.join(boundary)})\n"),
-    ):
-        whole = f"{_HEAD.format(kind, name)}{text}\n{_END}\n"
-        (folder / name).write_text(whole, encoding="utf-8")
+    _write(folder / "points", "vectorField", listed(points, VECTOR))
+    _write(folder / "faces", "faceList", listed(faces, "4(%d %d %d %d)"))
+    _write(folder / "owner", "labelList", listed(owner, "%d"))
+    _write(folder / "neighbour", "labelList", listed(neighbour, "%d"))
+    _write(folder / "boundary", "polyBoundaryMesh", patch_list)
+
+
+def _columns(middles: FloatArray, count: int) -> IntArray:
+    """Cells of each column, upwards, from the most upstream column on."""
+    columns = np.argsort(middles[:, 0]).reshape(count, -1)
+    upwards = np.argsort(middles[columns, 2], axis=1)
+    return np.take_along_axis(columns, upwards, axis=1)
+
+
+class _Faces(NamedTuple):
+    """The faces of a mesh in the order of OpenFOAM: those inside, then each patch."""
+
+    corners: IntArray
+    owner: IntArray
+    neighbour: IntArray
+
+    @classmethod
+    def of(
+        cls, cells: IntArray, patches: Mapping[str, IntArray], points: int
+    ) -> "_Faces":
+        """The faces of hexahedra, of which those of the patches are given."""
+        corners = cells[:, SIDES].reshape(-1, 4)
+        owner = np.repeat(np.arange(len(cells)), len(SIDES))
+        keys = _keys(corners, points)
+        order = np.argsort(keys, kind="stable")
+        sorted_keys = keys[order]
+        twins = np.flatnonzero(sorted_keys[1:] == sorted_keys[:-1])
+        inner = order[twins]
+        outer = order[twins + 1]
+        # OpenFOAM orders the faces inside by their cells.
+        inside = np.lexsort((owner[outer], owner[inner]))
+        chosen = [inner[inside]]
+        for quads in patches.values():
+            on_patch = order[np.searchsorted(sorted_keys, _keys(quads, points))]
+            chosen.append(np.sort(on_patch))
+        at = np.concatenate(chosen)
+        return cls(corners[at], owner[at], owner[outer[inside]])
+
+
+def _keys(corners: IntArray, points: int) -> IntArray:
+    """A number for the lowest three corners of each face, which no other face has."""
+    a, b, c, _ = np.sort(corners, axis=1).T
+    return np.asarray((a * points + b) * points + c)
+
+
+def _write(path: Path, kind: str, text: str) -> None:
+    """Write a file of OpenFOAM with its head and its end."""
+    whole = f"{_HEAD.format(kind, path.name)}{text}\n{_END}\n"
+    path.write_text(whole, encoding="utf-8")
 
 
 def start_from(path: Path, values: FloatArray, digits: int = DIGITS) -> None:
-    """Let a field in ``0/`` start from a value or a vector of each cell, with some digits."""
+    """Let a field in ``0/`` start from some values.
+
+    Parameters
+    ----------
+    path
+        The file of the field.
+    values
+        A value or a vector for each cell.
+    digits
+        Digits of each value, or of the largest component of all vectors.
+    """
     if values.ndim > 1 and values.shape[1] > 1:
-        # a component that is nothing but round-off has no digits of its own
+        # A component that is nothing but round-off has no digits of its own.
         values = on_grid(values, digits=digits)
         field = f"nonuniform List<vector>\n{listed(values, VECTOR)};"
     else:
         field = f"nonuniform List<scalar>\n{listed(values, f'%.{digits}g')};"
     text = path.read_text(encoding="utf-8")
-    field = f"internalField {field}"
-    path.write_text(
-        re.sub(r"internalField [^;]+;", lambda _: field, text), encoding="utf-8"
-    )
+    entry = f"internalField {field}"
+    text = re.sub(r"internalField [^;]+;", lambda _: entry, text)
+    path.write_text(text, encoding="utf-8")
+
+
+class BedMesh(NamedTuple):
+    """The mesh of a case.
+
+    Attributes
+    ----------
+    faces
+        Corners of the bed's faces, m; shape (F, 4, 3).
+    cells
+        The cell on each of them; shape (F,).
+    middles
+        Middles of all cells, m; shape (N, 3).
+    """
+
+    faces: FloatArray
+    cells: IntArray
+    middles: FloatArray
 
 
 @dataclass(frozen=True)
 class SolvedFlow:
     """The last iteration of an OpenFOAM case that `Allrun` has run in.
 
-    The approaching flow develops in the column before the inlet, on the rows of the mesh. Each
-    method and property raises a SolverError if there are no results, or a file is not whole.
+    The approaching flow develops in the column before the inlet, on the rows of the
+    mesh.
+
+    Attributes
+    ----------
+    directory
+        The case. Each method and property raises a SolverError if there are no results,
+        or a file is not whole.
     """
 
     directory: Path
@@ -179,63 +298,92 @@ class SolvedFlow:
     def at(
         self, name: str, x: FloatArray, heights: FloatArray, bed: BedLine
     ) -> FloatArray:
-        """A field of a study's case at the middles of the cells of another mesh over the same bed.
+        """A field at the middles of the cells of another mesh over the same bed.
 
-        In m, x (columns,) and heights over the bed (columns, cells); a row of the result for each.
-        The field is linear along the rows of cells, in a column in the logarithm of the height.
+        The field is linear along the rows of cells, and in a column linear in the
+        logarithm of the height.
+
+        Parameters
+        ----------
+        name
+            Name of the field.
+        x
+            Places of the columns of the other mesh, m; shape (C,).
+        heights
+            Heights of its cells over the bed, m; shape (C, cells of a column).
+        bed
+            The bed line, m.
+
+        Returns
+        -------
+        FloatArray
+            A row for each cell; shape (cells, components).
         """
-        middles, values = self.mesh[2], self.field(name)
+        middles = self.mesh.middles
         rows = int(np.argmax(np.diff(middles[:, 0]) > 1e-9 * bed.h)) + 1
         places = middles[::rows, 0]
         above = (middles[:, 2] - bed.height(middles[:, 0])).reshape(-1, rows)
-        old = np.dstack([np.log(above), values.reshape(len(places), rows, -1)])
+        values = self.field(name).reshape(len(places), rows, -1)
+        old = np.dstack([np.log(above), values])
         after = np.clip(np.searchsorted(places, x), 1, len(places) - 1)
-        part = ((x - places[after - 1]) / np.diff(places)[after - 1])[:, None, None]
+        part = (x - places[after - 1]) / np.diff(places)[after - 1]
+        part = part[:, None, None]
         columns = (1 - part) * old[after - 1] + part * old[after]
-        pairs = zip(np.log(heights), columns, strict=True)
-        fields = (
-            [np.interp(up, old[:, 0], c) for c in old[:, 1:].T] for up, old in pairs
-        )
-        return np.concatenate([np.column_stack(each) for each in fields])
+        fields = []
+        for up, column in zip(np.log(heights), columns, strict=True):
+            components = [np.interp(up, column[:, 0], c) for c in column[:, 1:].T]
+            fields.append(np.column_stack(components))
+        return np.concatenate(fields)
 
     @property
     def last_iteration(self) -> Path:
-        """The directory with the fields of the last iteration, of those that were written."""
-        names = (path.name for path in self.directory.glob("[1-9]*") if path.is_dir())
+        """The directory with the fields of the last iteration that was written."""
+        names = [path.name for path in self.directory.glob("[1-9]*") if path.is_dir()]
         iterations = [int(name) for name in names if name.isdecimal()]
         if not iterations:
             raise SolverError("no results", str(self.directory), "run ./Allrun there")
         return self.directory / str(max(iterations))
 
     def field(self, name: str, patch: str = "") -> FloatArray:
-        """Values of a field in the cells, or on the faces of a patch, shape (n, components)."""
+        """Values of a field in the cells, or on the faces of a patch.
+
+        Parameters
+        ----------
+        name
+            Name of the field.
+        patch
+            Name of the patch.
+
+        Returns
+        -------
+        FloatArray
+            The values, shape (n, components).
+        """
         after = f"\n    {patch}\n" if patch else "internalField   nonuniform"
         return read_list(self.last_iteration / name, after)
 
     @cached_property
-    def mesh(self) -> tuple[FloatArray, IntArray, FloatArray]:
-        """Corners of the bed's faces (n, 4, 3), the cells on them (n,), middles of all cells, m."""
+    def mesh(self) -> BedMesh:
+        """The mesh."""
         folder = self.directory / "constant/polyMesh"
-        files = (folder / name for name in ("faces", "owner", "neighbour"))
-        faces, owner, neighbour = (read_list(file, kind=int) for file in files)
-        # the corners of each face come behind their number
+        faces = read_list(folder / "faces", kind=int)
+        owner = read_list(folder / "owner", kind=int)[:, 0]
+        neighbour = read_list(folder / "neighbour", kind=int)[:, 0]
+        # The corners of each face come behind their number.
         corners = read_list(folder / "points")[faces[:, 1:]]
-        owner, neighbour = owner[:, 0], neighbour[:, 0]
-        # the mean of a hexahedron's corners is that of the means of its sides
+        # The mean of a hexahedron's corners is that of the means of its sides.
+        parts = corners.mean(axis=1) / len(SIDES)
         middles = np.zeros((owner.max() + 1, 3))
-        np.add.at(middles, owner, corners.mean(axis=1) / len(SIDES))
-        np.add.at(
-            middles, neighbour, corners[: len(neighbour)].mean(axis=1) / len(SIDES)
-        )
+        np.add.at(middles, owner, parts)
+        np.add.at(middles, neighbour, parts[: len(neighbour)])
         boundary = (folder / "boundary").read_text(encoding="utf-8")
         match = re.search(r"\bbed\b[^}]*nFaces\s+(\d+);\s+startFace\s+(\d+);", boundary)
         if match is None:
-            raise SolverError(
-                "a mesh without a bed", where=str(folder), remedy="mesh it again"
-            )
-        count, start = map(int, match.groups())
-        bed = slice(start, start + count)
-        return corners[bed], owner[bed], middles
+            what = "a mesh without a bed"
+            raise SolverError(what, where=str(folder), remedy="mesh it again")
+        start = int(match[2])
+        bed = slice(start, start + int(match[1]))
+        return BedMesh(corners[bed], owner[bed], middles)
 
     @cached_property
     def velocity(self) -> FloatArray:
@@ -254,66 +402,101 @@ class SolvedFlow:
         Both are along the face and positive downstream.
         """
         table = read_texts(self.directory / BED_FLOW)
-        stress, speed = (table[name].astype(float) for name in ("tau_m2_s2", "u_m_s"))
-        return stress, speed
+        return table["tau_m2_s2"].astype(float), table["u_m_s"].astype(float)
 
     @cached_property
     def _ends(self) -> tuple[FloatArray, FloatArray]:
-        """Upstream and downstream ends of each face of the bed, m, each of shape (n, 3)."""
-        corners = self.mesh[0]
-        across = np.argsort(corners[..., 0], axis=1)[..., None]
-        corners = np.take_along_axis(corners, across, axis=1)
+        """Upstream and downstream ends of each face of the bed, m; shape (F, 3)."""
+        corners = self.mesh.faces
+        downstream = np.argsort(corners[..., 0], axis=1)[..., None]
+        corners = np.take_along_axis(corners, downstream, axis=1)
         return corners[:, :2].mean(axis=1), corners[:, 2:].mean(axis=1)
 
     def check(self) -> None:
-        """See that the tables of the flow are those of its mesh and of its fields."""
+        """See that the tables of the flow are those of its mesh and of its fields.
+
+        Raises
+        ------
+        SolverError
+            If they are not.
+        """
+        stress, speed = self._on_bed
+        are_right = self._fit(-self.wall_shear, stress)
+        are_right = are_right and self._fit(self.velocity[self.mesh.cells], speed)
+        if not are_right:
+            what = f"{BED_FLOW} is not of these fields"
+            where = str(self.directory)
+            raise SolverError(what, where=where, remedy="run ./Allrun there")
+
+    def _fit(self, field: FloatArray, values: FloatArray) -> bool:
+        """Whether some values are the parts of a field along the faces of the bed."""
         starts, ends = self._ends
-        tangents = (ends - starts) / np.linalg.norm(ends - starts, axis=1)[:, None]
-        fields = -self.wall_shear, self.velocity[self.mesh[1]]
-        for field, values in zip(fields, self._on_bed, strict=True):
-            expected = (field * tangents).sum(axis=1)
-            most = READ_ERROR * np.abs(expected).max()
-            if len(values) != len(expected) or not np.all(
-                np.abs(values - expected) <= most
-            ):
-                what = f"{BED_FLOW} is not of these fields"
-                raise SolverError(
-                    what, where=str(self.directory), remedy="run ./Allrun there"
-                )
+        lengths = np.linalg.norm(ends - starts, axis=1)
+        tangents = (ends - starts) / lengths[:, None]
+        expected = (field * tangents).sum(axis=1)
+        if len(values) != len(expected):
+            return False
+        most = READ_ERROR * np.abs(expected).max()
+        return bool(np.all(np.abs(values - expected) <= most))
 
     @cached_property
     def ustar0(self) -> float:
         """Friction velocity in the column before the inlet, m/s."""
-        tau = float(self._on_bed[0][np.argmin(self.mesh[0][..., 0].mean(axis=1))])
+        stress, _ = self._on_bed
+        first = np.argmin(self.mesh.faces[..., 0].mean(axis=1))
+        tau = float(stress[first])
         if not tau > 0:
-            raise SolverError(
-                "no flow in the column before the inlet", where=str(self.directory)
-            )
+            what = "no flow in the column before the inlet"
+            raise SolverError(what, where=str(self.directory))
         return float(np.sqrt(tau))
 
     def stress(self, z0: float) -> WallStress:
-        """Stress along the bed, of a roughness length z0 (m), over that of the approaching flow."""
-        corners, cells, middles = self.mesh
-        # faces in the order of the flow; those of the study begin behind the column before the
-        # inlet
-        order = np.argsort(corners[..., 0].mean(axis=1))
+        """Stress along the bed over that of the approaching flow.
+
+        Parameters
+        ----------
+        z0
+            Roughness length of the bed, m.
+
+        Returns
+        -------
+        WallStress
+            The stress on the faces of the bed behind the column before the inlet.
+        """
+        order = np.argsort(self.mesh.faces[..., 0].mean(axis=1))
         starts, ends = (places[order] for places in self._ends)
-        centres, lengths = (starts + ends) / 2.0, np.linalg.norm(ends - starts, axis=1)
+        on_wall, speed = (values[order] for values in self._on_bed)
+        middles = self.mesh.middles[self.mesh.cells[order]]
+        centres = (starts + ends) / 2.0
+        lengths = np.linalg.norm(ends - starts, axis=1)
         tangents = (ends - starts) / lengths[:, None]
+        normals = np.column_stack(
+            [-tangents[:, 2], np.zeros(len(lengths)), tangents[:, 0]]
+        )
         toe = int(np.argmin(np.abs(starts[:, 0])))
         s = np.cumsum(lengths) - lengths[:toe].sum() - lengths / 2.0
-        normals = np.column_stack([-tangents[:, 2], np.zeros(len(s)), tangents[:, 0]])
-        z_e = ((middles[cells[order]] - centres) * normals).sum(axis=1)
-        on_wall, u_t = (values[order] for values in self._on_bed)
-        tau = on_wall / self.ustar0**2
-        eq10 = [
-            log_law_ustar(u_t, z_e, z0, printed=as_printed)
-            for as_printed in (False, True)
-        ]
-        ustar = [velocity / self.ustar0 for velocity in eq10]
-        columns = (s, centres[:, 0], centres[:, 2], lengths, z_e, tau, *ustar)
-        return WallStress(*(values[1:] for values in columns))
+        z_e = ((middles - centres) * normals).sum(axis=1)
+        eq10 = log_law_ustar(speed, z_e, z0) / self.ustar0
+        printed = log_law_ustar(speed, z_e, z0, printed=True) / self.ustar0
+        # The first face is that of the column before the inlet.
+        return WallStress(
+            s_m=s[1:],
+            x_m=centres[1:, 0],
+            z_m=centres[1:, 2],
+            length_m=lengths[1:],
+            z_e_m=z_e[1:],
+            tau_wall=(on_wall / self.ustar0**2)[1:],
+            ustar_over_ustar0_eq10=eq10[1:],
+            ustar_over_ustar0_eq10_printed=printed[1:],
+        )
 
     def column_speed(self) -> float:
-        """Mean speed in the column before the inlet, m/s."""
-        return float(read_texts(self.directory / COLUMN_FLOW)["mean_velocity_m_s"][0])
+        """Mean speed in the column before the inlet.
+
+        Returns
+        -------
+        float
+            The speed, m/s.
+        """
+        table = read_texts(self.directory / COLUMN_FLOW)
+        return float(table["mean_velocity_m_s"][0])

@@ -1,121 +1,264 @@
-"""The mesh of a flow case: its grid lines along the bed, and the hexahedra that gmsh makes of them.
+"""The mesh of a flow case: its grid lines along the bed, and the hexahedra by gmsh.
 
-The grid lines are vertical. Each corner of the bed line is one of them; between two corners the
-cells are a geometric series. They are shortest at sharp tops, where the stress has its peaks.
+The grid lines are vertical. Each corner of the bed line is one of them; between two
+corners the cells are a geometric series. They are shortest at sharp tops, where the
+stress has its peaks.
 """
 
 import threading
 from dataclasses import dataclass, replace
 from math import expm1, inf, log, radians, tan
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from orchestrator.bed.line import BedLine
 from orchestrator.digits import FORMAT, whole_up
 from orchestrator.errors import SolverError
-from orchestrator.types import FloatArray
+from orchestrator.types import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
     import meshio
 
-SHARP_DEG = 8.0
-"""Least bend of the bed that is a corner, not a part of a curve."""
+CORNER_DEG = 8.0
+"""Least bend of the bed, degrees, that is a corner and not a part of a curve."""
 CELLS_ON_OBSTACLE = 8
 """Cells in the height of an obstacle, along the bed beside it."""
 TOP = 0.35
-"""Length of the cells at sharp tops over the mean of a face: a grain's stress is averaged over h/40
-there."""
+"""Length of the cells at sharp tops over the mean of a face: the stress of a grain is
+averaged over h/40 there."""
 NEAR = 4.0
-"""Beyond this, h before and behind the forms and above the bed, cells grow by `FAR`."""
+"""Distance before and behind the forms and above the bed, h, beyond which cells grow by
+`FAR`."""
 FAR = 1.3
 """Ratio of neighbouring cells there, with 40 cells on a face."""
 LEVEL_CELLS = 8
-"""A level piece of this many cells at least is divided in the middle: cells grow towards it."""
+"""A level piece of this many cells at least is divided in the middle: cells grow
+towards it."""
+LEVEL = 1e-9
+"""Rise of a piece, h, below which it is level."""
+NO_BEND_DEG = 1e-9
+"""Bend, degrees, below which the bed does not bend."""
+STEADY = 1e-9
+"""Difference from 1 below which a ratio of cells is 1."""
 GROUPS = frozenset({"air", "bed", "lid", "inlet", "outlet", "sides"})
 """Physical groups of the mesh; all but `air` become patches."""
 ARGUMENTS = ["gmsh", "-v", "0", "-no_signal_handler"]
 """PETSc, a part of gmsh, would take all signals: a hang-up would end this process."""
-LINE_HEAD = """// The bed line from the inlet to the outlet: x and z of each corner, m;
-// cells from it to the next one, and the ratio of each of these to the one upstream of it.
-"""
-_GMSH = threading.Lock()  # gmsh has one global state
-_QUADRANGLE, _HEXAHEDRON = 3, 5  # gmsh's types of elements
+LINE_HEAD = (
+    "// The bed line from the inlet to the outlet: x and z of each corner, m;\n"
+    "// cells from it to the next one, and the ratio of each of these to the one"
+    " upstream of it.\n"
+)
+_GMSH = threading.Lock()
+"""gmsh has one global state."""
+_QUADRANGLE = 3
+_HEXAHEDRON = 5
+"""Types of elements, as gmsh numbers them."""
+
+
+class Piece(NamedTuple):
+    """Cells between two corners, a geometric series.
+
+    Attributes
+    ----------
+    cells
+        How many there are.
+    ratio
+        Length of a cell over that of the one upstream of it.
+    """
+
+    cells: int
+    ratio: float
+
+    def first_cell(self, length: float) -> float:
+        """Length of the first cell.
+
+        Parameters
+        ----------
+        length
+            Length of all cells together.
+
+        Returns
+        -------
+        float
+            The length, in the same unit.
+
+        Examples
+        --------
+        >>> round(Piece(3, 2.0).first_cell(7.0), 9)
+        1.0
+        >>> round(Piece(3, 0.5).first_cell(7.0), 9)
+        4.0
+        """
+        if self.ratio < 1:
+            last = Piece(self.cells, 1 / self.ratio).first_cell(length)
+            return last * self.ratio ** (1 - self.cells)
+        if self.ratio == 1:
+            return length / self.cells
+        sum_over_first = float(expm1(self.cells * log(self.ratio)))
+        return length * (self.ratio - 1) / sum_over_first
+
+    def reversed(self) -> "Piece":
+        """The same cells, seen from their other end.
+
+        Returns
+        -------
+        Piece
+            The cells.
+        """
+        return Piece(self.cells, 1 / self.ratio)
 
 
 @dataclass(frozen=True)
 class Grid:
-    """The pieces between the corners of a bed line (m), with one more where a piece was divided.
+    """The grid lines along a bed line.
 
-    Each piece has a number of cells, and the length of a cell over that of the one upstream of it.
+    Attributes
+    ----------
+    line
+        The bed line, m, with one more corner where a piece was divided.
+    pieces
+        The cells between each two corners.
     """
 
     line: BedLine
-    cells: tuple[int, ...]
-    ratio: tuple[float, ...]
+    pieces: tuple[Piece, ...]
+
+    @property
+    def cells(self) -> int:
+        """Number of the cells along the bed."""
+        return sum(piece.cells for piece in self.pieces)
 
     @property
     def shortest(self) -> tuple[float, float, float]:
         """Length of the shortest cell and the two ends of its piece, m."""
-        pieces = zip(self.cells, self.ratio, np.diff(self.line.x).tolist(), strict=True)
-        shorter = [
-            _first((n, max(ratio, 1 / ratio)), length) for n, ratio, length in pieces
-        ]
-        piece = int(np.argmin(shorter))
-        return shorter[piece], self.line.x[piece], self.line.x[piece + 1]
+        lengths = np.diff(self.line.x).tolist()
+        cells = []
+        for piece, length in zip(self.pieces, lengths, strict=True):
+            growing = Piece(piece.cells, max(piece.ratio, 1 / piece.ratio))
+            cells.append(growing.first_cell(length))
+        at = int(np.argmin(cells))
+        return cells[at], self.line.x[at], self.line.x[at + 1]
 
     def write(self, path: Path) -> None:
-        """Write the bed line and the cells along it as `pile.geo` includes them."""
-        rows = zip(
-            self.line.x, self.line.z, (*self.cells, 0), (*self.ratio, 1.0), strict=True
-        )
+        """Write the bed line and the cells along it as `pile.geo` includes them.
+
+        Parameters
+        ----------
+        path
+            The file.
+        """
         form = f"  {FORMAT}, {FORMAT}, %d, {FORMAT}"
-        lines = ",\n".join(form % row for row in rows)
+        behind_the_last = Piece(0, 1.0)
+        pieces = (*self.pieces, behind_the_last)
+        rows = zip(self.line.x, self.line.z, pieces, strict=True)
+        lines = ",\n".join(form % (x, z, *piece) for x, z, piece in rows)
         path.write_text(f"{LINE_HEAD}bed_line() = {{\n{lines}\n}};\n", encoding="utf-8")
 
 
 def growth_far(growth: float, cells_per_face: int) -> float:
-    """Ratio of neighbouring cells far from the forms."""
+    """Ratio of neighbouring cells far from the forms.
+
+    Parameters
+    ----------
+    growth
+        The ratio beside them.
+    cells_per_face
+        Cells of a face as high as the form.
+
+    Returns
+    -------
+    float
+        The ratio.
+    """
     return max(growth, float(FAR ** (40 / cells_per_face)))
 
 
 def extended(line: BedLine, upstream: float, downstream: float) -> BedLine:
-    """A line with flat bed of some lengths, m, before and behind it in place of its own."""
-    return replace(
-        line, x=(line.x[1] - upstream, *line.x[1:-1], line.x[-2] + downstream)
-    )
+    """A line with another length of flat bed at its ends.
+
+    Parameters
+    ----------
+    line
+        The bed line, m.
+    upstream, downstream
+        Lengths of the flat bed before and behind it, m, in place of its own.
+
+    Returns
+    -------
+    BedLine
+        The line.
+    """
+    start = line.x[1] - upstream
+    end = line.x[-2] + downstream
+    return replace(line, x=(start, *line.x[1:-1], end))
 
 
 def along(line: BedLine, slope_deg: float, cells_per_face: int, growth: float) -> Grid:
-    """The grid along a bed line (m); `growth` is the ratio of neighbouring cells beside the form.
+    """The grid along a bed line.
 
-    A face of the slope as high as the form has `cells_per_face` cells; 0 stands for no face.
+    Parameters
+    ----------
+    line
+        The bed line, m.
+    slope_deg
+        Slope of a face, degrees; 0 stands for no face.
+    cells_per_face
+        Cells of a face of this slope that is as high as the form.
+    growth
+        Ratio of neighbouring cells beside the form.
+
+    Returns
+    -------
+    Grid
+        The grid.
     """
     face = line.h / tan(radians(slope_deg)) if slope_deg else 4 * line.h
     cell = face / cells_per_face
-    # a face has a short cell at its sharp top, and this at its foot
+    # A face has a short cell at its sharp top, and this one at its foot.
     face_ratio = ratio_of(cells_per_face, TOP * cell, face)
-    foot = TOP * cell * face_ratio ** (cells_per_face - 1) if slope_deg else cell
+    foot = cell
+    if slope_deg:
+        foot = TOP * cell * face_ratio ** (cells_per_face - 1)
     ends = (line.x[1] - NEAR * line.h, line.x[-2] + NEAR * line.h)
     inside = [x for x in ends if line.x[0] + cell < x < line.x[-1] - cell]
     line = _divided(line.with_corners(inside), cell)
     sizes = _sizes(line, cell, foot, max(growth, face_ratio))
     lengths = np.diff(line.x)
-    inner = [
-        _piece(*one)
-        for one in zip(lengths[1:-1], sizes[1:-2], sizes[2:-1], strict=True)
-    ]
+    inner = []
+    for at in range(1, len(lengths) - 1):
+        inner.append(_piece(lengths[at], sizes[at], sizes[at + 1]))
     far = growth_far(growth, cells_per_face)
-    up, ratio_up = _away(lengths[0], _first(inner[0], lengths[1]), far)
-    last, ratio_last = inner[-1]
-    down = _away(lengths[-1], _first((last, 1 / ratio_last), lengths[-2]), far)
-    pieces = [(up, 1 / ratio_up), *inner, down]
-    return Grid(line, tuple(n for n, _ in pieces), tuple(r for _, r in pieces))
+    upstream = _away(lengths[0], inner[0].first_cell(lengths[1]), far)
+    last_cell = inner[-1].reversed().first_cell(lengths[-2])
+    downstream = _away(lengths[-1], last_cell, far)
+    return Grid(line, (upstream.reversed(), *inner, downstream))
 
 
 def ratio_of(cells: int, first: float, length: float) -> float:
-    """The ratio, at least 1, at which `cells` cells that begin with `first` fill a length."""
+    """The ratio of neighbouring cells that fill a length.
+
+    Parameters
+    ----------
+    cells
+        How many there are.
+    first
+        Length of the first one.
+    length
+        The length that they fill, in the same unit.
+
+    Returns
+    -------
+    float
+        The ratio, at least 1.
+
+    Examples
+    --------
+    >>> round(ratio_of(3, 1.0, 7.0), 9)
+    2.0
+    """
     if cells < 2 or first * cells >= length:
         return 1.0
 
@@ -124,41 +267,46 @@ def ratio_of(cells: int, first: float, length: float) -> float:
 
     from scipy.optimize import brentq  # a third of a second, for which no page waits
 
-    # the last cell alone would fill the length at the upper end
-    return float(
-        brentq(beyond, 1 + 1e-9, (length / first) ** (1 / (cells - 1)), xtol=1e-15)
-    )
+    # The last cell alone would fill the length at the upper end.
+    most = (length / first) ** (1 / (cells - 1))
+    return float(brentq(beyond, 1 + STEADY, most, xtol=1e-15))
+
+
+def _is_level(line: BedLine) -> BoolArray:
+    """Which pieces of a line are level."""
+    return np.asarray(np.abs(np.diff(line.z)) < LEVEL * line.h)
 
 
 def _divided(line: BedLine, cell: float) -> BedLine:
-    """The line with a corner in the middle of pieces whose cells shall grow from both ends."""
-    lengths, bends = np.diff(line.x), line.bends_deg
-    level = np.abs(np.diff(line.z)) < 1e-9 * line.h
-    level &= lengths > LEVEL_CELLS * cell
-    ridge = (bends[:-1] > SHARP_DEG) & (bends[1:] > SHARP_DEG)
-    chosen = np.flatnonzero((level | ridge)[1:-1]) + 1
-    return line.with_corners([(line.x[i] + line.x[i + 1]) / 2 for i in chosen])
+    """The line with a corner in the middle of long level pieces and of ridges."""
+    bends = line.bends_deg
+    is_long = np.diff(line.x) > LEVEL_CELLS * cell
+    is_ridge = (bends[:-1] > CORNER_DEG) & (bends[1:] > CORNER_DEG)
+    chosen = (_is_level(line) & is_long) | is_ridge
+    inner = np.flatnonzero(chosen[1:-1]) + 1
+    middles = [(line.x[at] + line.x[at + 1]) / 2 for at in inner]
+    return line.with_corners(middles)
 
 
 def _sizes(line: BedLine, cell: float, foot: float, growth: float) -> FloatArray:
-    """Length of the cells at each corner, m; the ends of the line have none of their own."""
-    x, z, bends, lengths = (
-        np.array(line.x),
-        np.array(line.z),
-        line.bends_deg,
-        np.diff(line.x),
-    )
+    """Length of the cells at each corner, m; without one of their own at the ends."""
+    x = np.array(line.x)
+    z = np.array(line.z)
+    bends = line.bends_deg
+    lengths = np.diff(line.x)
     sizes = np.full(len(x), cell)
-    sizes[bends > SHARP_DEG] = TOP * cell
-    sizes[bends < -SHARP_DEG] = foot
-    # in the middle of level bed, and at the ends, as long as the growth allows
-    level = np.abs(np.diff(z)) < 1e-9 * line.h
-    sizes[1:-1][(np.abs(bends[1:-1]) < 1e-9) & level[1:] & level[:-1]] = inf
+    sizes[bends > CORNER_DEG] = TOP * cell
+    sizes[bends < -CORNER_DEG] = foot
+    # In the middle of level bed, and at the ends, as long as the growth allows.
+    level = _is_level(line)
+    inside_level = (np.abs(bends[1:-1]) < NO_BEND_DEG) & level[1:] & level[:-1]
+    sizes[1:-1][inside_level] = inf
     sizes[[0, -1]] = inf
     for start, end in line.bare:
         on_it = (x >= start - 1e-12) & (x <= end + 1e-12)
         sizes[on_it] = np.minimum(sizes[on_it], np.ptp(z[on_it]) / CELLS_ON_OBSTACLE)
-    sizes[1:-1] = np.minimum(sizes[1:-1], np.minimum(lengths[:-1], lengths[1:]))
+    shorter_piece = np.minimum(lengths[:-1], lengths[1:])
+    sizes[1:-1] = np.minimum(sizes[1:-1], shorter_piece)
     for i in range(1, len(sizes)):
         sizes[i] = min(sizes[i], sizes[i - 1] + (growth - 1) * lengths[i - 1])
     for i in range(len(sizes) - 2, -1, -1):
@@ -166,92 +314,106 @@ def _sizes(line: BedLine, cell: float, foot: float, growth: float) -> FloatArray
     return sizes
 
 
-def _piece(length: float, start: float, end: float) -> tuple[int, float]:
-    """Cells, and their ratio, of a piece whose first and last cells are about `start` and `end`."""
-    first, last = min(start, end), max(start, end)
-    if last >= length:
-        return 1, 1.0
-    ratio = (length - first) / (length - last)
-    count = length / first if ratio - 1 < 1e-9 else 1 + log(last / first) / log(ratio)
+def _piece(length: float, start: float, end: float) -> Piece:
+    """The piece whose first and last cells are about `start` and `end`."""
+    shorter = min(start, end)
+    longer = max(start, end)
+    if longer >= length:
+        return Piece(1, 1.0)
+    ratio = (length - shorter) / (length - longer)
+    if ratio - 1 < STEADY:
+        count = length / shorter
+    else:
+        count = 1 + log(longer / shorter) / log(ratio)
     cells = max(whole_up(count), 1)
-    if cells < 3 or ratio - 1 < 1e-6 or first * cells >= length:
-        return cells, 1.0
-    ratio = ratio_of(cells, first, length)
-    return cells, ratio if start <= end else 1 / ratio
+    if cells < 3 or ratio - 1 < 1e-6 or shorter * cells >= length:
+        return Piece(cells, 1.0)
+    growing = Piece(cells, ratio_of(cells, shorter, length))
+    return growing if start <= end else growing.reversed()
 
 
-def _away(length: float, first: float, growth: float) -> tuple[int, float]:
+def _away(length: float, first: float, growth: float) -> Piece:
     """Cells that begin with `first` and grow until they fill a length."""
     cells = whole_up(log(1 + length * (growth - 1) / first) / log(growth))
-    return cells, ratio_of(cells, first, length)
-
-
-def _first(piece: tuple[int, float], length: float) -> float:
-    """Length of the first cell of a piece; its cells are a geometric series."""
-    cells, ratio = piece
-    if ratio < 1:
-        return _first((cells, 1 / ratio), length) * ratio ** (1 - cells)
-    return (
-        length / cells
-        if ratio == 1
-        else length * (ratio - 1) / float(expm1(cells * log(ratio)))
-    )
+    return Piece(cells, ratio_of(cells, first, length))
 
 
 def made_by_gmsh(directory: Path) -> "meshio.Mesh":
-    """The mesh of a case, which gmsh makes of `pile.geo` and the files that it includes.
+    """The mesh of a case, which gmsh makes of `pile.geo` and what it includes.
 
-    Its cell sets are the faces of each patch. Any thread may call; one at a time makes its mesh.
-    Raises a SolverError if gmsh fails, cells are inverted or no hexahedra, or one of `GROUPS` is
-    missing.
+    Any thread may call; one at a time makes its mesh.
+
+    Parameters
+    ----------
+    directory
+        The case.
+
+    Returns
+    -------
+    meshio.Mesh
+        Hexahedra, and quadrangles on the sides; its cell sets are the faces of each
+        patch.
+
+    Raises
+    ------
+    SolverError
+        If gmsh fails, cells are inverted or no hexahedra, or one of `GROUPS` is
+        missing.
     """
-    import meshio
-
     try:
         import gmsh
     except OSError as error:
-        remedy = (
-            "install the Debian packages libglu1-mesa libxft2 libxcursor1 libxinerama1"
-        )
+        packages = "libglu1-mesa libxft2 libxcursor1 libxinerama1"
+        remedy = f"install the Debian packages {packages}"
         raise SolverError(f"gmsh does not load: {error}", remedy=remedy) from error
     with _GMSH:
-        # the default installs a signal handler, which only the main thread may
+        # The default installs a signal handler, which only the main thread may.
         gmsh.initialize(ARGUMENTS, readConfigFiles=False, interruptible=False)
         try:
             gmsh.option.setNumber("General.Terminal", 0)
             gmsh.open(str(directory / "pile.geo"))
-            model, mesh = gmsh.model, gmsh.model.mesh
-            mesh.generate(3)
-            names = {
-                model.getPhysicalName(*group) for group in model.getPhysicalGroups()
-            }
-            if missing := GROUPS - names:
-                raise ValueError(f"without the physical groups {sorted(missing)}")
-            if list(mesh.getElementTypes(3)) != [_HEXAHEDRON]:
-                raise ValueError("not of hexahedra only")
-            tags, cells = mesh.getElementsByType(_HEXAHEDRON)
-            if (mesh.getElementQualities(tags, "minSICN") <= 0).any():
-                raise ValueError("with inverted cells")
-            nodes, points, _ = mesh.getNodes()
-            number, patches = np.empty(int(nodes.max()) + 1, np.int64), {}
-            number[nodes] = np.arange(len(nodes))
-            for group in model.getPhysicalGroups(2):
-                faces = model.getEntitiesForPhysicalGroup(*group)
-                quads = [mesh.getElementsByType(_QUADRANGLE, face)[1] for face in faces]
-                corners = number[np.concatenate(quads)].reshape(-1, 4)
-                patches[model.getPhysicalName(*group)] = corners
-            ends = np.cumsum([len(corners) for corners in patches.values()])
-            rows = np.split(np.arange(ends[-1]), ends[:-1])
-            sets = {name: [None, of] for name, of in zip(patches, rows, strict=True)}
-            sides, hexahedra = (
-                np.concatenate([*patches.values()]),
-                number[cells].reshape(-1, 8),
-            )
-            blocks = [("hexahedron", hexahedra), ("quad", sides)]
-            return meshio.Mesh(points.reshape(-1, 3), blocks, cell_sets=sets)
+            gmsh.model.mesh.generate(3)
+            return _checked(gmsh.model)
         except Exception as error:  # gmsh raises nothing narrower
             remedy = "check the slope, the height and the first cell in parameters.geo"
             where = str(directory / "pile.geo")
             raise SolverError(f"no usable mesh: {error}", where, remedy) from error
         finally:
             gmsh.finalize()
+
+
+def _checked(model: Any) -> "meshio.Mesh":
+    """The mesh that gmsh holds; ValueError if it is not one that a case can use."""
+    import meshio
+
+    names = {model.getPhysicalName(*group) for group in model.getPhysicalGroups()}
+    missing = GROUPS - names
+    if missing:
+        raise ValueError(f"without the physical groups {sorted(missing)}")
+    if list(model.mesh.getElementTypes(3)) != [_HEXAHEDRON]:
+        raise ValueError("not of hexahedra only")
+    tags, cells = model.mesh.getElementsByType(_HEXAHEDRON)
+    if (model.mesh.getElementQualities(tags, "minSICN") <= 0).any():
+        raise ValueError("with inverted cells")
+    nodes, points, _ = model.mesh.getNodes()
+    number = np.empty(int(nodes.max()) + 1, np.int64)
+    number[nodes] = np.arange(len(nodes))
+    patches = {}
+    for group in model.getPhysicalGroups(2):
+        patches[model.getPhysicalName(*group)] = number[_quadrangles(model, group)]
+    sets = {}
+    start = 0
+    for name, corners in patches.items():
+        end = start + len(corners)
+        sets[name] = [None, np.arange(start, end)]
+        start = end
+    sides = np.concatenate([*patches.values()])
+    blocks = [("hexahedron", number[cells].reshape(-1, 8)), ("quad", sides)]
+    return meshio.Mesh(points.reshape(-1, 3), blocks, cell_sets=sets)
+
+
+def _quadrangles(model: Any, group: tuple[int, int]) -> IntArray:
+    """Nodes of the quadrangles of a physical group, as gmsh numbers them."""
+    faces = model.getEntitiesForPhysicalGroup(*group)
+    quads = [model.mesh.getElementsByType(_QUADRANGLE, face)[1] for face in faces]
+    return np.concatenate(quads).reshape(-1, 4)

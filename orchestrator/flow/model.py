@@ -1,4 +1,4 @@
-"""The flow model of a scene: the stress along its bed line, and the cases that this needs."""
+"""The flow model of a scene: the stress along its bed line, and the cases it needs."""
 
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
@@ -14,15 +14,21 @@ from orchestrator.study.parts import Flow, PileBed
 from orchestrator.study.profile import Profile
 from orchestrator.study.scene import Scene
 
-FACE_DEG = 2.0  # least slope of a profile whose cells are as fine as on a face
+FACE_DEG = 2.0
+"""Least slope of a profile, degrees, whose cells are as fine as those on a face."""
 
 
 @dataclass(frozen=True)
 class FlowModel:
     """A way to find the stress on the bed of a scene with a pile.
 
-    The scene has the undisturbed stress, that of linear theory, or that of steady turbulent flow by
-    OpenFOAM, which scenes that differ in their grains alone share.
+    It is the undisturbed stress, that of linear theory, or that of steady turbulent
+    flow by OpenFOAM, which scenes that differ in their grains alone share.
+
+    Attributes
+    ----------
+    scene
+        The scene.
     """
 
     scene: Scene
@@ -35,10 +41,9 @@ class FlowModel:
 
     @property
     def lid_speed_ratio(self) -> float:
-        """U_e over u*_0: the approaching flow's speed at 10 h over its friction velocity."""
-        return float(
-            log_law_speed(1.0, SPEED_HEIGHT * self.line.h, self.scene.solve_roughness)
-        )
+        """U_e over u*_0: speed of the approaching flow at 10 h over its u*."""
+        height = SPEED_HEIGHT * self.line.h
+        return float(log_law_speed(1.0, height, self.scene.solve_roughness))
 
     @cached_property
     def cases(self) -> tuple[FlowCase, ...]:
@@ -54,7 +59,18 @@ class FlowModel:
         return (_case(self.scene),)
 
     def stress(self, cases: Path) -> WallStress:
-        """The stress along the bed; `cases` is the directory of the finished runs."""
+        """The stress along the bed.
+
+        Parameters
+        ----------
+        cases
+            The directory of the finished runs.
+
+        Returns
+        -------
+        WallStress
+            The stress on each face of the bed, over the undisturbed one.
+        """
         model = self.scene.flow.model
         if model == "flat":
             return theory.flat(self.line)
@@ -73,15 +89,18 @@ def _read(path: Path, state: tuple[int, ...]) -> WallStress:
 
 def _case(scene: Scene) -> FlowCase:
     """The run of a scene whose flow is solved."""
-    bed, update = scene.bed, {"roughness": scene.solve_roughness}
+    bed = scene.bed
     assert isinstance(bed, PileBed)
-    update |= {
+    numbers = {
+        "roughness": scene.solve_roughness,
         "viscosity": scene.solve_viscosity,
         "first_cell_height": scene.first_cell_height,
     }
-    # on a gentle profile cells are as fine as on flat bed
-    slope = bed.slope_deg if bed.slope_deg >= FACE_DEG or not bed.profile else 0.0
-    settings = scene.flow.model_copy(update=update)
+    settings = scene.flow.model_copy(update=numbers)
+    slope = bed.slope_deg
+    if bed.profile and slope < FACE_DEG:
+        # On a gentle profile cells are as fine as on flat bed.
+        slope = 0.0
     return _shared(bed.relief, slope, settings, of_bed(bed), bed.profile)
 
 
