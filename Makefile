@@ -7,7 +7,7 @@ ARGS =
 PARALLEL = -n auto --maxprocesses 4 --dist worksteal
 
 .DEFAULT_GOAL = help
-.PHONY: help study test test-faults calibration docs lint setup lock clean
+.PHONY: help study test test-faults calibration docs lint setup lock release clean
 
 help:  ## list the targets
 	@echo 'Targets (each first installs what it needs; ARGS="..." goes to the program or to pytest):'
@@ -49,6 +49,10 @@ setup:  ## install all that the study needs: Debian packages (as root or by sudo
 
 lock:  ## pin anew, from pyproject.toml, what goes into .venv
 	@sh tools/setup.sh lock
+
+release:  ## build wheel and sdist, and try each in an empty environment
+	@sh tools/setup.sh test
+	@sh tools/release.sh
 
 clean:  ## remove .venv, caches and built packages; results stay
 	rm -rf site .venv .mypy_cache .pytest_cache .ruff_cache .hypothesis dist
