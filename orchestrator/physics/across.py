@@ -1,0 +1,185 @@
+"""The threshold of motion of a grain where the stress meets the slope at an angle.
+
+On a bed in three dimensions the flow goes up, down and across slopes. A grain in a
+pocket that is alike all around leaves it when the moment of the forces along the bed,
+drag and the weight's component together, exceeds that of the forces normal to it:
+N. H. Brooks, discussion of Boundary shear stress in curved trapezoidal channels,
+J. Hydraul. Div. ASCE 89 (HY3), 1963; W. Wu, Computational River Dynamics, 2007,
+Eq. 3.46. Lift, torque and cohesion are added here as the pivot of Eq. 1 has them.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from orchestrator.physics.constants import GRAVITY
+from orchestrator.physics.laws import Exposure, ForceLaw
+from orchestrator.physics.threshold import RUNGS, root, weight
+from orchestrator.types import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class _Moments:
+    """Moments over d/2 on n grains, N: arrays of shape (n,) that no flow changes."""
+
+    law: ForceLaw
+    exposure: Exposure
+    beta: FloatArray
+    """Entrainment angle, rad."""
+    down: FloatArray
+    """Of the weight against the stress, negative where the stress goes down the slope."""
+    aside: FloatArray
+    """Of the weight across the stress."""
+    held: FloatArray
+    """Of the weight normal to the bed and of cohesion."""
+
+    def excess(self, ustar: FloatArray) -> FloatArray:
+        """Moment along the bed less that which holds, at friction velocities (m/s)."""
+        turning = 2 / self.exposure.diameter * self.law.torque(ustar, self.exposure)
+        drag = self.law.drag(ustar, self.exposure) * np.sin(self.beta) + turning
+        lift = self.law.lift(ustar, self.exposure) * np.cos(self.beta)
+        return np.asarray(np.hypot(drag - self.down, self.aside) + lift - self.held)
+
+    def at(self, places: IntArray) -> "_Moments":
+        """The moments on some of the grains."""
+        return _Moments(
+            law=self.law,
+            exposure=Exposure(*[field[places] for field in self.exposure.fields]),
+            beta=self.beta[places],
+            down=self.down[places],
+            aside=self.aside[places],
+            held=self.held[places],
+        )
+
+
+def slope_along_deg(slope_deg: ArrayLike, heading_deg: ArrayLike) -> FloatArray:
+    """Compute the slope that a flow meets in its own direction.
+
+    Parameters
+    ----------
+    slope_deg
+        Steepest slope of the bed, degrees.
+    heading_deg
+        Angle between the stress and the direction straight up the slope, degrees.
+
+    Returns
+    -------
+    FloatArray
+        Slope along the stress, degrees, negative where it goes down.
+
+    Examples
+    --------
+    >>> print(slope_along_deg(30.0, [0.0, 90.0, 180.0]).round(9))
+    [ 30.   0. -30.]
+    """
+    rise = np.sin(np.radians(np.asarray(slope_deg, float)))
+    ahead = np.cos(np.radians(np.asarray(heading_deg, float)))
+    return np.asarray(np.degrees(np.arcsin(rise * ahead)))
+
+
+def threshold_across(
+    law: ForceLaw,
+    exposure: Exposure,
+    *,
+    density: ArrayLike,
+    slope_deg: ArrayLike,
+    heading_deg: ArrayLike,
+    entrainment_angle_deg: ArrayLike,
+    gravity: ArrayLike = GRAVITY,
+    cohesion: ArrayLike = 0.0,
+) -> FloatArray:
+    """Find the threshold of a grain under a stress at an angle to the slope.
+
+    With the slope b, the heading c between the stress and the direction up the slope,
+    and the entrainment angle beta, the grain leaves where
+
+    ``|F| sin(beta) = (W cos(b) - f_l) cos(beta) + F_a sin(2 beta)``
+
+    and F is the sum of two forces along the bed: drag, with the torque T as the force
+    T/(d/2 sin(beta)), and the weight's W sin(b) straight down the slope. Without lift
+    and torque the drag over that on a level bed is ``cos(c) sin(b)/tan(p) +
+    sqrt(cos(b)^2 - sin(c)^2 sin(b)^2/tan(p)^2)`` with ``p = 90 deg - beta``, which is
+    that of Brooks. Straight up and down the slope it is that of
+    `orchestrator.physics.threshold.threshold`, but where lift lets the grain roll back
+    down a slope that the flow goes up.
+
+    Parameters
+    ----------
+    law
+        The force law.
+    exposure
+        The grain and the fluid.
+    density
+        Density of the grain, kg/m3.
+    slope_deg
+        Steepest slope b of the bed, degrees, at least 0.
+    heading_deg
+        Angle c between the stress and the direction straight up the slope, degrees.
+    entrainment_angle_deg
+        Entrainment angle beta, degrees.
+    gravity
+        Acceleration of gravity, m/s2.
+    cohesion
+        Pull of a contact over the diameter, N/m.
+
+    Returns
+    -------
+    FloatArray
+        Threshold friction velocity, m/s, of the broadcast shape: 0 on a slope down
+        which the grain rolls without a flow, infinite where no flow moves it.
+
+    Examples
+    --------
+    >>> from orchestrator.physics.laws import LAWS
+    >>> sand = Exposure(1e-3, 1e-3 / 30, 1000.0, 1e-6)
+    >>> grain = {"density": 2650.0, "entrainment_angle_deg": 60.0}
+    >>> headings = {"slope_deg": 20.0, "heading_deg": [0.0, 90.0, 180.0]}
+    >>> print(threshold_across(LAWS["bridged"], sand, **grain, **headings).round(5))
+    [0.02468 0.01624 0.01177]
+    """
+    slope = np.radians(np.asarray(slope_deg, float))
+    heading = np.radians(np.asarray(heading_deg, float))
+    beta = np.radians(np.asarray(entrainment_angle_deg, float))
+    submerged = weight(
+        diameter=exposure.diameter,
+        density=density,
+        fluid_density=exposure.fluid_density,
+        gravity=gravity,
+    )
+    pulled = np.asarray(cohesion, float) * exposure.diameter * np.sin(2 * beta)
+    along = submerged * np.sin(slope) * np.sin(beta)
+    given = np.broadcast_arrays(
+        *exposure.fields,
+        beta,
+        along * np.cos(heading),
+        along * np.sin(heading),
+        submerged * np.cos(slope) * np.cos(beta) + pulled,
+    )
+    *fields, angle, down, aside, held = [np.ravel(array) for array in given]
+    moments = _Moments(law, Exposure(*fields), angle, down, aside, held)
+    return _first(moments).reshape(given[0].shape)
+
+
+def _first(moments: _Moments) -> FloatArray:
+    """The least friction velocities at which the moments along the bed win, m/s, (n,)."""
+    unit = moments.exposure.viscosity / moments.exposure.diameter
+    is_loose = moments.excess(np.zeros_like(unit)) >= 0
+    found = np.where(is_loose, 0.0, np.inf)
+    low = np.zeros_like(unit)
+    high = np.full_like(unit, np.nan)
+    left = np.flatnonzero(~is_loose)
+    for rung in RUNGS:
+        ustar = rung * unit[left]
+        is_reached = moments.at(left).excess(ustar) >= 0
+        high[left[is_reached]] = ustar[is_reached]
+        left = left[~is_reached]
+        low[left] = rung * unit[left]
+        if not len(left):
+            break
+    solved = np.flatnonzero(np.isfinite(high))
+    if len(solved):
+        excess: Callable[[FloatArray], FloatArray] = moments.at(solved).excess
+        found[solved] = root(excess, low[solved], high[solved])
+    return found
