@@ -29,7 +29,7 @@ class _Moments:
     beta: FloatArray
     """Entrainment angle, rad."""
     down: FloatArray
-    """Of the weight against the stress, negative where the stress goes down the slope."""
+    """Of the weight against the stress, negative where that goes down the slope."""
     aside: FloatArray
     """Of the weight across the stress."""
     held: FloatArray
@@ -163,7 +163,7 @@ def threshold_across(
 
 
 def _first(moments: _Moments) -> FloatArray:
-    """The least friction velocities at which the moments along the bed win, m/s, (n,)."""
+    """The least friction velocities at which the moments along the bed win, m/s."""
     unit = moments.exposure.viscosity / moments.exposure.diameter
     is_loose = moments.excess(np.zeros_like(unit)) >= 0
     found = np.where(is_loose, 0.0, np.inf)

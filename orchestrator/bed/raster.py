@@ -1,0 +1,391 @@
+"""Files of heights on a raster: XYZ, ESRI ASCII grid, GeoTIFF and STL; maps as GeoTIFF."""
+
+import io
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from orchestrator.bed.surface import FEWEST, MOST_NODES, Raster, Surface, Tags, checked
+from orchestrator.errors import InputError
+from orchestrator.study.profile import decoded, read_bytes
+from orchestrator.types import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+LARGEST = 2**28
+"""Most bytes of a file."""
+UNEVEN = 1e-3
+"""Largest difference of two steps of an axis, over the step."""
+SCALE, TIE_POINT, TRANSFORMATION = 33550, 33922, 34264
+KEYS, KEY_NUMBERS, KEY_TEXTS, NODATA = 34735, 34736, 34737, 42113
+"""Tags of a GeoTIFF (OGC 19-008r4), and GDAL's for cells without a height."""
+MODEL, PIXEL, LENGTH_UNIT, HEIGHT_UNIT = 1024, 1025, 3076, 4099
+"""Keys of a GeoTIFF: kind of the axes, what a pixel is, and units."""
+DEGREES, POINT, METRE = 2, 2, 9001
+FEET = {9002: 0.3048, 9003: 1200 / 3937}
+"""Units of a GeoTIFF in feet, m."""
+GRID_KEYS = ("ncols", "nrows", "cellsize")
+FORMATS = ".tif .tiff (GeoTIFF), .asc (ESRI), .xyz .csv .txt (x y z), .stl"
+BARE_TAGS: Tags = {
+    KEYS: (1, 1, 0, 1, PIXEL, 0, 1, 1),
+}
+"""Keys of a map without a place on the Earth: its pixels are areas."""
+
+
+def read_surface(path: Path, where: str) -> Surface:
+    """Read the file of a surface.
+
+    Parameters
+    ----------
+    path
+        The file; its ending says what it is.
+    where
+        The file and the field that names it, for messages.
+
+    Returns
+    -------
+    Surface
+        The surface.
+
+    Raises
+    ------
+    InputError
+        If the file is no surface, with the place and the remedy.
+    """
+    content = read_bytes(path, LARGEST, where)
+    ending = path.suffix.lower()
+    if ending in (".tif", ".tiff"):
+        raster = _of_geotiff(content, path.name, where)
+    elif ending == ".asc":
+        raster = _of_grid(decoded(content, where), path.name, where)
+    elif ending in (".xyz", ".csv", ".txt"):
+        raster = _of_points(decoded(content, where), path.name, where)
+    elif ending == ".stl":
+        raster = _of_triangles(path, where)
+    else:
+        what = f"the ending {ending!r} is of no surface"
+        raise InputError(what, where, f"endings: {FORMATS}")
+    return checked(raster, where)
+
+
+def _of_grid(text: str, name: str, where: str) -> Raster:
+    """The raster of an ESRI ASCII grid, whose rows run from north to south."""
+    header: dict[str, float] = {}
+    lines = text.splitlines()
+    first = 0
+    for line in lines:
+        words = line.split()
+        if len(words) != 2 or not words[0][0].isalpha():
+            break
+        header[words[0].lower()] = _number(words[1], f"{where}: {words[0]}")
+        first += 1
+    for key in GRID_KEYS:
+        if key not in header:
+            remedy = "its head has ncols, nrows, xllcorner, yllcorner, cellsize"
+            raise InputError(f"{key} is missing", where, remedy)
+    columns = int(header["ncols"])
+    rows = int(header["nrows"])
+    values = _numbers(lines[first:], first, where)
+    if columns < FEWEST or rows < FEWEST or columns * rows != len(values):
+        what = f"{len(values)} heights, not {columns} x {rows}"
+        remedy = f"nrows lines of ncols numbers, {FEWEST} of each at least"
+        raise InputError(what, where, remedy)
+    heights = np.array(values).reshape(rows, columns)[::-1]
+    heights = np.where(heights == header.get("nodata_value", -9999.0), np.nan, heights)
+    step = header["cellsize"]
+    if not step > 0:
+        raise InputError(f"cellsize {step:g}", where, "it is in m, above 0")
+    axes = []
+    for axis, count in (("x", columns), ("y", rows)):
+        start = header.get(f"{axis}llcenter")
+        if start is None:
+            start = header.get(f"{axis}llcorner", 0.0) + step / 2
+        axes.append(_steps(start, step, count))
+    return Raster(name, axes[0], axes[1], heights)
+
+
+def _numbers(lines: list[str], before: int, where: str) -> list[float]:
+    """The numbers of some lines; `before` lines of the file stand before them."""
+    values: list[float] = []
+    for number, line in enumerate(lines, before + 1):
+        try:
+            values.extend(map(float, line.split()))
+        except ValueError:
+            words = line.split()
+            bad = next(word for word in words if not _is_number(word))
+            place = f"{where}: line {number}"
+            remedy = "numbers with a decimal point, spaces between them"
+            raise InputError(f"{bad!r} is no number", place, remedy) from None
+    return values
+
+
+def _is_number(word: str) -> bool:
+    """Whether a word is a number."""
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _number(word: str, where: str) -> float:
+    """The number that a word is; an `InputError` for any other word."""
+    if not _is_number(word):
+        raise InputError(f"{word!r} is no number", where, "with a decimal point")
+    return float(word)
+
+
+def _of_points(text: str, name: str, where: str) -> Raster:
+    """The raster of lines x y z, whose points lie on a grid in any order."""
+    rows: list[list[float]] = []
+    numbers: list[int] = []
+    for number, line in enumerate(text.splitlines(), 1):
+        words = line.replace(",", " ").replace(";", " ").split()
+        if not words or words[0].startswith("#"):
+            continue
+        is_head = not rows and not all(map(_is_number, words))
+        if is_head:
+            continue
+        if len(words) < 3 or not all(map(_is_number, words[:3])):
+            place = f"{where}: line {number}"
+            remedy = "x, y and z in m, with a decimal point"
+            raise InputError(f"{line.strip()!r} is no point", place, remedy)
+        rows.append([float(word) for word in words[:3]])
+        numbers.append(number)
+    if len(rows) < FEWEST**2:
+        what = f"{len(rows)} points are no surface"
+        raise InputError(what, where, "x, y and z in m, a point in each line")
+    return _on_grid(np.array(rows), numbers, name, where)
+
+
+def _on_grid(points: FloatArray, lines: list[int], name: str, where: str) -> Raster:
+    """The raster of points that lie on a grid, NaN where there is none."""
+    along_x, column = _grid_axis(points[:, 0], "x", lines, where)
+    along_y, row = _grid_axis(points[:, 1], "y", lines, where)
+    if len(along_x) * len(along_y) > MOST_NODES:
+        what = f"{len(along_x)} x {len(along_y)} cells are more than {MOST_NODES}"
+        raise InputError(what, where, "put them on a grid of larger cells")
+    _, first, counts = np.unique(
+        row * len(along_x) + column, return_index=True, return_counts=True
+    )
+    if counts.max() > 1:
+        twice = first[int(counts.argmax())]
+        x, y = points[twice, :2]
+        what = f"x = {x:.9g} m, y = {y:.9g} m has two heights"
+        place = f"{where}: line {lines[twice]}"
+        raise InputError(what, place, "leave one height for each place")
+    heights = np.full((len(along_y), len(along_x)), np.nan)
+    heights[row, column] = points[:, 2]
+    return Raster(name, along_x, along_y, heights)
+
+
+def _grid_axis(
+    values: FloatArray, axis: str, lines: list[int], where: str
+) -> tuple[FloatArray, IntArray]:
+    """An axis of equal steps through some values, and the place of each on it."""
+    found = np.unique(values)
+    step = float(np.diff(found).min(initial=np.inf))
+    places = (values - found[0]) / step
+    nearest = np.round(places).astype(int)
+    count = int(nearest.max()) + 1
+    off = np.abs(places - nearest)
+    worst = int(off.argmax())
+    if off[worst] > UNEVEN * count or count > MOST_NODES:
+        what = f"{axis} = {values[worst]:.9g} m is on no grid of {step:.4g} m"
+        remedy = "put the points on a grid of equal steps, with gdal_grid"
+        raise InputError(what, f"{where}: line {lines[worst]}", remedy)
+    return np.linspace(found[0], found[-1], count), nearest
+
+
+def _of_triangles(path: Path, where: str) -> Raster:
+    """The raster of an STL file: its vertices, seen from above, interpolated."""
+    from scipy.interpolate import LinearNDInterpolator
+
+    points = _seen_from_above(path, where)
+    _, counts = np.unique(points[:, :2], axis=0, return_counts=True)
+    if counts.max() > 1:
+        twice = points[np.repeat(counts > 1, counts)][0]
+        what = f"x = {twice[0]:.9g} m, y = {twice[1]:.9g} m has two heights"
+        raise InputError(what, where, "a wall or an overhang is no bed")
+    start = points.min(axis=0)
+    extent = np.ptp(points, axis=0)
+    step = float(np.sqrt(extent[0] * extent[1] / len(points)))
+    east = np.linspace(0.0, extent[0], round(extent[0] / step) + 1)
+    north = np.linspace(0.0, extent[1], round(extent[1] / step) + 1)
+    of_places = LinearNDInterpolator(points[:, :2] - start[:2], points[:, 2])
+    heights = of_places(*np.meshgrid(east, north))
+    return Raster(path.name, start[0] + east, start[1] + north, heights)
+
+
+def _seen_from_above(path: Path, where: str) -> FloatArray:
+    """The vertices of the triangles of an STL file that are seen from above, (n, 3)."""
+    import pyvista
+
+    remedy = "is it an STL file of a surface, seen from above?"
+    try:
+        mesh: Any = pyvista.read(path)
+    except Exception as error:  # a reader of another library raises what it likes
+        raise InputError(f"not readable: {error}", where, remedy) from None
+    if not mesh.n_cells:
+        raise InputError("it has no triangle", where, remedy)
+    corners = np.asarray(mesh.points, float)[mesh.regular_faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    up = normal[:, 2]
+    if mesh.n_open_edges:
+        up = np.abs(up)
+    # the sides and the bottom of a closed body are no bed
+    is_upper = up > 1e-6 * np.linalg.norm(normal, axis=1)
+    points = np.unique(corners[is_upper].reshape(-1, 3), axis=0)
+    if len(points) < FEWEST**2:
+        raise InputError(f"{len(points)} vertices are no surface", where, remedy)
+    return points
+
+
+def _of_geotiff(content: bytes, name: str, where: str) -> Raster:
+    """The raster of a GeoTIFF of one band."""
+    from PIL import Image
+
+    try:
+        with warnings.catch_warnings():
+            # Pillow warns of large images; the size is checked here
+            warnings.simplefilter("ignore")
+            image = Image.open(io.BytesIO(content), formats=["TIFF"])
+            if image.width * image.height > MOST_NODES:
+                what = f"{image.width} x {image.height} cells, over {MOST_NODES}"
+                remedy = "resample it to larger cells, with gdalwarp -tr"
+                raise InputError(what, where, remedy)
+            image.load()
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        remedy = "heights are one band: gdal_translate -b 1 -ot Float32"
+        raise InputError(f"no readable GeoTIFF: {error}", where, remedy) from None
+    if len(image.getbands()) != 1 or image.mode in ("P", "1", "L"):
+        what = f"its pixels are {image.mode}, a picture, not heights"
+        raise InputError(what, where, "export the elevation model, not its picture")
+    heights = np.array(image, float)[::-1]
+    tags: Any = getattr(image, "tag_v2", {})
+    kept = {key: tags[key] for key in (KEYS, KEY_NUMBERS, KEY_TEXTS) if key in tags}
+    text = str(tags.get(NODATA, "")).strip("\0 ")
+    if _is_number(text):
+        # GDAL writes the number of a float in decimal
+        is_empty = np.isclose(heights, float(text), rtol=1e-6, atol=0.0)
+        heights = np.where(is_empty, np.nan, heights)
+    _check_units(_keys(kept), where)
+    along_x, along_y = _geotiff_axes(image, kept, where)
+    return Raster(name, along_x, along_y, heights, kept)
+
+
+def _keys(tags: Mapping[int, Any]) -> dict[int, int]:
+    """The keys of a GeoTIFF whose value is a short integer."""
+    table = np.array(tags.get(KEYS, ()), int)
+    entries = table[4 : 4 * (len(table) // 4)].reshape(-1, 4)
+    found = {}
+    for key, place, _, value in entries.tolist():
+        if place == 0:
+            found[key] = value
+    return found
+
+
+def _check_units(keys: Mapping[int, int], where: str) -> None:
+    """Refuse a GeoTIFF whose axes or heights are not in metres."""
+    if keys.get(MODEL) == DEGREES:
+        what = "its axes are degrees of longitude and latitude"
+        remedy = "project it to metres, with gdalwarp -t_srs EPSG:326NN, NN the zone"
+        raise InputError(what, where, remedy)
+    for key, axes in ((LENGTH_UNIT, "axes"), (HEIGHT_UNIT, "heights")):
+        unit = keys.get(key, METRE)
+        if unit in FEET:
+            what = f"its {axes} are in feet"
+            remedy = f"multiply them by {FEET[unit]:.7g}: they must be in m"
+            raise InputError(what, where, remedy)
+
+
+def _geotiff_axes(
+    image: "Image", tags: Mapping[int, Any], where: str
+) -> tuple[FloatArray, FloatArray]:
+    """The axes of a GeoTIFF, to the middles of its pixels."""
+    x0, y0, step_x, step_y = _geotiff_corner(getattr(image, "tag_v2", {}), where)
+    if min(step_x, step_y) <= 0:
+        what = f"its pixels are {step_x:g} x {step_y:g} m"
+        raise InputError(what, where, "rows run from north to south: gdalwarp")
+    half = 0.0 if _keys(tags).get(PIXEL) == POINT else 0.5
+    # the first row is the northernmost
+    south = y0 - step_y * (image.height - 1 + half)
+    along_x = _steps(x0 + step_x * half, step_x, image.width)
+    return along_x, _steps(south, step_y, image.height)
+
+
+def _geotiff_corner(
+    tags: Mapping[int, Any], where: str
+) -> tuple[float, float, float, float]:
+    """Place of the first pixel's corner, or of its middle, and steps along x and y, m."""
+    if TRANSFORMATION in tags:
+        step_x, turn_x, _, x0, turn_y, down, _, y0 = tags[TRANSFORMATION][:8]
+        if turn_x or turn_y:
+            remedy = "turn its axes to x and y, with gdalwarp"
+            raise InputError("its axes are turned", where, remedy)
+        return x0, y0, step_x, -down
+    if SCALE in tags and TIE_POINT in tags:
+        step_x, step_y = tags[SCALE][:2]
+        column, row, _, x0, y0, _ = tags[TIE_POINT][:6]
+        return x0 - column * step_x, y0 + row * step_y, step_x, step_y
+    what = "it says nothing of the size of its pixels"
+    remedy = "export it with a scale and a tie point, or as .asc"
+    raise InputError(what, where, remedy)
+
+
+def _steps(start: float, step: float, count: int) -> FloatArray:
+    """An axis of equal steps."""
+    return np.asarray(start + step * np.arange(count), float)
+
+
+def geotiff(
+    x: FloatArray,
+    y: FloatArray,
+    values: ArrayLike,
+    tags: Tags,
+) -> bytes:
+    """Write a map as a GeoTIFF of 32-bit numbers, for a GIS.
+
+    Parameters
+    ----------
+    x, y
+        Axes to the middles of its cells, m, rising, of shapes (nx,) and (ny,).
+    values
+        The map, of shape (ny, nx), NaN where it has no value.
+    tags
+        Tags of the GeoTIFF that the bed was read from; empty without any.
+
+    Returns
+    -------
+    bytes
+        The file.
+    """
+    from PIL import Image
+    from PIL.TiffImagePlugin import ImageFileDirectory_v2
+
+    step_x = float(np.ptp(x)) / (len(x) - 1)
+    step_y = float(np.ptp(y)) / (len(y) - 1)
+    kept = {**BARE_TAGS, **tags}
+    half = 0.0 if _keys(kept).get(PIXEL) == POINT else 0.5
+    corner = (float(x[0]) - half * step_x, float(y[-1]) + half * step_y)
+    directory = ImageFileDirectory_v2()
+    types = {KEYS: 3, KEY_NUMBERS: 12, KEY_TEXTS: 2, NODATA: 2}
+    types |= {SCALE: 12, TIE_POINT: 12}
+    kept |= {
+        SCALE: (step_x, step_y, 0.0),
+        TIE_POINT: (0.0, 0.0, 0.0, *corner, 0.0),
+        NODATA: "nan",
+    }
+    for key, value in kept.items():
+        directory.tagtype[key] = types[key]
+        directory[key] = value
+    rows = np.asarray(values, np.float32)[::-1]
+    stream = io.BytesIO()
+    image = Image.fromarray(np.ascontiguousarray(rows))
+    image.save(stream, "TIFF", tiffinfo=directory, compression="tiff_lzw")
+    return stream.getvalue()

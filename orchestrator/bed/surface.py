@@ -1,0 +1,546 @@
+"""A bed in three dimensions: heights on a raster, as a file has them or by a shape.
+
+The axes are those of the file, x to the east and y to the north. Heights are counted
+from the level ground around the form.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from hashlib import sha256
+from math import pi, radians, tan
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from orchestrator.digits import on_grid
+from orchestrator.errors import InputError
+from orchestrator.types import BoolArray, FloatArray
+
+Tags = Mapping[int, tuple[float, ...] | str]
+"""Tags of a GeoTIFF by their numbers."""
+SPREAD_OF_RASTER = 1.25
+SPREAD_OF_SHAPE = 0.5
+"""Standard deviation of the smoothing over the length of a cell, of the flow's mesh."""
+NODES_OF_SPREAD = 4.0
+"""Nodes of a smoothed surface in the standard deviation of its smoothing."""
+TRUNCATED = 4.0
+"""Standard deviations at which the weights of the smoothing end."""
+MOST_NODES = 4_000_000
+FEWEST = 8
+"""Fewest nodes of a raster along each axis."""
+FLAT_RIM = 0.02
+TAPERED_RIM = 0.2
+"""Largest height of the rim over that of the form which is flat, and which is tapered."""
+TAPER = 10.0
+"""Width over which the rim is tapered, over its largest height."""
+SPIKE_STEPS = 3.0
+SPIKE_RELIEF = 0.05
+"""Steps of the raster, and part of the height, which a bad cell is off its neighbours."""
+STEEPEST_DEG = 60.0
+"""Slope beyond which no mesh of upright columns follows the bed."""
+FORM_NODES = 12
+"""Fewest nodes of a raster above half the height of the form."""
+LONGEST, HIGHEST = 2e4, 500.0
+"""Extent and height of a surface above which it is likelier in millimetres, m."""
+OF_GROUND = 0.01
+"""Height over that of the form from which a place is a part of it, not of the ground."""
+STEPS_OF_SHAPE = 160
+"""Steps of the raster of a shape over the width of its base."""
+SLIP_DEG = 33.0
+"""Slope of a barchan's slip face."""
+HORNS = 0.8
+"""Length of a barchan's horns beyond its brink, over that of its windward side."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Heights of a bed on a raster with equal steps, two surfaces with one digest are one.
+
+    Attributes
+    ----------
+    name
+        The name of the file or of the shape.
+    x, y
+        Axes of the raster, m, rising, of shapes (nx,) and (ny,): east and north.
+    z
+        Heights as the file has them, m, of shape (ny, nx).
+    level
+        Height of the ground around the form, m.
+    spread
+        Standard deviation of the smoothing, in cells of the flow's mesh.
+    said
+        What was done to the heights, in words.
+    tags
+        Tags of the GeoTIFF that say where on the Earth it is; empty without any.
+    digest
+        SHA-256 of the axes and of the heights above the ground.
+    """
+
+    name: str = field(compare=False)
+    x: FloatArray = field(compare=False, repr=False)
+    y: FloatArray = field(compare=False, repr=False)
+    z: FloatArray = field(compare=False, repr=False)
+    level: float = field(compare=False)
+    spread: float
+    said: tuple[str, ...] = field(compare=False)
+    tags: Tags = field(compare=False, repr=False)
+    digest: str
+
+    def __str__(self) -> str:
+        return f"{self.name} ({self.digest[:12]})"
+
+    @property
+    def steps(self) -> tuple[float, float]:
+        """Steps of the raster along x and along y, m."""
+        along_x = float(np.ptp(self.x)) / (len(self.x) - 1)
+        along_y = float(np.ptp(self.y)) / (len(self.y) - 1)
+        return along_x, along_y
+
+    @property
+    def relief(self) -> float:
+        """Height of the highest place above the ground, m."""
+        return float(self.z.max() - self.level)
+
+    @cached_property
+    def is_form(self) -> BoolArray:
+        """Whether each node is a part of the form, not of the ground, of shape (ny, nx)."""
+        return np.asarray(np.abs(self.z - self.level) > OF_GROUND * self.relief)
+
+    @cached_property
+    def centre(self) -> tuple[float, float]:
+        """The middle of the form's extent along x and along y, m."""
+        of_x = self.x[self.is_form.any(axis=0)]
+        of_y = self.y[self.is_form.any(axis=1)]
+        middle_x = float(of_x[0] + of_x[-1]) / 2
+        middle_y = float(of_y[0] + of_y[-1]) / 2
+        return middle_x, middle_y
+
+    @cached_property
+    def radius(self) -> float:
+        """Distance from the centre within which the whole form lies, m."""
+        rows, columns = np.nonzero(self.is_form)
+        east = self.x[columns] - self.centre[0]
+        north = self.y[rows] - self.centre[1]
+        return float(np.hypot(east, north).max())
+
+    @property
+    def volume(self) -> float:
+        """Volume above the ground, m3."""
+        along_x, along_y = self.steps
+        return float((self.z - self.level).sum()) * along_x * along_y
+
+    @cached_property
+    def _coefficients(self) -> FloatArray:
+        """Coefficients of the cubic splines through the heights above the ground."""
+        from scipy.ndimage import spline_filter
+
+        return np.asarray(spline_filter(self.z - self.level, order=3))
+
+    def at(self, x: ArrayLike, y: ArrayLike) -> FloatArray:
+        """Interpolate heights by cubic splines.
+
+        Parameters
+        ----------
+        x, y
+            Places on the axes of the file, m, which broadcast.
+
+        Returns
+        -------
+        FloatArray
+            Heights above the ground, m, of the broadcast shape; 0 outside the raster.
+        """
+        from scipy.ndimage import map_coordinates
+
+        along_x, along_y = self.steps
+        east, north = np.broadcast_arrays(x, y)
+        column = (east.ravel() - self.x[0]) / along_x
+        row = (north.ravel() - self.y[0]) / along_y
+        found = map_coordinates(
+            self._coefficients, [row, column], order=3, prefilter=False
+        )
+        return np.asarray(found.reshape(east.shape))
+
+    def smoothed(self, cell_m: float) -> "Surface":
+        """Smooth the heights to the cells of a mesh.
+
+        They become means with Gaussian weights, whose standard deviation is `spread`
+        cells, on a raster that is no finer than these need.
+
+        Parameters
+        ----------
+        cell_m
+            Horizontal length of the cells, m.
+
+        Returns
+        -------
+        Surface
+            The smoothed surface; where it ends it is at the height of the ground.
+        """
+        from scipy.ndimage import gaussian_filter
+
+        deviation = self.spread * cell_m
+        sigmas = deviation / np.array(self.steps[::-1])
+        # the weights reach beyond the raster, over the level ground
+        rows, columns = np.ceil(TRUNCATED * sigmas).astype(int)
+        wide = np.pad(self.z - self.level, ((rows, rows), (columns, columns)))
+        smooth = gaussian_filter(wide, sigmas, truncate=TRUNCATED, mode="constant")
+        y = _beyond(self.y, rows)[:: _thinning(sigmas[0])]
+        x = _beyond(self.x, columns)[:: _thinning(sigmas[1])]
+        thin = smooth[:: _thinning(sigmas[0]), :: _thinning(sigmas[1])]
+        said = (*self.said, f"smoothed over {2 * deviation:.3g} m, to the cells")
+        heights = thin + self.level
+        return surface_of(
+            self.name, x, y, heights, self.level, self.spread, said, self.tags
+        )
+
+
+def _beyond(axis: FloatArray, nodes: int) -> FloatArray:
+    """An axis with so many nodes more at each of its ends."""
+    step = float(np.ptp(axis)) / (len(axis) - 1)
+    before = axis[0] - step * np.arange(nodes, 0, -1)
+    after = axis[-1] + step * np.arange(1, nodes + 1)
+    return np.concatenate([before, axis, after])
+
+
+def _thinning(sigma: float) -> int:
+    """How many nodes of a smoothed raster one node may stand for."""
+    return max(int(sigma / NODES_OF_SPREAD), 1)
+
+
+def surface_of(
+    name: str,
+    x: FloatArray,
+    y: FloatArray,
+    z: FloatArray,
+    level: float,
+    spread: float,
+    said: tuple[str, ...] = (),
+    tags: Tags | None = None,
+) -> Surface:
+    """Make a surface of its heights, with its digest; the parameters are its attributes."""
+    relief = float(z.max() - level)
+    digest = sha256()
+    for part in (x - x[0], y - y[0], z - level):
+        digest.update(on_grid(part, relief).astype("<f8").tobytes())
+    return Surface(name, x, y, z, level, spread, said, tags or {}, digest.hexdigest())
+
+
+@dataclass(frozen=True)
+class Raster:
+    """Heights of a file as they are read, NaN where it has none.
+
+    Attributes
+    ----------
+    name
+        The name of the file.
+    x, y
+        Axes, m, rising, of shapes (nx,) and (ny,).
+    z
+        Heights, m, of shape (ny, nx).
+    tags
+        Tags of a GeoTIFF that say where on the Earth it is.
+    """
+
+    name: str
+    x: FloatArray
+    y: FloatArray
+    z: FloatArray
+    tags: Tags = field(default_factory=dict)
+
+
+def checked(raster: Raster, where: str) -> Surface:
+    """Make a surface of the raster of a file.
+
+    The rim of what the file covers is the ground. A rim that is nearly level is tapered
+    to it; cells without a height beyond the rim are ground.
+
+    Parameters
+    ----------
+    raster
+        The heights of the file.
+    where
+        The file and the field that names it, for messages.
+
+    Returns
+    -------
+    Surface
+        The surface; it says what was done to it.
+
+    Raises
+    ------
+    InputError
+        If the raster is no bed of the flow, with the place and the remedy.
+    """
+    _check_size(raster, where)
+    is_outside = _outside(raster, where)
+    is_rim = _rim(is_outside)
+    level = float(np.median(raster.z[is_rim]))
+    above = np.where(is_outside, 0.0, raster.z - level)
+    relief = float(above.max())
+    _check_relief(relief, -float(above.min()), where)
+    _check_cells(raster, above, where)
+    rim = np.where(is_rim, above, 0.0)
+    said = _check_rim(raster, rim, relief, where)
+    if is_outside.any():
+        count = int(is_outside.sum())
+        said = (*said, f"{count} cells without a height around it are level ground")
+    width = TAPER * float(np.abs(rim).max())
+    tapered = above * _taper(raster, is_outside, width)
+    surface = surface_of(
+        raster.name,
+        raster.x,
+        raster.y,
+        tapered + level,
+        level,
+        SPREAD_OF_RASTER,
+        said,
+        raster.tags,
+    )
+    _check_slopes(surface, where)
+    return surface
+
+
+def _place(raster: Raster, row: int, column: int) -> str:
+    """A place of a raster in words."""
+    return f"x = {raster.x[column]:.9g} m, y = {raster.y[row]:.9g} m"
+
+
+def _check_size(raster: Raster, where: str) -> None:
+    """Refuse a raster of too few or too many cells, or of an extent that no bed has."""
+    rows, columns = raster.z.shape
+    size = f"{columns} x {rows} cells"
+    if min(rows, columns) < FEWEST:
+        what = f"{size} are no surface"
+        raise InputError(what, where, f"give {FEWEST} along each axis at least")
+    if raster.z.size > MOST_NODES:
+        what = f"{size} are more than {MOST_NODES}"
+        remedy = "resample it to larger cells, with gdalwarp -tr"
+        raise InputError(what, where, remedy)
+    extent = max(float(np.ptp(raster.x)), float(np.ptp(raster.y)))
+    if extent > LONGEST:
+        what = f"it is {extent:.4g} m wide, more than {LONGEST:g}"
+        remedy = "in millimetres or feet? Write x, y and z in m, or cut it"
+        raise InputError(what, where, remedy)
+
+
+def _outside(raster: Raster, where: str) -> BoolArray:
+    """The cells without a height that reach the edge; a hole is refused with its place."""
+    from scipy.ndimage import label
+
+    is_empty = ~np.isfinite(raster.z)
+    if is_empty.all():
+        raise InputError("no cell has a height", where, "is its NODATA value right?")
+    numbered, _ = label(is_empty)
+    edges = [numbered[0], numbered[-1], numbered[:, 0], numbered[:, -1]]
+    at_edge = np.setdiff1d(np.concatenate(edges), [0])
+    is_outside = np.isin(numbered, at_edge)
+    rows, columns = np.nonzero(is_empty & ~is_outside)
+    if len(rows):
+        place = _place(raster, rows[0], columns[0])
+        what = f"a hole at {place}; {len(rows)} cells have no height"
+        remedy = "fill them, with gdal_fillnodata.py"
+        raise InputError(what, where, remedy)
+    return np.asarray(is_outside)
+
+
+def _rim(is_outside: BoolArray) -> BoolArray:
+    """The cells with a height beside the edge or beside a cell outside."""
+    from scipy.ndimage import binary_erosion
+
+    is_inside = ~is_outside
+    return np.asarray(is_inside & ~binary_erosion(is_inside, np.ones((3, 3), bool)))
+
+
+def _check_relief(relief: float, depth: float, where: str) -> None:
+    """Refuse a surface that is no form on the ground, or one that is too high."""
+    if relief <= max(depth, 0.0):
+        what = f"it is {relief:.3g} m higher than its rim, and {depth:.3g} m deeper"
+        raise InputError(what, where, "a form must rise from the ground around it")
+    if relief > HIGHEST:
+        what = f"it is {relief:.4g} m high, more than {HIGHEST:g}"
+        remedy = "in millimetres or feet? Write x, y and z in m"
+        raise InputError(what, where, remedy)
+
+
+def _check_cells(raster: Raster, above: FloatArray, where: str) -> None:
+    """Refuse single cells that stand off all their neighbours, and forms of few cells."""
+    from scipy.ndimage import median_filter
+
+    relief = float(above.max())
+    off = np.abs(above - median_filter(above, size=3))
+    step = float(np.ptp(raster.x)) / (len(raster.x) - 1)
+    most = max(SPIKE_STEPS * step, SPIKE_RELIEF * relief)
+    row, column = np.unravel_index(int(off.argmax()), off.shape)
+    if off[row, column] > most:
+        place = _place(raster, int(row), int(column))
+        what = f"the cell at {place} is {off[row, column]:.4g} m off its neighbours"
+        remedy = "replace it by their mean, or mark it as NODATA and fill it"
+        raise InputError(what, where, remedy)
+    nodes = int((above > relief / 2).sum())
+    if nodes < FORM_NODES:
+        what = f"only {nodes} cells are above half its height of {relief:.4g} m"
+        remedy = "give a raster of smaller cells"
+        raise InputError(what, where, remedy)
+
+
+def _check_rim(
+    raster: Raster, rim: FloatArray, relief: float, where: str
+) -> tuple[str, ...]:
+    """Refuse a rim that is not level; what is said of one that is nearly so."""
+    worst = int(np.abs(rim).argmax())
+    row, column = np.unravel_index(worst, rim.shape)
+    off = abs(float(rim[row, column]))
+    if off > TAPERED_RIM * relief:
+        place = _place(raster, int(row), int(column))
+        what = f"its rim is not level: at {place} it is {off:.3g} m off"
+        what = f"{what}, the form is {relief:.3g} m high"
+        remedy = "take more of the level ground around the form, or subtract its tilt"
+        raise InputError(what, where, remedy)
+    if off > FLAT_RIM * relief:
+        return (f"the rim, up to {off:.3g} m off, is tapered to level ground",)
+    return ()
+
+
+def _taper(raster: Raster, is_outside: BoolArray, width: float) -> FloatArray:
+    """Weights that fall to 0 at the rim over a width, m, of two steps at least."""
+    from scipy.ndimage import distance_transform_edt
+
+    if not width:
+        return np.ones(raster.z.shape)
+    step_x = float(np.ptp(raster.x)) / (len(raster.x) - 1)
+    step_y = float(np.ptp(raster.y)) / (len(raster.y) - 1)
+    inside = np.pad(~is_outside, 1)
+    distance = distance_transform_edt(inside, sampling=(step_y, step_x))[1:-1, 1:-1]
+    least = max(step_x, step_y)
+    part = np.clip((distance - least) / max(width, 2 * least), 0.0, 1.0)
+    return np.asarray((1 - np.cos(pi * part)) / 2)
+
+
+def _check_slopes(surface: Surface, where: str) -> None:
+    """Refuse slopes that no mesh follows, after the noise of single cells is taken out."""
+    from scipy.ndimage import gaussian_filter
+
+    along_x, along_y = surface.steps
+    deviation = 0.1 * min(surface.relief, surface.radius)
+    sigmas = deviation / np.array([along_y, along_x])
+    smooth = gaussian_filter(surface.z, sigmas, mode="nearest")
+    by_y, by_x = np.gradient(smooth, along_y, along_x)
+    slopes = np.degrees(np.arctan(np.hypot(by_x, by_y)))
+    row, column = np.unravel_index(int(slopes.argmax()), slopes.shape)
+    steepest = float(slopes[row, column])
+    if steepest > STEEPEST_DEG:
+        place = f"x = {surface.x[column]:.9g} m, y = {surface.y[row]:.9g} m"
+        what = f"a slope of {steepest:.0f} deg at {place}, above {STEEPEST_DEG:g}"
+        remedy = "are x, y and z all in m? A wall or an overhang is no bed"
+        raise InputError(what, where, remedy)
+
+
+def cone(height: float, slope_deg: float) -> Surface:
+    """Make a cone.
+
+    Parameters
+    ----------
+    height
+        Its height, m.
+    slope_deg
+        Its slope, degrees.
+
+    Returns
+    -------
+    Surface
+        The cone, its axis at the origin.
+
+    Examples
+    --------
+    >>> pile = cone(10.0, 45.0)
+    >>> round(pile.relief, 6), round(pile.volume / (1000 * pi / 3), 2)
+    (10.0, 1.0)
+    """
+    radius = height / tan(radians(slope_deg))
+    x, y = _axes(radius, radius)
+    distance = np.hypot(x, y[:, None])
+    z = np.maximum(height - distance * tan(radians(slope_deg)), 0.0)
+    return surface_of("cone", x, y, z, 0.0, SPREAD_OF_SHAPE)
+
+
+def oval(height: float, slope_deg: float, length: float, width: float) -> Surface:
+    """Make an oval pile with a flat top: a straight middle between two round ends.
+
+    Parameters
+    ----------
+    height
+        Its height, m.
+    slope_deg
+        Slope of its sides, degrees.
+    length, width
+        Length of its flat top along y, and width along x, m; the length is the larger.
+
+    Returns
+    -------
+    Surface
+        The pile, its middle at the origin.
+
+    Examples
+    --------
+    >>> pile = oval(10.0, 45.0, 30.0, 10.0)
+    >>> round(pile.relief, 6), round(float(pile.at(0.0, 14.9)), 1)
+    (10.0, 10.0)
+    """
+    half = (length - width) / 2
+    foot = width / 2 + height / tan(radians(slope_deg))
+    x, y = _axes(foot, foot + half)
+    beyond = np.maximum(np.abs(y) - half, 0.0)
+    distance = np.hypot(x, beyond[:, None])
+    rise = (foot - distance) * tan(radians(slope_deg))
+    return surface_of("oval", x, y, np.clip(rise, 0.0, height), 0.0, SPREAD_OF_SHAPE)
+
+
+def barchan(height: float, slope_deg: float) -> Surface:
+    """Make a dune in the form of a barchan, which wind from the west has made.
+
+    Its windward side is a paraboloid, its brink a parabola across the wind, and its
+    slip face has the slope `SLIP_DEG` along the normal of the brink.
+
+    Parameters
+    ----------
+    height
+        Height of its brink in the middle, m.
+    slope_deg
+        Slope of the windward side at its toe, where it is steepest, degrees.
+
+    Returns
+    -------
+    Surface
+        The dune, the middle of its brink at the origin.
+
+    Examples
+    --------
+    >>> dune = barchan(3.0, 10.0)
+    >>> round(dune.relief, 6), bool(dune.centre[0] < 0)
+    (3.0, True)
+    """
+    length = 2 * height / tan(radians(slope_deg))
+    horn = HORNS * length
+    # at its ends the brink meets the ground: there the paraboloid is at 0
+    half_width = length * np.sqrt(1 - HORNS**2)
+    x, y = _axes(length, length)
+    windward = height * (1 - (x / length) ** 2 - (y[:, None] / length) ** 2)
+    brink = horn * (y / half_width) ** 2
+    turn = 2 * horn * y / half_width**2
+    height_there = height * (1 - (brink / length) ** 2 - (y / length) ** 2)
+    fall = tan(radians(SLIP_DEG)) / np.sqrt(1 + turn**2)
+    behind = x - brink[:, None]
+    slip = height_there[:, None] - fall[:, None] * behind
+    z = np.where(behind > 0, np.minimum(windward, slip), windward)
+    return surface_of("barchan", x, y, np.maximum(z, 0.0), 0.0, SPREAD_OF_SHAPE)
+
+
+def _axes(half_x: float, half_y: float) -> tuple[FloatArray, FloatArray]:
+    """Axes about the origin over a base of these half widths, with some ground around."""
+    step = 2 * min(half_x, half_y) / STEPS_OF_SHAPE
+    axes = []
+    for half in (half_x, half_y):
+        nodes = int(np.ceil(half / step)) + 2
+        axes.append(np.linspace(-step * nodes, step * nodes, 2 * nodes + 1))
+    return axes[0], axes[1]
