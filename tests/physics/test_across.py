@@ -10,7 +10,7 @@ from orchestrator.physics.constants import LIFT_COEFFICIENT
 from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import threshold
 
-SAND = {"density": 2650.0, "entrainment_angle_deg": 55.0}
+SAND: dict[str, float] = {"density": 2650.0, "entrainment_angle_deg": 55.0}
 REPOSE_DEG = 35.0
 """Slope at which the grains of `SAND` roll by themselves, 90 degrees less the angle."""
 ROUGH = [name for name in LAWS if name != "low"]
@@ -51,8 +51,8 @@ def test_without_lift_the_drag_is_that_of_brooks(
 ) -> None:
     law = LAWS["bridged"]
     at = grain(lift=0.0)
-    headings = {"slope_deg": [0.0, slope_deg], "heading_deg": heading_deg}
-    ustar = threshold_across(law, at, **SAND, **headings)
+    slopes = [0.0, slope_deg]
+    ustar = threshold_across(law, at, slope_deg=slopes, heading_deg=heading_deg, **SAND)
     on_level, on_slope = law.drag(ustar, at)
     b, c, p = np.radians([slope_deg, heading_deg, REPOSE_DEG])
     under = np.cos(b) ** 2 - (np.sin(c) * np.sin(b) / np.tan(p)) ** 2
