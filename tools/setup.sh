@@ -71,7 +71,7 @@ install_packages() {
 
 $by_hand
 
-Here, build the image of Debian 13 that the Containerfile describes (docs/reliability.md), or provide
+Here, build the image of Debian 13 that the Containerfile describes (docs/install.md), or provide
 OpenFOAM (1912), LIGGGHTS, Python 3.11 or newer and these libraries by other means and install the
 package itself with pip.  Nothing was installed."
     fi
