@@ -150,7 +150,7 @@ class PouredBed(Case):
 
     kind: ClassVar[str] = "poured"
     template: ClassVar[str] = "liggghts/poured"
-    recipe: ClassVar[int] = 5
+    recipe: ClassVar[int] = 6
     results: ClassVar[tuple[str, ...]] = (SETTLING, DUMP)
     derived: ClassVar[tuple[str, ...]] = (BED,)
     made: ClassVar[tuple[str, ...]] = ("log.liggghts",)

@@ -5,6 +5,7 @@ The threshold of a bed depends on the Galileo number
 few solves answer hundreds of measured beds.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,9 +17,10 @@ from orchestrator.bed.packing import Packing, Places
 from orchestrator.fidelity.fidelities import Fields
 from orchestrator.grains import peeling, threshold
 from orchestrator.grains.loads import Geometry
+from orchestrator.grains.threshold import EQUAL_MOBILITY
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import changed
-from orchestrator.types import FloatArray
+from orchestrator.types import BoolArray, FloatArray
 
 MOVED = 0.1
 """Part of the exposed grains that has moved at the threshold of a bed."""
@@ -49,10 +51,13 @@ class Counted(NamedTuple):
         Shields number at which each moves, with the stress over (rho_sol - rho_f) g d.
     sizes
         Their diameters, d.
+    is_free
+        Whether a free way leads it out of its place.
     """
 
     shields: FloatArray
     sizes: FloatArray
+    is_free: BoolArray
 
 
 @dataclass(frozen=True)
@@ -157,7 +162,7 @@ class Strips:
         excess = (grain.density - fluid.density) * fluid.gravity
         unit = excess * grain.diameter / fluid.density
         shields = ustar[packed.windward] ** 2 / unit
-        return Counted(shields, packed.sizes[packed.windward])
+        return Counted(shields, packed.sizes[packed.windward], bed.is_free)
 
     def shields(
         self,
@@ -233,28 +238,38 @@ class Strips:
         angles = [laid(bed.packing, LAID, bed.bed.seed) for bed in beds]
         return np.asarray(np.nanpercentile(np.concatenate(angles), PERCENTILES))
 
-    def hiding(self, fields: Fields) -> float:
+    def hiding(self, fields: Fields, mobility: float = EQUAL_MOBILITY) -> float:
         """Find the exponent g of theta_i ~ (D_i/D_50)^-g over the mixture's classes.
+
+        Only grains that a free way leads out, and that the bed holds without a flow,
+        count in a class.
 
         Parameters
         ----------
         fields
             The fields of a scene that the model sets.
+        mobility
+            Exponent m of the part of a class that has moved at its threshold, which is
+            ``MOVED (D_i/D_50)^-m``; 0 is the same part of each.
 
         Returns
         -------
         float
-            The exponent.
+            The exponent: 1 where all sizes move at one stress, 0 where each moves as if
+            it were alone. It is NaN with fewer than two classes.
         """
         strips = self.grains(fields, ROUGH)
         sizes = np.concatenate([strip.sizes for strip in strips])
         own = np.concatenate([strip.shields for strip in strips]) / sizes
-        is_held = own > 0
+        is_held = (own > 0) & np.concatenate([strip.is_free for strip in strips])
         points = []
         for _, size, in_class in threshold.classes(sizes):
             counted = is_held & in_class
             if counted.sum() >= FEWEST:
-                points.append((size, np.quantile(own[counted], MOVED)))
+                part = min(MOVED * size**-mobility, 1.0)
+                points.append((size, np.quantile(own[counted], part)))
+        if len(points) < 2:
+            return math.nan
         ln_size, ln_theta = np.log(np.array(points)).T
         slope, _ = np.polyfit(ln_size, ln_theta, 1)
         return float(-slope)

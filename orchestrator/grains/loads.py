@@ -511,6 +511,16 @@ class Geometry:
         angles = peeling.pivot_angles_deg(packed.places, packed.sizes, self.tangents)
         return np.asarray(angles[packed.windward])
 
+    @cached_property
+    def is_free(self) -> BoolArray:
+        """Which counted grains a free way leads out of their places, shape (N,).
+
+        The others wait until one of the contacts that surround them has left.
+        """
+        packed = self.packing
+        held = peeling.surrounded(packed.places, packed.sizes, packed.windward)
+        return np.asarray(~held[packed.windward])
+
     def under(
         self,
         stress: WallStress,

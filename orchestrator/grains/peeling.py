@@ -430,6 +430,31 @@ def pivots(
     return least
 
 
+def surrounded(places: Places, sizes: FloatArray, chosen: BoolArray) -> BoolArray:
+    """Find the grains of a strip that their contacts surround.
+
+    No way leads such a grain out of its place, whatever force acts on it, until one of
+    its neighbours has left.
+
+    Parameters
+    ----------
+    places, sizes
+        As in `leaving`.
+    chosen
+        Which grains are asked about, shape (n,).
+
+    Returns
+    -------
+    BoolArray
+        Which of them, shape (n,); none in one plane.
+    """
+    found = np.zeros(len(sizes), bool)
+    if places.width:
+        for grain, sides, _ in _pyramids(places, sizes, chosen):
+            found[grain] = not len(sides)
+    return found
+
+
 def pivot_angles_deg(
     places: Places, sizes: FloatArray, along: FloatArray, only: int | None = None
 ) -> FloatArray:

@@ -16,6 +16,14 @@ OUTSIDE = 0.1  # part of samples beyond each end of the interval of a size class
 STEP = np.sqrt(
     2
 )  # ratio of the ends of a class: half a phi; d lies in the middle of one
+EQUAL_MOBILITY = 2.0
+"""Exponent m of the parts D_i^-m of size classes that move where all sizes are as mobile.
+
+Measured hiding is that of equal dimensionless transport W*_i. It is as the part of the
+class that moves in a time, times its diameter and the length of a step. A step is some
+100 diameters of the grain (H. A. Einstein, 1950, from memory), so that the part is as
+1/D_i^2; with one length for all it would be as 1/D_i.
+"""
 
 
 @dataclass(frozen=True)

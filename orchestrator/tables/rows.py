@@ -588,8 +588,10 @@ def _fidelity(decision: Decision) -> str:
 def size_class(answer: Answer) -> Iterator[Row]:
     """Find the threshold of each size class of a mixture.
 
-    It is that at which a fraction of its grains has moved. The stress at d50, over which
-    those of the classes are, lies between the two classes beside it.
+    It is that at which a fraction of its grains has moved; for the hiding of equal
+    mobility, a part that falls with the size. Grains that no free way leads out of their
+    places count in no class. The stress at d50, over which those of the classes are, lies
+    between the two classes beside it.
 
     Parameters
     ----------
@@ -605,15 +607,28 @@ def size_class(answer: Answer) -> Iterator[Row]:
     if not pile.pouring:
         return
     motion = answer.motion
-    classes = list(threshold.classes(pile.packing.sizes[pile.packing.windward]))
+    all_sizes = pile.packing.sizes[pile.packing.windward]
+    classes = []
+    for each in threshold.classes(all_sizes):
+        is_free = each.chosen & pile.is_free
+        if is_free.any():
+            classes.append(each._replace(chosen=is_free))
     sizes = np.array([each.size for each in classes])
+    mobility = sizes**-threshold.EQUAL_MOBILITY
     for fraction in pile.scene.protocol.fractions:
         level = threshold.first_level(motion, fraction)
         has_moved = None if level is None else motion.moved_by(level)
         found = [answer.at(fraction, each.chosen) for each in classes]
         taus = np.array([at.tau for at in found])
         median = threshold.at_size(1.0, sizes, taus)
-        for each, at in zip(classes, found, strict=True):
+        mobile_taus = np.full(len(classes), np.nan)
+        for place, each in enumerate(classes):
+            part = fraction * mobility[place]
+            if part <= 1:
+                mobile_taus[place] = answer.at(part, each.chosen).tau
+        mobile_median = threshold.at_size(1.0, sizes, mobile_taus)
+        hidden = mobile_taus / mobile_median / sizes
+        for each, at, of_mobility in zip(classes, found, hidden, strict=True):
             count = int(each.chosen.sum())
             moved = (np.nan, np.nan, np.nan)
             if has_moved is not None:
@@ -631,6 +646,7 @@ def size_class(answer: Answer) -> Iterator[Row]:
                 "ustar0_m_s": at.ustar0,
                 **_with_ends("shields_own", shields(pile.scene, tau) / each.size),
                 **_with_ends("hiding", tau / median / each.size),
+                "hiding_equal_mobility": float(of_mobility),
                 "hiding_wilcock_crowe": float(wilcock_crowe),
                 "hiding_egiazaroff": float(measured.egiazaroff_hiding(each.size)),
             }

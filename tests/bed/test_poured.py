@@ -203,3 +203,36 @@ def test_equal_grains_that_rain_onto_a_lattice_reproduce_it(tmp_path: Path) -> N
     place = x - row / 2 - lattice.floor[0, 0]
     np.testing.assert_allclose(place, np.rint(place), atol=5e-3)
     assert row.max() == 4
+
+
+class OfThreeSizes(PouredBed):
+    """A large grain and two of d in pockets of the floor, a small one on these two."""
+
+    @cached_property
+    def grains(self) -> tuple[FloatArray, FloatArray]:
+        """Centres, the fixed ones first, and diameters, d."""
+        floor = self.floor
+        middle = floor[len(floor) // 2]
+        places = [(0.5, 0.87), (1.5, 0.87), (1.0, 1.52), (-4.5, 1.21)]
+        above = np.array([[x, 0.0, z] for x, z in places])
+        sizes = np.append(np.ones(len(floor)), [1.0, 1.0, 0.6, 1.6])
+        return np.vstack([floor, middle + above]), sizes
+
+
+def test_a_bed_is_cut_by_the_tops_of_its_grains(tmp_path: Path) -> None:
+    """The pockets are exact: over their row grains of 1.6, 1 and 0.6 d lie 1.2, 0.87 and 0.62."""
+    depth = 0.8
+    bed = OfThreeSizes(_plane().line, depth, SURFACE, MIXED, 1.0, 35.0, 0)
+    rows = pd.read_csv(_run(bed, tmp_path) / BED)
+    left = rows[rows["fixed"] == 0].set_index("size")["z_over_d"].sort_index()
+    on_floor = np.sqrt(0.75) - depth
+    on_two = on_floor + np.sqrt(0.8**2 - 0.5**2)
+    # the centre of the small grain lies above the line, its top under that of a grain of d
+    assert on_two > SURFACE
+    assert on_two + 0.3 < SURFACE + 0.5
+    # the large grain is the other way round, and it is gone
+    large = np.sqrt(1.3**2 - 0.5**2) - depth
+    assert large < SURFACE
+    assert large + 0.8 > SURFACE + 0.5
+    np.testing.assert_allclose(left.index, [0.6, 1.0, 1.0])
+    np.testing.assert_allclose(left, [on_two, on_floor, on_floor], atol=2e-3)

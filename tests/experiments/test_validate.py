@@ -39,6 +39,26 @@ def test_grains_laid_on_a_close_packed_layer_lie_in_its_pockets() -> None:
     assert {int(np.abs(angle - exact).argmin()) for angle in angles} == {0, 1}
 
 
+@pytest.mark.parametrize(("mobility", "exponent"), [(0.0, 1.0), (2.0, 2.0)])
+def test_hiding_is_that_of_grains_that_one_stress_moves(
+    monkeypatch: pytest.MonkeyPatch, mobility: float, exponent: float
+) -> None:
+    """Equal parts of all sizes move at one stress; then a part as D^-2 falls as that."""
+    sizes = np.repeat([0.5, math.sqrt(0.5), 1.0, math.sqrt(2.0)], 2001)
+    # as much of each class moves as the square of the stress; locked grains count in none
+    stress = np.tile(np.sqrt(np.linspace(0, 1, 2001)), 4)
+    free = strips.Counted(stress, sizes, np.ones(len(sizes), bool))
+    locked = strips.Counted(np.full(500, 1e-3), np.full(500, 1.0), np.zeros(500, bool))
+
+    def grains(*_: Any) -> list[strips.Counted]:
+        return [free, locked]
+
+    monkeypatch.setattr(strips.Strips, "grains", grains)
+    found = strips.Strips([], Path()).hiding({}, mobility)
+    # theta_i ~ D_i^-1 at one stress, and the stress as the root of the part
+    assert found == pytest.approx(exponent, abs=5e-3)
+
+
 def test_a_score_is_of_rows_that_were_read_alone() -> None:
     rows = pd.DataFrame(
         {"set": "a", "model": "m", "ratio": [0.5, 2.0, 4.0, 100.0, np.nan]}

@@ -203,6 +203,31 @@ def _moved_by_dem(
     return motion.read(copy, grains, rules.displacement_criterion, falls_out=False)
 
 
+def _around(elevation_deg: float, turned_deg: float) -> FloatArray:
+    """Three directions, 120 degrees apart, of an elevation, shape (3, 3)."""
+    azimuth = np.radians(turned_deg + np.array([0.0, 120.0, 240.0]))
+    up = np.radians(elevation_deg)
+    flat = np.column_stack([np.cos(azimuth), np.sin(azimuth)]) * np.cos(up)
+    return np.column_stack([flat, np.full(3, np.sin(up))])
+
+
+@pytest.mark.parametrize(("elevation_deg", "locked"), [(20.0, True), (-20.0, False)])
+def test_a_grain_is_surrounded_where_its_contacts_leave_no_way(
+    elevation_deg: float, locked: bool
+) -> None:
+    """Three grains bear it, three are at its flanks: above its centre they lock it."""
+    touching = np.vstack([_around(-60.0, 0.0), _around(elevation_deg, 60.0)])
+    middle = np.array([10.0, 10.0, 10.0])
+    places = Places(np.vstack([middle, middle + touching]), 20.0)
+    only = np.arange(7) == 0
+    found = peeling.surrounded(places, np.ones(7), only)
+    assert found.tolist() == [locked] + 6 * [False]
+    angle = peeling.pivot_angles_deg(places, np.ones(7), np.tile([1.0, 0.0], (7, 1)), 0)
+    assert np.isnan(angle[0]) == locked
+    in_plane = Places.of(np.array([[0.0, 0.0], [1.0, 0.1], [-1.0, 0.1]]))
+    assert not peeling.surrounded(in_plane, np.ones(3), np.ones(3, bool)).any()
+
+
 def test_dem_moves_a_grain_out_of_its_pocket_at_the_closed_form(tmp_path: Path) -> None:
     places, d = _grains(), 1e-3
     kind = np.tile([deck.FIXED] * 3 + [deck.COUNTED], len(TURNED))

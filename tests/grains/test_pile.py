@@ -11,7 +11,7 @@ from orchestrator.errors import Exploded, InputError
 from orchestrator.grains.loads import Loads
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile, flows
-from orchestrator.grains.threshold import sampled, within
+from orchestrator.grains.threshold import at_size, classes, sampled, within
 from orchestrator.report import poured
 from orchestrator.report.results import Results
 from orchestrator.study import study
@@ -246,6 +246,42 @@ def mixed(tmp_path_factory: pytest.TempPathFactory) -> Results:
 def strip(tmp_path_factory: pytest.TempPathFactory) -> Results:
     text = STUDY.format(fields=STRIP, methods=["pivot", "dem"])
     return small_study.run(tmp_path_factory.mktemp("strip"), text)
+
+
+def test_a_grain_without_a_way_out_counts_in_no_class(strip: Results) -> None:
+    rows, pile = strip.tables["size_class"], _pile(strip, "dem")
+    free = int(pile.is_free.sum())
+    assert 0 < free < pile.packing.count
+    assert (rows.groupby(["scene_id", "fraction"])["count"].sum() == free).all()
+    # those whose pivot is known are among the free
+    angles = pile.pivot_angles_deg
+    assert pile.is_free[np.isfinite(angles)].all()
+
+
+def test_classes_of_equal_mobility_move_in_parts_of_the_inverse_square(
+    mixed: Results,
+) -> None:
+    name, pile = next(iter(mixed.plan.piles.items()))
+    answer = Answer(mixed.plan.decisions[name], pile, mixed.cases)
+    # one distribution of the stress for all sizes: equal parts of the classes move at one stress
+    sizes = pile.packing.sizes[pile.packing.windward]
+    flows = np.empty(len(sizes))
+    for each in classes(sizes):
+        count = int(each.chosen.sum())
+        flows[each.chosen] = ((np.arange(count) + 1) / count) ** 0.5
+    answer.motion = Motion.of_flows(flows)
+    rows = pd.DataFrame(size_class(answer))
+    rows = rows[rows["fraction"] == rows["fraction"].max()]
+    own: dict[str, list[float]] = {"hiding": [], "hiding_equal_mobility": []}
+    for size, count in zip(rows["size_over_d"], rows["count"], strict=True):
+        for column, part in (("hiding", 1.0), ("hiding_equal_mobility", size**-2)):
+            asked = part * rows["fraction"].iloc[0]
+            tau = np.ceil(asked * count - 1e-9) / count if asked <= 1 else np.nan
+            own[column].append(tau)
+    for column, taus in own.items():
+        found = rows[column] * rows["size_over_d"]
+        middle = at_size(1.0, rows["size_over_d"].to_numpy(), np.array(taus))
+        np.testing.assert_allclose(found, np.array(taus) / middle, rtol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["mixed", "strip"])
