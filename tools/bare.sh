@@ -33,6 +33,13 @@ step() {
     return "$code"
 }
 
+# Copies a folder of pip's settings into the image, where there is one.
+pip_settings() {
+    [ -d "$1" ] || return 0
+    mkdir -p "$2"
+    cp -r "$1/." "$2"
+}
+
 image() {
     # apt's sources of Debian, of the other release; how it reaches them
     here=$(sed -n 's/^VERSION_CODENAME=//p' /etc/os-release)
@@ -44,12 +51,11 @@ image() {
         - <"$root.sources" || return
     cp /etc/resolv.conf "$root/etc/"
     cp /etc/ssl/certs/ca-certificates.crt "$root/etc/ssl/certs/"
-    for file in /etc/pip.conf /etc/xdg/pip/pip.conf; do
-        [ ! -f "$file" ] || install -D -m 644 "$file" "$root$file"
-    done
-    for file in .config/pip/pip.conf .pip/pip.conf; do
-        [ ! -f "$HOME/$file" ] || install -D -m 644 "$HOME/$file" "$root/root/$file"
-    done
+    # pip's settings, with the files that they name
+    [ ! -f /etc/pip.conf ] || cp /etc/pip.conf "$root/etc/"
+    pip_settings /etc/xdg/pip "$root/etc/xdg/pip"
+    pip_settings "$HOME/.config/pip" "$root/root/.config/pip"
+    pip_settings "$HOME/.pip" "$root/root/.pip"
     mkdir -p "$root$checkout"
     git archive "$commit" | tar -x -C "$root$checkout"
 }
