@@ -2,6 +2,7 @@
 
 import time
 import timeit
+import warnings
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -16,6 +17,7 @@ from orchestrator.fidelity import decision, limits, smoothing
 from orchestrator.fidelity.decision import Decision, decide
 from orchestrator.grains.cells import SingleGrainCase, batches
 from orchestrator.grains.pile import Pile
+from orchestrator.runs import reuse
 from orchestrator.runs.case import Case, done_state, is_whole
 from orchestrator.runs.engine import human
 from orchestrator.study.closed_form import law_holds, regime_of
@@ -84,15 +86,32 @@ class Plan:
     def done(
         self, directory: Path, but: Container[str] = ()
     ) -> dict[str, dict[str, Any]]:
-        """The markers of the cases that are done, by name, but for some; results are checked."""
+        """The markers of the cases that are done, by name, but for some.
+
+        Results are checked. A case that other code has made, and that the code as it is
+        now would make otherwise, is not done; nor is one that needs such a case.
+        """
         names = [name for name in self.cases if name not in but]
         with ThreadPoolExecutor() as pool:  # gigabytes of results are read
-            states = pool.map(
+            found = pool.map(
                 lambda name: done_state(self.cases[name], directory), names
             )
-            return {
-                name: state for name, state in zip(names, states, strict=True) if state
-            }
+            states = dict(zip(names, found, strict=True))
+        done: dict[str, dict[str, Any]] = {}
+        outdated: set[str] = set()
+        for name in names:
+            state, case = states[name], self.cases[name]
+            if not state:
+                continue
+            needs = {need.name for need in case.needs}
+            if needs & outdated or not reuse.is_as_made_now(case, directory):
+                outdated.add(name)
+            else:
+                done[name] = state
+        if outdated:
+            what = f"{len(outdated)} cases were made by other code of this program"
+            warnings.warn(f"{what}, which now makes them otherwise", stacklevel=2)
+        return done
 
     def missing(self, directory: Path, done: Container[str]) -> dict[str, Case]:
         """The cases to be run, by name: those not `done`, and those pruned that they need."""

@@ -17,9 +17,13 @@ from orchestrator.runs import files
 from orchestrator.runs.files import Folder, canonical_json, digest_text, read_json
 
 PACKAGE = Path(__file__).absolute().parents[1]
+MAKERS = ("bed", "flow", "grains", "physics", "runs", "solvers", "study")
+"""Parts of the package that make cases; the others only read them."""
 NAME = re.compile(r"[a-z]+-[0-9a-f]{12}")
 """Name of a case's directory."""
 IDENTITY = "case.json"
+CODE = "code_sha256"
+"""Key of the identity: the code that made the case, or that would make the same."""
 DONE = "done.json"
 FAILED = "failed.json"
 CHECKSUMS = "results.sha256"
@@ -59,6 +63,20 @@ def _template_digest(name: str) -> str:
     digests = {
         path: sha256(content).hexdigest() for path, _, content in template_files(name)
     }
+    return digest_text(canonical_json(digests))
+
+
+@cache
+def code_digest() -> str:
+    """Compute one digest of the code that makes cases.
+
+    Returns
+    -------
+    str
+        SHA-256 of the names and contents of the Python files of `MAKERS`.
+    """
+    paths = [path for part in MAKERS for path in (PACKAGE / part).rglob("*.py")]
+    digests = files.digest_files(paths, root=PACKAGE)
     return digest_text(canonical_json(digests))
 
 
@@ -151,24 +169,19 @@ def prepare(case: Case, cases: Path) -> Path:
     """
     cases.mkdir(parents=True, exist_ok=True)
     old = cases / case.name
-    inputs = read_json(old / IDENTITY).get("inputs_sha256")
+    before = read_json(old / IDENTITY).get("inputs_sha256")
     patterns = (*STATE, *case.results, *case.derived, *case.bulky, *case.made)
     names = {path for path, _, _ in template_files(case.template)}
 
     def is_ours(name: str) -> bool:
-        if isinstance(inputs, dict) and name in inputs and not _fits(name, case.made):
-            return bool(inputs[name] == files.digest_file(old / name))
+        if isinstance(before, dict) and name in before and not _fits(name, case.made):
+            return bool(before[name] == files.digest_file(old / name))
         final = re.sub(r"(^|/)\.([^/]+)\.tmp$", r"\1\2", name)
         return final in names or _fits(final, patterns)
 
     directory = Folder(cases.parent).clear(f"{cases.name}/{case.name}", is_ours)
     directory.mkdir()
-    for name, mode, content in template_files(case.template):
-        (directory / name).parent.mkdir(parents=True, exist_ok=True)
-        (directory / name).write_bytes(content)
-        (directory / name).chmod(mode)
-    case.write(directory, cases)
-    written = [path for path in directory.rglob("*") if path.is_file()]
+    inputs = inputs_written(case, directory, cases)
     identity = {
         **{
             "id": case.id,
@@ -179,11 +192,38 @@ def prepare(case: Case, cases: Path) -> Path:
         "template_sha256": _template_digest(case.template),
         "parameters": case.parameters,
         "needs": [need.name for need in case.needs],
-        "inputs_sha256": files.digest_files(written, root=directory),
+        "inputs_sha256": inputs,
+        CODE: code_digest(),
         "programs": case.versions(),
     }
     (directory / IDENTITY).write_text(files.text_of(identity))
     return directory
+
+
+def inputs_written(case: Case, directory: Path, cases: Path) -> dict[str, str]:
+    """Write the template and the inputs of a case into an empty directory.
+
+    Parameters
+    ----------
+    case
+        The case.
+    directory
+        Where its files go.
+    cases
+        Directory of the cases that it needs.
+
+    Returns
+    -------
+    dict
+        SHA-256 of each file by its name.
+    """
+    for name, mode, content in template_files(case.template):
+        (directory / name).parent.mkdir(parents=True, exist_ok=True)
+        (directory / name).write_bytes(content)
+        (directory / name).chmod(mode)
+    case.write(directory, cases)
+    written = [path for path in directory.rglob("*") if path.is_file()]
+    return files.digest_files(written, root=directory)
 
 
 def finish(case: Case, directory: Path, **times: float) -> None:

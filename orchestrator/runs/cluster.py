@@ -16,7 +16,7 @@ from typing import Any
 from filelock import FileLock
 
 from orchestrator.errors import InputError, OrchestratorError
-from orchestrator.runs import engine, process
+from orchestrator.runs import engine, process, reuse
 from orchestrator.runs.case import PACKAGE, Case, done_state, names_in
 from orchestrator.runs.engine import Pool
 
@@ -193,7 +193,7 @@ def execute_unless_done(case: Case, cases: Path, limit_s: float) -> float:
     """
     with FileLock(_lock_of(case.name, cases)):
         state = done_state(case, cases)
-        if state:
+        if state and reuse.is_as_made_now(case, cases):
             return float(state["wall_s"])
         return engine.execute(case, cases, limit_s)
 
