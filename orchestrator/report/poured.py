@@ -229,7 +229,11 @@ def _draw_classes(ax: Axes, rows: pd.DataFrame, colour: str) -> None:
     ax.errorbar(
         mean["size_over_d"],
         mean["hiding"],
-        yerr=[mean["hiding"] - low, high - mean["hiding"]],
+        # of one class the mean is an end but for its last digit
+        yerr=[
+            (mean["hiding"] - low).clip(lower=0.0),
+            (high - mean["hiding"]).clip(lower=0.0),
+        ],
         marker="o",
         ms=4,
         lw=0.8,

@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.lines import Line2D
 
-from orchestrator.report import bed, flows, piles, shields, style
+from orchestrator.report import bed, flows, piles, poured, shields, style
 from orchestrator.report.results import Results
 from orchestrator.report.style import Figure
 from tests.report.conftest import axes_of, changed, copies, only
@@ -231,3 +232,23 @@ def test_flows_by_two_models_have_a_panel_each(results: Results) -> None:
     models = [title.rpartition(", ")[2] for title in titles if title]
     assert models == ["RNG k-ε", "k-ε"]
     assert len(figure.cases) == 2
+
+
+def test_a_class_whose_interval_ends_at_its_threshold_is_drawn() -> None:
+    # by a logarithm and back a value may come out larger in its last digit
+    values = np.linspace(30.0, 31.0, 100)
+    value = values[np.exp(np.log(values)) > values][0]
+    rows = pd.DataFrame(
+        {
+            "size_over_d": [1.83400809],
+            "hiding": [value],
+            "hiding_low": [np.nan],
+            "hiding_high": [value],
+            "few": [True],
+        }
+    )
+    with style.settings():
+        ax = plt.figure().subplots()
+        poured._draw_classes(ax, rows, "C0")
+    (bars,) = ax.containers
+    assert bars.has_yerr
