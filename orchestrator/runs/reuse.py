@@ -81,4 +81,4 @@ def _is_made_alike(case: Case, cases: Path, beside: Path) -> bool:
             place.symlink_to(path.absolute())
     case.collect(folder)
     made = [folder / name for name in tables]
-    return files.digest_files(made, root=folder) == tables
+    return bool(files.digest_files(made, root=folder) == tables)

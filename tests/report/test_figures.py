@@ -9,6 +9,7 @@ import pytest
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
+from matplotlib.container import ErrorbarContainer
 from matplotlib.lines import Line2D
 
 from orchestrator.report import bed, flows, piles, poured, shields, style
@@ -251,4 +252,5 @@ def test_a_class_whose_interval_ends_at_its_threshold_is_drawn() -> None:
         ax = plt.figure().subplots()
         poured._draw_classes(ax, rows, "C0")
     (bars,) = ax.containers
+    assert isinstance(bars, ErrorbarContainer)
     assert bars.has_yerr
