@@ -32,7 +32,7 @@ STATE = (IDENTITY, DONE, FAILED, CHECKSUMS, LOG)
 GENERATED = (
     *("[1-9]", "[1-9][0-9]", "[1-9][0-9][0-9]", "[1-9][0-9][0-9][0-9]"),
     *("log.*", "postProcessing", "polyMesh", "settling.csv", "samples.csv", "*.dump"),
-    *("load_steps.csv", "bed_flow.csv", "column_flow.csv"),
+    *("load_steps.csv", "bed_flow.csv", "column_flow.csv", "processor[0-9]*"),
 )
 """Files that a run by hand leaves in the template's own folder; no part of the template."""
 

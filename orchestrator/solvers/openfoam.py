@@ -23,6 +23,8 @@ _TIME = r"\nTime = (\d+)\n"
 _NOT_A_NUMBER = r"(?m)^.*residual = -?nan.*"
 _FATAL = r"(?s)--> FOAM FATAL (?:IO )?ERROR[^\n]*\n(.*?)(?:\n\s*\n|\Z)"
 _CONVERGED = r"(?m)^SIMPLE solution converged in (\d+) iterations$"
+_OF_SEVERAL = "Finalising parallel run"
+"""What several processes say behind the end."""
 _RESIDUAL = r"Solving for Ux, Initial residual = (\S+),"
 
 
@@ -118,7 +120,7 @@ def _check_end(text: str, last: str, where: str) -> None:
         cause = " ".join(fatal[1].split())
         remedy = f"log.{PROGRAM} says where"
         raise SolverError(f"{PROGRAM} stopped: {cause}", where, remedy)
-    if text.split()[-1:] != ["End"]:
+    if text.replace(_OF_SEVERAL, "").split()[-1:] != ["End"]:
         what = f"{PROGRAM} was stopped before its end; its log breaks off after {last}"
         remedy = "killed, out of time, memory or disk? Run the case again"
         raise SolverError(what, where, remedy)

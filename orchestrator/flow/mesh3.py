@@ -1,0 +1,478 @@
+"""The mesh of a flow over a surface: hexahedra in columns that stand on the bed.
+
+The axes of the mesh are those of the wind: x downstream, y to the left of it seen from
+above, z upwards from the flat ground. The columns are vertical, and the lowest cell of
+each has the same height normal to the bed under it, since the wall function of a rough
+bed needs one height. One slab of columns stands apart ahead of the inlet: the flow that
+enters develops in it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from orchestrator import digits
+from orchestrator.flow.foam import write_faces
+from orchestrator.flow.mesh import ratio_of
+from orchestrator.types import FloatArray, IntArray
+
+Heights = Callable[[FloatArray, FloatArray], FloatArray]
+"""Height of a bed above the flat ground, m, at places x and y, m, of one shape."""
+
+LID = 10.0
+"""Height of the lid above the flat ground, in heights of the form."""
+UPSTREAM, DOWNSTREAM, ASIDE = 6.0, 16.0, 7.0
+"""Flat ground from the inlet to the form, from it to the outlet, and on either side."""
+FIRST_CELL = 1 / 40
+"""Height of the cells on the bed, in heights of the form."""
+STEEPEST = 2.0
+"""Largest tangent of a slope along which a first cell is made higher: 63 degrees."""
+BISECTIONS = 60
+"""Steps in which the ratio of neighbouring cells of a column is found: all digits."""
+BACKWARDS = [0, 3, 2, 1]
+"""Corners of a face as they are seen from its other side."""
+
+
+@dataclass(frozen=True)
+class Level:
+    """How fine a mesh is.
+
+    Attributes
+    ----------
+    name
+        Name of the level.
+    per_radius
+        Cells along the radius of the circle with the area of the form.
+    per_height
+        Cells that are as long as the form is high, at least.
+    growth
+        Ratio of neighbouring cells upwards, and along the wind outside the form.
+    growth_across
+        The same across the wind.
+    most_cells
+        Most cells of a mesh: those of a wide form are longer than the two lengths ask.
+    ranks
+        Processes that share the mesh.
+    """
+
+    name: str
+    per_radius: float
+    per_height: float
+    growth: float
+    growth_across: float
+    most_cells: int
+    ranks: int = 1
+
+
+COARSE = Level("coarse", 12, 4, 1.15, 1.2, 110_000)
+STANDARD = Level("standard", 18, 6, 1.1, 1.15, 280_000, ranks=2)
+LEVELS = {level.name: level for level in (COARSE, STANDARD)}
+"""The levels by their names."""
+
+
+class Sizes(NamedTuple):
+    """Ends of a form along and across the wind, m."""
+
+    start: float
+    end: float
+    right: float
+    left: float
+
+
+def wind_axes(from_deg: float) -> FloatArray:
+    """Find the axes of a wind.
+
+    Parameters
+    ----------
+    from_deg
+        Where the wind comes from, degrees from north (+y) towards east (+x).
+
+    Returns
+    -------
+    FloatArray
+        Unit vectors along the wind, downstream, and across it, to the left seen from
+        above: shape (2, 2), in the axes of the file, x east and y north.
+
+    Examples
+    --------
+    >>> wind_axes(270.0).tolist()
+    [[1.0, 0.0], [0.0, 1.0]]
+    """
+    angle = np.radians(from_deg)
+    east, north = -np.sin(angle), -np.cos(angle)
+    return np.round([[east, north], [-north, east]], 12) + 0.0
+
+
+def ratios(first: FloatArray, length: FloatArray, count: int) -> FloatArray:
+    """Find the ratios at which cells fill columns.
+
+    Parameters
+    ----------
+    first
+        Height of the lowest cell of each column, m.
+    length
+        Height of each column, m, of the same shape.
+    count
+        Number of cells of a column.
+
+    Returns
+    -------
+    FloatArray
+        Height of each cell over that of the one below it, of the same shape.
+
+    Examples
+    --------
+    >>> ratios(np.array([1.0]), np.array([7.0]), 3).round(9).tolist()
+    [2.0]
+    """
+    low = np.full_like(first, 0.5)
+    high = np.full_like(first, 4.0)
+    for _ in range(BISECTIONS):
+        middle = (low + high) / 2
+        filled = first
+        for _ in range(count - 1):
+            filled = filled * middle + first
+        is_short = filled < length
+        low = np.where(is_short, middle, low)
+        high = np.where(is_short, high, middle)
+    return (low + high) / 2
+
+
+def axis(
+    start: float, end: float, cell: float, before: float, behind: float, growth: float
+) -> FloatArray:
+    """Place grid lines along one axis.
+
+    Parameters
+    ----------
+    start, end
+        The part with even cells, m.
+    cell
+        Their length, at most, m.
+    before, behind
+        Lengths before and behind that part, m, where the cells grow.
+    growth
+        Ratio of neighbouring cells there, at most.
+
+    Returns
+    -------
+    FloatArray
+        The grid lines, rising, m.
+    """
+    count = digits.whole_up((end - start) / cell)
+    even = np.linspace(start, end, count + 1)
+    cell = (end - start) / count
+    ahead = start - _outwards(cell, before, growth)[::-1]
+    after = end + _outwards(cell, behind, growth)
+    return np.concatenate([ahead, even, after])
+
+
+def _outwards(cell: float, length: float, growth: float) -> FloatArray:
+    """Ends of cells that grow from a cell of the given length, which they follow, m."""
+    first = cell * growth
+    count = _count(first, length, growth)
+    ratio = ratio_of(count, first, length)
+    ends = np.cumsum(ratio ** np.arange(count))
+    return np.asarray(ends * length / ends[-1])
+
+
+def _count(first: float, length: float, growth: float) -> int:
+    """How many cells fill a length if they grow from the first one."""
+    cells = np.log(1 + length * (growth - 1) / first) / np.log(growth)
+    return max(digits.whole_up(float(cells)), 1)
+
+
+def grid_lines(
+    form: Sizes, height: float, cell: float, level: Level
+) -> tuple[FloatArray, FloatArray]:
+    """Place the grid lines over a form and the flat ground around it.
+
+    Parameters
+    ----------
+    form
+        Ends of the form along and across the wind, m.
+    height
+        Height of the form, m.
+    cell
+        Length of the cells over the form, m.
+    level
+        How fine the mesh is.
+
+    Returns
+    -------
+    along
+        The grid lines along the wind, rising, m.
+    across
+        Those across it, m.
+    """
+    before, behind, aside = UPSTREAM * height, DOWNSTREAM * height, ASIDE * height
+    along = axis(form.start, form.end, cell, before, behind, level.growth)
+    across = axis(form.right, form.left, cell, aside, aside, level.growth_across)
+    return along, across
+
+
+def rows(height: float, first_cell: float, level: Level) -> int:
+    """Count the cells of a column.
+
+    Parameters
+    ----------
+    height
+        Height of the form, m.
+    first_cell
+        Height of the lowest cell, m.
+    level
+        How fine the mesh is.
+
+    Returns
+    -------
+    int
+        The number.
+    """
+    return _count(first_cell, LID * height, level.growth)
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """A mesh of hexahedra in columns over a bed.
+
+    Attributes
+    ----------
+    x, y
+        Grid lines along and across the wind, rising, m.
+    bed
+        Height of the bed at each of their crossings, m, shape (len(x), len(y)).
+    lid
+        Height of the lid, m.
+    first_cell
+        Height of the lowest cells normal to the bed, m.
+    count
+        Number of cells of a column.
+    slab
+        Length of the slab of columns ahead of the inlet, and its distance from it, m.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    bed: FloatArray
+    lid: float
+    first_cell: float
+    count: int
+    slab: float
+
+    @classmethod
+    def over(
+        cls,
+        heights: Heights,
+        x: FloatArray,
+        y: FloatArray,
+        *,
+        height: float,
+        first_cell: float,
+        count: int,
+    ) -> "Columns":
+        """Make the mesh over a bed.
+
+        Parameters
+        ----------
+        heights
+            Height of the bed; flat ground, at 0, at the inlet.
+        x, y
+            Grid lines along and across the wind, rising, m.
+        height
+            Height of the form, m.
+        first_cell
+            Height of the lowest cells normal to the bed, m.
+        count
+            Number of cells of a column.
+
+        Returns
+        -------
+        Columns
+            The mesh.
+        """
+        x = digits.on_grid(x, height)
+        y = digits.on_grid(y, height)
+        along, across = np.meshgrid(x, y, indexing="ij")
+        bed = digits.on_grid(heights(along, across), height)
+        return cls(x, y, bed, LID * height, first_cell, count, slab=height)
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Cells along the wind, with the slab, across it and upwards."""
+        return len(self.x), len(self.y) - 1, self.count
+
+    @property
+    def cells(self) -> int:
+        """Number of all cells."""
+        along, across, up = self.shape
+        return along * across * up
+
+    @cached_property
+    def levels(self) -> FloatArray:
+        """Heights of the corners over each crossing, m, (len(x), len(y), count + 1)."""
+        slope_x, slope_y = np.gradient(self.bed, self.x, self.y)
+        steepness = np.minimum(np.hypot(slope_x, slope_y), STEEPEST)
+        first = self.first_cell * np.sqrt(1 + steepness**2)
+        length = self.lid - self.bed
+        ratio = ratios(first, length, self.count)
+        powers = ratio[..., None] ** np.arange(self.count)
+        heights = np.cumsum(powers, axis=-1)
+        heights *= (length / heights[..., -1])[..., None]
+        whole = np.insert(heights, 0, 0.0, axis=-1) + self.bed[..., None]
+        return digits.on_grid(whole, self.slab)
+
+    @cached_property
+    def corners(self) -> FloatArray:
+        """The corners of all cells, m, with the slab's two planes first.
+
+        Shape (len(x) + 2, len(y), count + 1, 3).
+        """
+        inlet = self.x[0]
+        planes = [inlet - 1.5 * self.slab, inlet - 0.5 * self.slab]
+        x = np.concatenate([planes, self.x])
+        z = np.concatenate([self.levels[[0, 0]], self.levels])
+        whole = np.empty((*z.shape, 3))
+        whole[..., 0] = x[:, None, None]
+        whole[..., 1] = self.y[:, None]
+        whole[..., 2] = z
+        return whole
+
+    @property
+    def middles(self) -> FloatArray:
+        """Means of the corners of each cell, m, shape (*shape, 3)."""
+        return self._means(self.corners)
+
+    @property
+    def over_bed(self) -> FloatArray:
+        """Heights of these means over the bed, m, of the mesh's shape."""
+        heights = self.corners[..., 2]
+        return self._means(heights - heights[:, :, :1])
+
+    @staticmethod
+    def _means(corners: FloatArray) -> FloatArray:
+        """Mean over the corners of each cell."""
+        means = (corners[:-1] + corners[1:]) / 2
+        means = (means[:, :-1] + means[:, 1:]) / 2
+        means = (means[:, :, :-1] + means[:, :, 1:]) / 2
+        return np.delete(means, 1, axis=0)  # between the slab and the inlet are none
+
+    def write(self, directory: Path) -> None:
+        """Write the mesh into a case that has none.
+
+        Parameters
+        ----------
+        directory
+            Directory of the case.
+        """
+        inner, owner, neighbour = self._inner_faces()
+        patches = self.patches
+        faces = [inner, *(quads.reshape(-1, 4) for quads, _ in patches.values())]
+        owners = [owner, *(cells.ravel() for _, cells in patches.values())]
+        offset = digits.text(-self.slab)
+        types = {
+            "bed": "wall",
+            "before": "cyclic; neighbourPatch after",
+            "after": "cyclic; neighbourPatch before",
+            "inlet": "mappedPatch; sampleMode nearestCell; sampleRegion region0; "
+            f"samplePatch none; offsetMode uniform; offset ({offset} 0 0)",
+        }
+        write_faces(
+            directory,
+            self.corners.reshape(-1, 3),
+            np.concatenate(faces),
+            np.concatenate(owners),
+            neighbour,
+            {name: cells.size for name, (_, cells) in patches.items()},
+            types,
+        )
+
+    @cached_property
+    def _cell_numbers(self) -> IntArray:
+        """Number of each cell: upwards, then across, then along the wind."""
+        return np.arange(self.cells).reshape(self.shape)
+
+    @cached_property
+    def _planes(self) -> tuple[IntArray, IntArray]:
+        """Numbers of the corners on the upstream and downstream sides of the cells.
+
+        Each has the shape (planes of cells, len(y), count + 1).
+        """
+        points = np.arange(self.corners[..., 0].size).reshape(self.corners.shape[:3])
+        ahead = np.delete(points[:-1], 1, axis=0)
+        behind = np.delete(points[1:], 1, axis=0)
+        return ahead, behind
+
+    @cached_property
+    def _fronts(self) -> IntArray:
+        """Sides of the cells downstream of them, seen from there against the clock."""
+        return _fronts(self._planes[1])
+
+    @cached_property
+    def _walls(self) -> IntArray:
+        """Upright sides along the wind, seen from the left against the clock."""
+        low, high = self._planes
+        ends = [low[:, :, :-1], low[:, :, 1:], high[:, :, 1:], high[:, :, :-1]]
+        return np.stack(ends, axis=-1)
+
+    @cached_property
+    def _floors(self) -> IntArray:
+        """Lower and upper sides, seen from above against the clock."""
+        low, high = self._planes
+        ends = [low[:, :-1], high[:, :-1], high[:, 1:], low[:, 1:]]
+        return np.stack(ends, axis=-1)
+
+    def _inner_faces(self) -> tuple[IntArray, IntArray, IntArray]:
+        """The faces between two cells, their owners and the cells beyond.
+
+        They are those of each cell above it, to its left and downstream of it: so the
+        cells beyond rise, which is OpenFOAM's order.
+        """
+        _, across, up = self.shape
+        sides = [self._floors[:, :, 1:], self._walls[:, 1:], self._fronts]
+        faces = np.stack(sides, axis=3)
+        steps = np.array([1, up, across * up])
+        beyond = self._cell_numbers[..., None] + steps
+        is_inner = np.ones(beyond.shape, bool)
+        is_inner[:, :, -1, 0] = False
+        is_inner[:, -1, :, 1] = False
+        is_inner[[0, -1], :, :, 2] = False  # the slab stands apart
+        owner = beyond - steps
+        return faces[is_inner], owner[is_inner], beyond[is_inner]
+
+    @property
+    def hexahedra(self) -> IntArray:
+        """Numbers of the corners of each cell, of its right and left sides, (n, 8)."""
+        walls = self._walls
+        whole = np.concatenate([walls[:, :-1], walls[:, 1:]], axis=-1)
+        return whole.reshape(-1, 8)
+
+    @property
+    def patches(self) -> dict[str, tuple[IntArray, IntArray]]:
+        """Faces of each patch, seen against the clock from outside, and their cells."""
+        cell = self._cell_numbers
+        backs = _fronts(self._planes[0])[..., BACKWARDS]
+        beside = [self._walls[:, 0][..., BACKWARDS], self._walls[:, -1]]
+        return {
+            "bed": (self._floors[:, :, 0][..., BACKWARDS], cell[:, :, 0]),
+            "lid": (self._floors[:, :, -1], cell[:, :, -1]),
+            "before": (backs[0], cell[0]),
+            "after": (self._fronts[0], cell[0]),
+            "inlet": (backs[1], cell[1]),
+            "outlet": (self._fronts[-1], cell[-1]),
+            "sides": (np.stack(beside), np.stack([cell[:, 0], cell[:, -1]])),
+        }
+
+
+def _fronts(planes: IntArray) -> IntArray:
+    """The quadrilaterals of some planes, seen from downstream against the clock."""
+    ends = [
+        planes[:, :-1, :-1],
+        planes[:, 1:, :-1],
+        planes[:, 1:, 1:],
+        planes[:, :-1, 1:],
+    ]
+    return np.stack(ends, axis=-1)

@@ -1,0 +1,388 @@
+"""Flows over surfaces against measurements, against the flow in a section, and themselves.
+
+python tools/surface_truth.py DIRECTORY [PART ...] > docs/measured/surfaces.csv
+
+The parts are ridge, turn, interval, piles and askervein; by default all, in an hour of one core. The
+cases in DIRECTORY run by hand as they lie; those that are there are not run again.
+
+- ridge: a ridge across the wind in three dimensions against today's flow over its bed line.
+- turn: a cone on a raster, with the wind turned by 30 degrees against the raster's axes.
+- interval: a cone with other meshes, first cells and turbulence models.
+- piles: us/ur on cone and oval, by the areas that AP-42 (section 13.2.5, table 13.2.5-3) has of them.
+- askervein: the wind at 10 m over Askervein hill against the masts of 1983.
+
+No measured stress on the wall of a hill in three dimensions was found: none is compared here.
+"""
+
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from orchestrator.bed.line import BedLine, triangle
+from orchestrator.bed.surface import SPREAD_OF_RASTER, Surface, cone, oval, surface_of
+from orchestrator.errors import Stalled
+from orchestrator.flow import mesh3
+from orchestrator.flow.case import WALL_STRESS, FlowCase
+from orchestrator.flow.mesh3 import COARSE, STANDARD, Columns, Level, Sizes
+from orchestrator.flow.stress import WallStress
+from orchestrator.flow.surface_case import SurfaceFlowCase
+from orchestrator.flow.surface_stress import SurfaceStress
+from orchestrator.physics.velocity import log_law_speed
+from orchestrator.runs import case, engine
+from orchestrator.runs.case import Case
+from orchestrator.study.parts import Flow
+from orchestrator.types import BoolArray, FloatArray
+
+HERE = Path(__file__).resolve().parents[1] / "docs/measured"
+LIMIT_S = 7200.0
+AIR = 1.5e-5
+"""Kinematic viscosity, m2/s."""
+RIDGE = 10.0
+"""Height of the ridge, m; its z0 is h/600, a coarse sand's on a dune of 2 m."""
+PILE, BASE = 11.4, 14.6
+"""Height and radius of the cone, m."""
+PILE_SLOPE = float(np.degrees(np.arctan(PILE / BASE)))
+OVAL_SLOPE, OVAL_LENGTH, OVAL_WIDTH = 37.0, 22.8, 11.4
+"""Of the oval: AP-42 gives a slope of 37 degrees and a flat top; its lengths are taken here
+as two heights and one."""
+ROUGHNESS = 0.004
+"""Roughness length of a coal pile, m."""
+ABOVE_PILE = 0.25
+"""Height over a pile, normal to it, at which us/ur is read, m."""
+REFERENCE = 10.0
+"""Height at which ur is read, m, and that of the masts."""
+BANDS = (0.0, 0.4, 0.8, 1.0, np.inf)
+"""Ends of the classes of us/ur, whose middles AP-42 names 0.2, 0.6, 0.9 and 1.1."""
+AREAS = {
+    "cone": (40.0, 48.0, 12.0, 0.0),
+    "oval, 0 deg": (36.0, 50.0, 14.0, 0.0),
+    "oval, 20 deg": (31.0, 51.0, 15.0, 3.0),
+    "oval, 40 deg": (28.0, 54.0, 14.0, 4.0),
+}
+"""Per cent of the area in each class by AP-42, by pile and direction."""
+HILL_ROUGHNESS, HILL_FROM_DEG = 0.03, 210.0
+HILL = Level("askervein", 12, 3.5, 1.15, 1.2, 400_000)
+TAPERED = 250.0
+"""Width over which the rim of the raster of Askervein is tapered to level ground, m."""
+ALONG_DEG, RIDGE_DEG = 43.0, 133.0
+"""Where lines A and AA, and line B, go to, degrees from north."""
+TO_CP = 400.0
+"""From the hilltop to the centre point along line B, m."""
+
+
+class Row(dict[str, object]):
+    """A row of the table."""
+
+
+def row(part: str, name: str, quantity: str, value: float, beside: float) -> Row:
+    """A value and what it is compared with, NaN where it is compared with nothing."""
+    return Row(
+        part=part, case=name, quantity=quantity, value=value, compared_with=beside
+    )
+
+
+def solve(one: Case, cases: Path) -> Path:
+    """The directory of a case, run if it has not been."""
+    if not case.done_state(one, cases):
+        engine.execute(one, cases, LIMIT_S)
+    return cases / one.name
+
+
+def stress_of(one: SurfaceFlowCase, cases: Path) -> SurfaceStress:
+    """The stress on the bed of a case."""
+    return one.stress(solve(one, cases))[0]
+
+
+@dataclass(frozen=True)
+class RidgeFlow(SurfaceFlowCase):
+    """The flow over a ridge that goes on beyond the sides of the mesh."""
+
+    slope_deg: float = 15.0
+
+    @cached_property
+    def line(self) -> BedLine:
+        """The section of the ridge."""
+        return triangle(self.slope_deg, self.height_m)
+
+    @cached_property
+    def mesh(self) -> Columns:
+        """A few columns of cells across the wind."""
+        h = self.height_m
+        foot, end = self.line.x[1], self.line.x[-2]
+        cell = (end - foot) / 2 / self.level.per_radius
+        x, _ = mesh3.grid_lines(Sizes(foot, end, -h, h), h, cell, self.level)
+        count = mesh3.rows(h, self.first_cell, self.level)
+        return Columns.over(
+            lambda x, y: self.line.height(x),
+            x,
+            np.linspace(-h, h, 7),
+            height=h,
+            first_cell=self.first_cell,
+            count=count,
+        )
+
+
+def ridge(cases: Path) -> Iterator[Row]:
+    """A ridge in three dimensions against its section, by the mean of its windward face."""
+    for slope in (15.0, 25.0):
+        z0, first = RIDGE / 600, RIDGE / 40
+        level = Level("ridge", 40, 1, 1.1, 1.2, 10**6)
+        surface = cone(RIDGE, slope)
+        wide = RidgeFlow(
+            surface, 270.0, 10.0, z0, 1e-5, level, slope_deg=slope, first_cell_m=first
+        )
+        try:
+            directory = solve(wide, cases)
+        except Stalled:
+            # the velocity across is nothing but round-off, whose residual never falls
+            directory = cases / wide.name
+        stress, _ = wide.stress(directory)
+        settings = Flow(
+            roughness=z0,
+            viscosity=1e-5,
+            first_cell_height=first,
+            cells_per_face=40,
+            lid=mesh3.LID,
+            upstream=mesh3.UPSTREAM,
+            downstream=mesh3.DOWNSTREAM,
+        )
+        section = FlowCase(RIDGE, slope, settings)
+        plane = WallStress.from_csv(solve(section, cases) / WALL_STRESS)
+        face = RIDGE / np.tan(np.radians(slope))
+        for name, ends in (("windward", (0.0, face)), ("lee", (face, 2 * face))):
+            of_wide = (stress.along_m > ends[0]) & (stress.along_m < ends[1])
+            of_plane = (plane.x_m > ends[0]) & (plane.x_m < ends[1])
+            ours = signed_ustar(stress.tau_along)[of_wide]
+            theirs = plane.ustar_over_ustar0_wall[of_plane]
+            value = float(np.average(ours, weights=stress.area_m2[of_wide]))
+            beside = float(np.average(theirs, weights=plane.length_m[of_plane]))
+            quantity = f"mean u*/u*_0, {name} side"
+            yield row("ridge", f"{slope:g} deg", quantity, value, beside)
+
+
+def signed_ustar(tau: FloatArray) -> FloatArray:
+    """Friction velocity of a stress, with its sign."""
+    return np.asarray(np.sign(tau) * np.sqrt(np.abs(tau)))
+
+
+def pile_flow(
+    surface: Surface,
+    from_deg: float = 270.0,
+    roughness: float = ROUGHNESS,
+    level: Level = COARSE,
+    first_cell: float | None = None,
+    model: str = "kEpsilon",
+) -> SurfaceFlowCase:
+    """The flow over a stockpile."""
+    return SurfaceFlowCase(
+        surface,
+        from_deg,
+        10.0,
+        roughness,
+        AIR,
+        level,
+        model,
+        first_cell_m=first_cell,
+    )
+
+
+def on_form(stress: SurfaceStress, height: float) -> BoolArray:
+    """Whether a face is a part of the form."""
+    return np.asarray(stress.z_m > 0.01 * height)
+
+
+def measures(stress: SurfaceStress, height: float) -> dict[str, float]:
+    """A few numbers of the stress on a form."""
+    form = on_form(stress, height)
+    area = stress.area_m2[form]
+    tau = np.linalg.norm(stress.tau[form], axis=1)
+    is_reversed = stress.tau_along[form] < 0
+    return {
+        "mean tau/u*_0^2": float(np.average(tau, weights=area)),
+        "u*/u*_0 that 1 % of the area exceeds": exceeded(np.sqrt(tau), area, 0.01),
+        "u*/u*_0 that half of the area exceeds": exceeded(np.sqrt(tau), area, 0.5),
+        "reversed, % of the area": 100 * float(area[is_reversed].sum() / area.sum()),
+    }
+
+
+def exceeded(values: FloatArray, area: FloatArray, share: float) -> float:
+    """The value that a share of the area exceeds."""
+    order = np.argsort(values)[::-1]
+    part = np.cumsum(area[order]) / area.sum()
+    return float(np.interp(share, part, values[order]))
+
+
+def turn(cases: Path) -> Iterator[Row]:
+    """A cone whose raster is turned against the wind, and against itself in the axes."""
+    surface = cone(PILE, PILE_SLOPE)
+    first = measures(stress_of(pile_flow(surface), cases), PILE)
+    for turned_deg in (30.0, 90.0):
+        other = stress_of(pile_flow(surface, 270.0 - turned_deg), cases)
+        for quantity, value in measures(other, PILE).items():
+            name = f"by {turned_deg:g} deg"
+            yield row("turn", name, quantity, value, first[quantity])
+
+
+def interval(cases: Path) -> Iterator[Row]:
+    """A cone with other meshes, first cells and models, against the coarse level."""
+    surface = cone(PILE, PILE_SLOPE)
+    first = measures(stress_of(pile_flow(surface), cases), PILE)
+    others = {
+        "standard level": pile_flow(surface, level=replace(STANDARD, ranks=1)),
+        "first cell h/20": pile_flow(surface, first_cell=PILE / 20),
+        "first cell h/80": pile_flow(surface, first_cell=PILE / 80),
+        "RNGkEpsilon": pile_flow(surface, model="RNGkEpsilon"),
+        "kOmegaSST": pile_flow(surface, model="kOmegaSST"),
+    }
+    for name, one in others.items():
+        found = measures(stress_of(one, cases), PILE)
+        for quantity, value in found.items():
+            yield row("interval", name, quantity, value, first[quantity])
+
+
+def speed_over_bed(one: SurfaceFlowCase, directory: Path, above: float) -> FloatArray:
+    """Speed so far over each face of the bed along its normal, m/s, in their order."""
+    velocity = np.linalg.norm(one.velocity(directory), axis=-1)[1:]
+    speeds = velocity.reshape(-1, velocity.shape[-1])
+    stress, _ = one.stress(directory)
+    heights = one.mesh.over_bed[1:].reshape(speeds.shape)
+    away = heights * stress.normal[:, 2, None]
+    pairs = zip(np.log(away), speeds, strict=True)
+    return np.array([np.interp(np.log(above), up, speed) for up, speed in pairs])
+
+
+def reference_speed(one: SurfaceFlowCase, directory: Path) -> float:
+    """Speed of the approaching flow at the reference height, m/s."""
+    ustar0 = one.stress(directory)[1]
+    return float(log_law_speed(ustar0, REFERENCE, one.roughness_m))
+
+
+def piles(cases: Path) -> Iterator[Row]:
+    """Areas of AP-42's classes on the shapes that the tunnel had."""
+    shapes = {"cone": (cone(PILE, PILE_SLOPE), 0.0)}
+    for angle in (0.0, 20.0, 40.0):
+        shape = oval(PILE, OVAL_SLOPE, OVAL_LENGTH, OVAL_WIDTH)
+        shapes[f"oval, {angle:g} deg"] = (shape, angle)
+    for name, (surface, angle) in shapes.items():
+        for roughness in (ROUGHNESS, 3 * ROUGHNESS):
+            one = pile_flow(surface, 270.0 - angle, roughness)
+            directory = solve(one, cases)
+            ratio = speed_over_bed(one, directory, ABOVE_PILE)
+            ratio /= reference_speed(one, directory)
+            stress, _ = one.stress(directory)
+            form = on_form(stress, PILE)
+            area = stress.area_m2[form]
+            counts, _ = np.histogram(ratio[form], BANDS, weights=area)
+            for band, count in enumerate(counts):
+                quantity = f"us/ur from {BANDS[band]:g}, % of the area"
+                share = 100 * float(count / area.sum())
+                label = f"{name}, z0 {1e3 * roughness:g} mm"
+                yield row("piles", label, quantity, share, AREAS[name][band])
+
+
+def askervein_hill() -> Surface:
+    """Askervein hill by the Copernicus model of heights, tapered to level ground."""
+    table = pd.read_csv(HERE / "askervein_terrain.csv", comment="#")
+    x, y = np.unique(table["x_m"]), np.unique(table["y_m"])
+    z = table.pivot(index="y_m", columns="x_m", values="z_m").to_numpy()
+    rim = np.concatenate([z[0], z[-1], z[:, 0], z[:, -1]])
+    level = float(np.median(rim))
+    to_x = np.minimum(x - x[0], x[-1] - x)
+    to_y = np.minimum(y - y[0], y[-1] - y)
+    inside = np.minimum(to_x, to_y[:, None]) / TAPERED
+    weight = (1 - np.cos(np.pi * np.clip(inside, 0.0, 1.0))) / 2
+    tapered = level + (z - level) * weight
+    return surface_of("Askervein", x, y, tapered, level, SPREAD_OF_RASTER)
+
+
+def at_places(
+    one: SurfaceFlowCase, directory: Path, places: FloatArray, above: float
+) -> FloatArray:
+    """Speed over some places in the axes of the file, m/s, linear between columns."""
+    velocity = np.linalg.norm(one.velocity(directory), axis=-1)[1:]
+    mesh = one.mesh
+    logs = np.log(mesh.over_bed[1:])
+    x = (mesh.x[1:] + mesh.x[:-1]) / 2
+    y = (mesh.y[1:] + mesh.y[:-1]) / 2
+    found = []
+    for along, across in (places - one.surface.centre) @ one.axes.T:
+        i = int(np.searchsorted(x, along)) - 1
+        j = int(np.searchsorted(y, across)) - 1
+        of_x = (along - x[i]) / (x[i + 1] - x[i])
+        of_y = (across - y[j]) / (y[j + 1] - y[j])
+        corners = {
+            (i, j): (1 - of_x) * (1 - of_y),
+            (i + 1, j): of_x * (1 - of_y),
+            (i, j + 1): (1 - of_x) * of_y,
+            (i + 1, j + 1): of_x * of_y,
+        }
+        parts = (
+            weight * np.interp(np.log(above), logs[at], velocity[at])
+            for at, weight in corners.items()
+        )
+        found.append(sum(parts))
+    return np.array(found)
+
+
+def askervein(cases: Path) -> Iterator[Row]:
+    """The wind at the masts over that at the reference site far upstream."""
+    surface = askervein_hill()
+    masts = pd.read_csv(HERE / "askervein_masts.csv", comment="#")
+    top = np.unravel_index(int(surface.z.argmax()), surface.z.shape)
+    hilltop = np.array([surface.x[top[1]], surface.y[top[0]]])
+    one = SurfaceFlowCase(surface, HILL_FROM_DEG, 16.0, HILL_ROUGHNESS, AIR, HILL)
+    directory = solve(one, cases)
+    reference = reference_speed(one, directory)
+    starts = {"A": hilltop, "B": hilltop, "AA": hilltop + TO_CP * towards(RIDGE_DEG)}
+    for line, table in masts.groupby("line"):
+        bearing = RIDGE_DEG if line == "B" else ALONG_DEG
+        along = 1000 * table["distance_km"].to_numpy()
+        places = starts[str(line)] + along[:, None] * towards(bearing)
+        half = (surface.x[-1] - surface.x[0]) / 2 - TAPERED
+        is_in = np.all(np.abs(places - surface.centre) <= half, axis=1)
+        speeds = at_places(one, directory, places[is_in], REFERENCE) / reference
+        measured = table["speed_over_reference"].to_numpy()[is_in]
+        for place, value, beside in zip(along[is_in], speeds, measured, strict=True):
+            name = f"line {line}, {place:.0f} m"
+            yield row("askervein", name, "U/U_RS at 10 m", float(value), float(beside))
+        error = speeds - measured
+        rms = float(np.sqrt(np.mean(error**2)))
+        name = f"line {line}, {len(error)} masts"
+        yield row("askervein", name, "rms of the differences", rms, np.nan)
+        bias = float(error.mean())
+        yield row("askervein", name, "mean of the differences", bias, np.nan)
+
+
+def towards(bearing_deg: float) -> FloatArray:
+    """Unit vector of a bearing, degrees from north."""
+    angle = np.radians(bearing_deg)
+    return np.array([np.sin(angle), np.cos(angle)])
+
+
+PARTS = {
+    "ridge": ridge,
+    "turn": turn,
+    "interval": interval,
+    "piles": piles,
+    "askervein": askervein,
+}
+
+
+def main(directory: str, *parts: str) -> None:
+    """Run the parts and print the table."""
+    cases = Path(directory)
+    cases.mkdir(parents=True, exist_ok=True)
+    rows = []
+    for part in parts or PARTS:
+        rows.extend(PARTS[part](cases))
+    table = pd.DataFrame(rows)
+    print(table.to_csv(index=False, float_format="%.4g", lineterminator="\n"), end="")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
