@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator import paper, pipeline, report, tables
-from orchestrator.calculator import LEAVES, PARAMETERS
+from orchestrator.calculator import BY_FLUID, PARAMETERS
 from orchestrator.calculator.asked import thresholds_and_questions
 from orchestrator.calculator.cli import OPTIONS
 from orchestrator.errors import InputError, OrchestratorError, SolverError
@@ -57,7 +57,7 @@ def threshold(
     law: str | None = "auto",
     fluid: str | None = None,
     temperature: float | None = None,
-    criterion: str = LEAVES,
+    criterion: str = BY_FLUID,
     **parameters: "ArrayLike",
 ) -> pd.DataFrame:
     """Thresholds of motion of single grains by the closed form.
@@ -80,8 +80,9 @@ def threshold(
     criterion
         What a grain must do: "leaves", its pocket, or "goes on", which is to leave it
         in a gust and to hop on after it. The threshold is then the larger of both mean
-        stresses, and there are columns of both, of the stress at which motion ceases,
-        and of which decides.
+        stresses, and there are columns of both, of the upper end by the weakest
+        rebounds, of the stress at which motion ceases, and of which decides. "auto" is
+        "leaves" in the paper's fluid and by its rule, "goes on" in all others.
     density, fluid_density
         Densities of the grains (2500) and of the fluid (1), kg/m3.
     viscosity

@@ -2,7 +2,7 @@
 
 python tools/saltation.py > orchestrator/physics/saltation.csv
 
-It takes some ten minutes of one core. Rows are in the order of Galileo number, density ratio and
+It takes some twenty minutes of one core. Rows are in the order of Galileo number, density ratio and
 slope, the last of them fastest.
 """
 
@@ -14,11 +14,15 @@ from orchestrator.physics.saltation import (
     SLOPE_NODES_DEG,
     Grains,
     thresholds,
+    weakest_thresholds,
 )
 
 if __name__ == "__main__":
     nodes = np.meshgrid(GALILEO_NODES, DENSITY_NODES, SLOPE_NODES_DEG, indexing="ij")
-    found = thresholds(Grains(*nodes))
-    print("steady,cessation")
-    for steady, cessation in zip(found.steady, found.cessation, strict=True):
-        print(f"{steady:.4g},{cessation:.4g}")
+    grains = Grains(*nodes)
+    found = thresholds(grains)
+    at_most = weakest_thresholds(grains)
+    columns = (found.steady, found.cessation, at_most.steady, at_most.cessation)
+    print("steady,cessation,steady_high,cessation_high")
+    for row in zip(*columns, strict=True):
+        print(",".join(f"{value:.4g}" for value in row))

@@ -107,9 +107,13 @@ QUANTITIES = {
 LEAVES, GOES_ON = "leaves", "goes on"
 CRITERIA = (LEAVES, GOES_ON)
 """What a grain must do to count: leave its pocket, or also go on after the gust."""
+BY_FLUID = "auto"
+"""The criterion that the fluid and the law decide: `GOES_ON` in natural fluids, `LEAVES`
+in the paper's fluid and under the paper's rule."""
 OF_CRITERION = {
     "shields_leaves": "leaves",
     "shields_goes_on": "goes on",
+    "shields_goes_on_high": "at most",
     "shields_cessation": "ceases",
     "decides": "decides",
 }

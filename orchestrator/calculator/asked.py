@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.calculator import LEAVES, PARAMETERS
+from orchestrator.calculator import BY_FLUID, PARAMETERS
 from orchestrator.errors import InputError
 from orchestrator.physics.fluids import TEMPERATURE, numbers_of
 from orchestrator.study.units import first, questions
@@ -27,7 +27,7 @@ def thresholds_and_questions(
     temperature: float | None,
     names: Mapping[str, str],
     form: str,
-    criterion: str = LEAVES,
+    criterion: str = BY_FLUID,
 ) -> tuple["Table", list[str]]:
     """Find the thresholds of some points, and ask about numbers that seem to be wrong.
 
@@ -47,7 +47,7 @@ def thresholds_and_questions(
     form
         How a parameter is given a value: a format of its name and the value.
     criterion
-        What a grain must do, one of `CRITERIA`.
+        What a grain must do, one of `CRITERIA`, or `BY_FLUID`.
 
     Returns
     -------

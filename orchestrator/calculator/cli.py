@@ -6,7 +6,7 @@ import math
 import sys
 from typing import Any
 
-from orchestrator.calculator import GEOMETRIC, LEAVES, MOST_POINTS, PARAMETERS
+from orchestrator.calculator import BY_FLUID, GEOMETRIC, MOST_POINTS, PARAMETERS
 from orchestrator.calculator.asked import OF_FLUID, Value, thresholds_and_questions
 from orchestrator.calculator.printed import as_json, as_text, print_csv
 from orchestrator.errors import InputError
@@ -33,8 +33,9 @@ LAW_HELP = (
     "of bridged ends; paper: Eq. 2 or 4 where each holds"
 )
 CRITERION_HELP = (
-    "what a grain must do: leaves, its pocket, the default; or goes on: leave it in a "
-    "gust, and hop on after it, the larger of both mean stresses"
+    "what a grain must do: goes on, which is to leave its pocket in a gust and to hop "
+    "on after it; leaves, its pocket; default: leaves in the paper's fluid and by the "
+    "law paper, goes on in all others"
 )
 
 
@@ -63,7 +64,7 @@ def add(commands: Any) -> None:
     command.add_argument("--temperature", type=number, metavar="T", help=text)
     command.add_argument("--law", default="auto", metavar="NAME", help=LAW_HELP)
     command.add_argument(
-        "--criterion", default=LEAVES, metavar="NAME", help=CRITERION_HELP
+        "--criterion", default=BY_FLUID, metavar="NAME", help=CRITERION_HELP
     )
     form = command.add_mutually_exclusive_group()
     text = "an object for each law by its name"

@@ -124,9 +124,9 @@ def _of_one(rows: Sequence["Row"], asked: str) -> Iterator[str]:
     chosen = [row for row in rows if row["answer"]]
     grain = f"a grain of {rows[0]['d_m'] * 1000:.4g} mm"
     goes_on = "decides" in chosen[0]
-    starts = (
-        "leaves its pocket in a gust, and goes on," if goes_on else "starts to move"
-    )
+    starts = "starts to move"
+    if goes_on:
+        starts = "leaves its pocket and goes on"
     yield f"{_subject(rows, asked)} {grain} {starts} at"
     width = max(map(len, quantities.values()))
     listed = quantities
@@ -157,13 +157,21 @@ def _criteria(chosen: Sequence["Row"]) -> Iterator[str]:
     for row in chosen:
         of_law = f"{row['law']}: " if len(chosen) > 1 else ""
         leaves = _cell(row["shields_leaves"])
+        if _is_nan(row["shields_goes_on"]):
+            yield (
+                f"{of_law}“{row['decides']}” decides: such a grain does not hop, the "
+                f"mean stress turns it over its neighbour from {leaves}"
+            )
+            continue
         goes_on = _cell(row["shields_goes_on"])
         ceases = _cell(row["shields_cessation"])
         yield (
-            f"{of_law}mean Shields number at which the gust turns it over {leaves}, "
-            f"at which it goes on {goes_on}: “{row['decides']}” decides; "
-            f"motion ceases below {ceases}"
+            f"{of_law}“{row['decides']}” decides: of the mean flow, a gust turns it "
+            f"over from {leaves}, it hops on after it from {goes_on}; motion ceases "
+            f"below {ceases}"
         )
+        highest = _cell(row["shields_goes_on_high"])
+        yield f"{of_law}with the weakest rebounds of sand it is {highest}"
 
 
 def _subject(rows: Sequence["Row"], asked: str) -> str:

@@ -3,12 +3,13 @@
 import re
 from collections import defaultdict
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.calculator import (
+    BY_FLUID,
     CRITERIA,
     GOES_ON,
     LEAVES,
@@ -19,6 +20,7 @@ from orchestrator.errors import InputError
 from orchestrator.physics import saltation
 from orchestrator.physics.beside import beside
 from orchestrator.physics.constants import GAS_BELOW
+from orchestrator.physics.fluids import PAPER as PAPER_FLUID
 from orchestrator.physics.laws import LAWS, Exposure, law
 from orchestrator.physics.threshold import (
     AUTO,
@@ -37,7 +39,7 @@ from orchestrator.physics.velocity import (
     measurable_speeds,
     open_water_reynolds,
 )
-from orchestrator.types import FloatArray, Row
+from orchestrator.types import BoolArray, FloatArray, Row
 
 Table = dict[str, NDArray[Any]]
 """Columns of equal length by their names."""
@@ -49,7 +51,7 @@ NO_END = "not reached: hops have no end, or go on without a flow"
 def thresholds(
     points: Mapping[str, Any],
     asked: str = AUTO,
-    criterion: str = LEAVES,
+    criterion: str = BY_FLUID,
 ) -> Table:
     """Find the thresholds of single grains under every force law.
 
@@ -62,9 +64,10 @@ def thresholds(
         The law that is asked for, ``auto`` for the default law, or ``paper`` for the
         paper's rule.
     criterion
-        What a grain must do: one of `CRITERIA`. Grains that go on leave their pockets
-        in a gust of `saltation.PEAK` times the mean stress and hop on after it; their
-        threshold is the larger of the two mean stresses.
+        What a grain must do: one of `CRITERIA`, or `BY_FLUID`. Grains that go on leave
+        their pockets in a gust of `saltation.PEAK` times the mean stress and hop on
+        after it; their threshold is the larger of the two mean stresses. Grains that
+        cannot hop go on where the mean stress turns them over their neighbours.
 
     Returns
     -------
@@ -89,10 +92,17 @@ def thresholds(
     ['bridged'] [0.89]
     """
     _check_law(asked)
-    if criterion not in CRITERIA:
+    if criterion not in (*CRITERIA, BY_FLUID):
         what = f"no criterion {criterion!r}"
-        raise InputError(what, "threshold: criterion", f"choose {', '.join(CRITERIA)}")
+        remedy = f"choose {', '.join(CRITERIA)}, {BY_FLUID}"
+        raise InputError(what, "threshold: criterion", remedy)
     grains = _grains(points)
+    if criterion == BY_FLUID:
+        criterion = _criterion(grains, asked)
+    if criterion == GOES_ON and asked == PAPER:
+        what = "the paper's rule is one of grains that leave their pockets"
+        remedy = f"take the criterion {LEAVES}, or another law"
+        raise InputError(what, "threshold: criterion", remedy)
     if "depth" in points:
         _check_depth(grains)
     exposure = Exposure(
@@ -108,13 +118,13 @@ def thresholds(
         by_law = {name: _threshold(name, exposure, grains) for name in LAWS}
         regimes = regime(by_law["low"], by_law["high"]).astype(object)
         picked = _picked(asked, regimes, by_law["bridged"].friction_velocity, exposure)
-        hops = _hops(grains) if criterion == GOES_ON else None
+        hopping = _hopping(grains) if criterion == GOES_ON else None
         blocks = []
         for name, at in by_law.items():
             block = _block(name, at, exposure, grains)
             kind: Table = {**inputs, "force_law": block["law"]}
-            if hops is not None:
-                block = _going_on(block, hops, exposure, grains)
+            if hopping is not None:
+                block = _going_on(block, hopping, exposure, grains)
                 kind["criterion"] = np.full(len(block["law"]), GOES_ON, object)
             block["regime"] = regimes
             block |= beside({**block, **kind})
@@ -124,7 +134,7 @@ def thresholds(
     for name in blocks[0]:
         of_laws = [block[name] for block in blocks]
         table[name] = np.stack(of_laws, axis=1).ravel()
-    if hops is not None and not np.isfinite(table["shields_goes_on"]).any():
+    if hopping is not None and not np.isfinite(table["shields"]).any():
         remedy = f"take the criterion {LEAVES}, or a larger grain"
         raise InputError(NO_START, "threshold: criterion", remedy)
     if not table["valid"].any():
@@ -219,40 +229,61 @@ def _block(name: str, at: Threshold, exposure: Exposure, grains: Table) -> Table
     return block
 
 
-def _hops(grains: Table) -> saltation.Thresholds:
-    """The thresholds of the grains as they hop over the bed."""
-    return saltation.tabulated(
-        saltation.Grains.of(
-            grains["diameter"],
-            density=grains["density"],
-            fluid_density=grains["fluid_density"],
-            viscosity=grains["viscosity"],
-            slope_deg=grains["slope_deg"],
-            roughness=grains["roughness"],
-            gravity=grains["gravity"],
-        )
+def _criterion(grains: Table, asked: str) -> str:
+    """The criterion of grains for which none is asked."""
+    is_paper = grains["fluid_density"] == PAPER_FLUID[0]
+    is_paper &= grains["viscosity"] == PAPER_FLUID[1]
+    return LEAVES if asked == PAPER or is_paper.all() else GOES_ON
+
+
+class _Hopping(NamedTuple):
+    """Whether grains can hop, and the thresholds at which they do, by their rebounds."""
+
+    can: BoolArray
+    thresholds: saltation.Thresholds
+    at_most: saltation.Thresholds
+
+
+def _hopping(grains: Table) -> _Hopping:
+    """How the grains hop over the bed."""
+    hoppers = saltation.Grains.of(
+        grains["diameter"],
+        density=grains["density"],
+        fluid_density=grains["fluid_density"],
+        viscosity=grains["viscosity"],
+        slope_deg=grains["slope_deg"],
+        roughness=grains["roughness"],
+        gravity=grains["gravity"],
+    )
+    return _Hopping(
+        saltation.hops(hoppers),
+        saltation.tabulated(hoppers),
+        saltation.tabulated(hoppers, at_most=True),
     )
 
 
 def _going_on(
     block: Table,
-    hops: saltation.Thresholds,
+    hopping: _Hopping,
     exposure: Exposure,
     grains: Table,
 ) -> Table:
     """The columns of a force law for grains that leave in a gust, and go on after it.
 
-    Drag and lift are those in the gust at the threshold. A law is valid where it holds
+    Drag and lift are those in the gust at the threshold; grains that cannot hop have no
+    gust. A law is valid where it holds
     for the grain that leaves.
     """
-    leaves = block["shields"] / saltation.PEAK
-    goes_on = hops.initiation(saltation.PEAK)
-    shields = np.maximum(leaves, goes_on)
+    steady = block["shields"]
+    goes_on = hopping.thresholds.initiation(saltation.PEAK)
+    found = saltation.motion(steady, goes_on, hopping.can)
+    shields = found.shields
+    peak = np.where(hopping.can, saltation.PEAK, 1.0)
     density = grains["fluid_density"]
     excess = (grains["density"] - density) * grains["gravity"] * grains["diameter"]
     ustar = np.sqrt(shields * excess / density)
     law = LAWS[block["law"][0]]
-    in_gust = ustar * np.sqrt(saltation.PEAK)
+    in_gust = ustar * np.sqrt(peak)
     changed = dict(block)
     changed |= measurable_speeds(
         ustar,
@@ -267,16 +298,22 @@ def _going_on(
     changed["reynolds"] = exposure.reynolds(ustar)
     changed["drag_n"] = law.drag(in_gust, exposure)
     changed["lift_n"] = law.lift(in_gust, exposure)
-    changed["shields_leaves"] = leaves
-    changed["shields_goes_on"] = goes_on
-    changed["shields_cessation"] = hops.cessation
-    changed["decides"] = np.where(leaves > goes_on, LEAVES, GOES_ON).astype(object)
+    changed["shields_leaves"] = steady / peak
+    changed["shields_goes_on"] = np.where(hopping.can, goes_on, np.nan)
+    at_most = hopping.at_most.initiation(saltation.PEAK)
+    highest = saltation.motion(steady, at_most, hopping.can).shields
+    changed["shields_goes_on_high"] = np.where(hopping.can, highest, np.nan)
+    ceases = np.where(hopping.can, hopping.thresholds.cessation, steady)
+    changed["shields_cessation"] = ceases
+    decides = np.where(found.goes_on, GOES_ON, LEAVES)
+    changed["decides"] = decides.astype(object)
     changed["why_not"] = block["why_not"].copy()
-    for row in np.flatnonzero(~np.isfinite(goes_on)).tolist():
+    is_missing = hopping.can & ~np.isfinite(goes_on)
+    for row in np.flatnonzero(is_missing).tolist():
         reason = NO_START if np.isinf(goes_on[row]) else NO_END
         reasons = [block["why_not"][row], reason]
         changed["why_not"][row] = "; ".join(filter(None, reasons))
-    changed["valid"] = block["valid"] & np.isfinite(goes_on)
+    changed["valid"] = block["valid"] & ~is_missing
     return changed
 
 

@@ -22,7 +22,7 @@ from orchestrator.fidelity.decision import as_asked
 from orchestrator.fidelity.fidelities import Fields
 from orchestrator.flow.stress import WallStress, bubble
 from orchestrator.physics import saltation
-from orchestrator.physics.constants import GRAVITY
+from orchestrator.physics.constants import GAS_BELOW, GRAVITY
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import CLIFT_GAUVIN, LAWS, Exposure
 from orchestrator.physics.measured import kirchner_pivot
@@ -213,6 +213,9 @@ def going_on(
 ) -> FloatArray:
     """Find the mean stress from which grains go on after a gust, on measured beds.
 
+    In a liquid the bed's slope is that of the surface of an open uniform flow. Grains
+    that cannot hop go on where the mean stress turns them over.
+
     Parameters
     ----------
     beds
@@ -231,18 +234,40 @@ def going_on(
     FloatArray
         Shields numbers of the mean flow, of shape (rows,).
     """
-    grains = saltation.Grains.of(
+    grains = hoppers(beds, ratio)
+    goes_on = saltation.tabulated(grains).initiation(gust)
+    if not leaves:
+        return goes_on
+    steady = single(beds, law, beta_deg, ratio).shields
+    return saltation.motion(steady, goes_on, saltation.hops(grains), gust).shields
+
+
+def hoppers(beds: pd.DataFrame, ratio: float = 30) -> saltation.Grains:
+    """Make the grains of measured beds as they hop.
+
+    Parameters
+    ----------
+    beds
+        The grains and fluids, as `single` takes them.
+    ratio
+        Diameter over roughness length, d/z0.
+
+    Returns
+    -------
+    Grains
+        The grains; in a liquid the surface of the flow falls with the bed.
+    """
+    slope = np.arctan(beds["slope"])
+    is_liquid = beds["rho_f_kg_m3"] >= GAS_BELOW
+    return saltation.Grains.of(
         beds["d_m"],
         density=beds["rho_sol_kg_m3"],
         fluid_density=beds["rho_f_kg_m3"],
         viscosity=beds["nu_m2_s"],
-        slope_deg=-np.degrees(np.arctan(beds["slope"])),
+        slope_deg=-np.degrees(slope),
         roughness=beds["d_m"] / ratio,
+        fall=np.where(is_liquid, np.sin(slope), 0.0),
     )
-    shields = saltation.tabulated(grains).initiation(gust)
-    if not leaves:
-        return shields
-    return np.maximum(shields, single(beds, law, beta_deg, ratio).shields / gust)
 
 
 class _Answers(NamedTuple):
@@ -312,12 +337,16 @@ def compared(
             "sure": READ,
         }
     )
+    ends = pd.read_csv(FOLDER / "cessation.csv").rename(columns={"shields": "measured"})
+    ceases = saltation.tabulated(hoppers(ends)).cessation
     without_gusts: dict[str, _Answers] = {}
     rows = []
     for model in MODELS:
+        cessation = np.full(len(ends), np.nan)
         if model.goes_on:
             shields = going_on(beds, model.gust, leaves=model.leaves)
             answers = _Answers(np.nan, np.nan, shields, np.nan)
+            cessation = ceases
         else:
             # a model with gusts has a part of the same model's stresses without them
             key = str(model.fields)
@@ -335,6 +364,7 @@ def compared(
         }
         parts = [
             beds.drop(columns="bond").assign(value=answers.beds),
+            ends.assign(value=cessation, sure=READ),
             others.assign(value=others["what"].map(values)),
             pivots,
             hump,

@@ -34,6 +34,7 @@ OF_KIND = (
         "alpha_deg",
         "relative_size",
         "rho_f_kg_m3",
+        "rho_sol_kg_m3",
         "force_law",
         "d_m",
     ),
@@ -64,6 +65,14 @@ LENGTHS = ("d_m", "length", "h_m")
 """Those of them that are lengths, of which the ratios to z0 alone matter."""
 GOES_ON = "goes on"
 """The criterion of the kinds of grains that must go on after a gust."""
+TABLE = Path(__file__).with_name("tested.csv")
+"""The tested intervals."""
+AIR_OF_QUARTZ = (1085.0, 4580.0)
+"""Densities of grains over that of the gas, within 2 of those of the sites in the field."""
+MOST_SLOPE_DEG = 30.0
+"""Slope to which an interval of grains that go on is given."""
+FRICTION_DEG = (32.0, 50.0)
+"""Friction angles of the slope laws that bound that of grains that go on."""
 LEAST_LENGTH = 20.0
 """Length of the strips whose intervals were found, d: shorter ones have too few grains."""
 
@@ -94,13 +103,30 @@ def beside(table: Any) -> dict[str, FloatArray]:
     edges = [VISUAL[0].low, *(each.high for each in VISUAL)]
     flumes = np.array(bins)[np.searchsorted(edges, re, side="right")]
     # the sites have Re* 8.8 to 13.5 and grains 2,170 to 2,290 times as dense as the air: within 2
-    near = (re > 4.4) & (re < 27) & (rho_s / rho > 1085) & (rho_s / rho < 4580)
+    least, most = AIR_OF_QUARTZ
+    near = (re > 4.4) & (re < 27) & (rho_s / rho > least) & (rho_s / rho < most)
     ends = (float(np.median(FIELD)), min(FIELD), max(FIELD), float(len(FIELD)))
     rows = np.where(is_gas[..., None], np.where(near[..., None], ends, none), flumes)
     kinds = _kinds(table)
     held = np.array(list(map(interval, kinds, re.tolist())), float).T
     held[:2] *= theta
+    wider = _slope_width(table)
+    held[0] /= wider
+    held[1] *= wider
     return dict(zip((*MEASURED, *TESTED), [curve, *rows.T, *held], strict=True))
+
+
+def _slope_width(table: Any) -> FloatArray:
+    """Factor by which the interval of a sloping bed is wider than that of a level one.
+
+    It is the range of the usual slope laws of the `FRICTION_DEG`; the intervals of
+    grains that leave are of level beds alone.
+    """
+    alpha = np.radians(np.asarray(table["alpha_deg"], float))
+    most, least = (
+        np.cos(alpha) + np.sin(alpha) / np.tan(np.radians(phi)) for phi in FRICTION_DEG
+    )
+    return np.asarray(np.where(alpha > np.radians(1), most / least, 1.0))
 
 
 def _kinds(table: Any) -> list[str]:
@@ -127,19 +153,25 @@ def kind_of(row: Mapping[str, Any]) -> str:
     Of single grains, and of strips of sand by the pivots at a fraction of their grains; there are
     none on slopes, and in a gas three, too few.
     """
-    if (
-        row["alpha_s"] != LIFT_COEFFICIENT
-        or row["cohesion_n_m"]
-        or row["alpha_deg"] > 1
-    ):
+    goes_on = row.get("criterion") == GOES_ON
+    if row["alpha_s"] != LIFT_COEFFICIENT or row["cohesion_n_m"]:
         return ""
-    if row["rho_f_kg_m3"] < GAS_BELOW or row.get("relative_size") not in (1.0, None):
+    if row["alpha_deg"] > (MOST_SLOPE_DEG if goes_on else 1):
+        return ""
+    if row.get("relative_size") not in (1.0, None):
+        return ""
+    is_gas = row["rho_f_kg_m3"] < GAS_BELOW
+    if is_gas and not goes_on:
+        return ""
+    if is_gas and not _is_quartz_in_air(row):
         return ""
     words = [row["force_law"], f"z0 d/{row['d_m'] / row['z0_m']:.3g}"]
     if row.get("bed", "grain") == "grain":
         words += ["grain", f"beta {row['beta_deg']:g}"]
-        if row.get("criterion") == GOES_ON:
+        if goes_on:
             words.append(GOES_ON)
+        if is_gas:
+            words.append("air")
     elif _is_strip(row):
         words += ["strip", f"phi {row['phi_deg']:g}", f"{row['poured_depth']:g} d deep"]
         words += [
@@ -154,6 +186,12 @@ def kind_of(row: Mapping[str, Any]) -> str:
     if isinstance(gusts, str):
         words.append(f"gusts {gusts}")
     return ", ".join(words)
+
+
+def _is_quartz_in_air(row: Mapping[str, Any]) -> bool:
+    """Whether grain and gas have a ratio of densities as those that were measured."""
+    low, high = AIR_OF_QUARTZ
+    return bool(low < row["rho_sol_kg_m3"] / row["rho_f_kg_m3"] < high)
 
 
 def _is_strip(row: Mapping[str, Any]) -> bool:
@@ -186,7 +224,7 @@ def interval(kind: str, reynolds: float) -> list[float]:
 def _table() -> dict[str, list[list[float]]]:
     """By kind: the ends of each range of Re*, and the interval."""
     table: dict[str, list[list[float]]] = {}
-    text = Path(__file__).with_name("tested.csv").read_text(encoding="utf-8")
+    text = TABLE.read_text(encoding="utf-8")
     for kind, *numbers in [*csv.reader(text.splitlines())][1:]:
         table.setdefault(kind, []).append([float(number) for number in numbers])
     return table
@@ -218,5 +256,8 @@ def sentences(row: Mapping[Any, Any]) -> tuple[str, str]:
             said,
             "no tested interval: no ten measured thresholds are of such beds at such Re*",
         )
-    rows = f"{held:.0%} of {count:g} flume rows"
+    where = "flume rows"
+    if row["rho_f_kg_m3"] < GAS_BELOW:
+        where = "rows in air"
+    rows = f"{held:.0%} of {count:g} {where}"
     return said, f"θ {theta:.3f}; {rows} lie within {low:.3f} and {high:.3f}"

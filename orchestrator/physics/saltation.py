@@ -57,6 +57,12 @@ ALIKE = 3
 
 A grain with so many goes on.
 """
+REBOUNDS_FROM = 10.0
+"""Stokes number of an impact from which a sphere rebounds in a viscous fluid."""
+LIQUID_BELOW = 100.0
+"""Density of the grain over that of the fluid below which that is a liquid."""
+SETTLING_HALVINGS = 50
+"""Halvings of the logarithm of a settling speed."""
 SETTLED = 1e-4
 """Relative difference up to which two hops are as strong as each other."""
 
@@ -150,6 +156,10 @@ class Grains:
         Slope of the bed, degrees, positive where the flow goes up it.
     roughness
         Roughness length of the bed over the diameter, z0/d.
+    fall
+        Fall of the surface of an open uniform flow, the sine of its slope. The flow's
+        own weight drives it then, and its depth is ``theta (s - 1)/fall`` diameters. It
+        is 0 in a flow that is much deeper than a grain.
 
     Examples
     --------
@@ -162,6 +172,7 @@ class Grains:
     density_ratio: FloatArray
     slope_deg: FloatArray
     roughness: FloatArray
+    fall: FloatArray
 
     def __init__(
         self,
@@ -169,10 +180,11 @@ class Grains:
         density_ratio: ArrayLike,
         slope_deg: ArrayLike = 0.0,
         roughness: ArrayLike = 1 / SAND_GRAIN,
+        fall: ArrayLike = 0.0,
     ) -> None:
-        given = np.broadcast_arrays(galileo, density_ratio, slope_deg, roughness)
+        given = np.broadcast_arrays(galileo, density_ratio, slope_deg, roughness, fall)
         flat = [np.ravel(array).astype(float) for array in given]
-        names = ("galileo", "density_ratio", "slope_deg", "roughness")
+        names = ("galileo", "density_ratio", "slope_deg", "roughness", "fall")
         for name, array in zip(names, flat, strict=True):
             # the dataclass is frozen
             object.__setattr__(self, name, array)
@@ -188,6 +200,7 @@ class Grains:
         slope_deg: ArrayLike = 0.0,
         roughness: ArrayLike | None = None,
         gravity: ArrayLike = GRAVITY,
+        fall: ArrayLike = 0.0,
     ) -> Self:
         """Make the numbers of grains of given sizes.
 
@@ -205,6 +218,8 @@ class Grains:
             Roughness length of the bed, m; by default d/30.
         gravity
             Acceleration of gravity, m/s2.
+        fall
+            Fall of the surface of an open uniform flow, as in `Grains`.
 
         Returns
         -------
@@ -216,7 +231,7 @@ class Grains:
         excess = (ratio - 1) * np.asarray(gravity, float)
         galileo = np.sqrt(excess * d**3) / np.asarray(viscosity, float)
         z0 = d / SAND_GRAIN if roughness is None else np.asarray(roughness, float)
-        return cls(galileo, ratio, slope_deg, z0 / d)
+        return cls(galileo, ratio, slope_deg, z0 / d, fall)
 
     def __len__(self) -> int:
         """Number of grains."""
@@ -240,6 +255,7 @@ class Grains:
             self.density_ratio[places],
             self.slope_deg[places],
             self.roughness[places],
+            self.fall[places],
         )
 
 
@@ -269,6 +285,19 @@ STOPS, GOES_ON, ENDLESS = 0, 1, 2
 """What becomes of a grain: it is trapped, goes on, or its trajectory does not end."""
 
 
+class _Pull(NamedTuple):
+    """What acts on some grains, arrays of shape (n,).
+
+    Speed of the `fluid`, `drag` over mass and relative speed, and gravity `along` the
+    bed and `normal` to it.
+    """
+
+    fluid: FloatArray
+    drag: FloatArray
+    along: FloatArray
+    normal: FloatArray
+
+
 class _Flow:
     """Constant quantities of some grains under their flows, arrays of shape (n,)."""
 
@@ -293,6 +322,11 @@ class _Flow:
         # Stokes' drag over mass and relative speed
         self.stokes = 18 * self.viscosity / (s + ADDED_MASS)
         self.sand_grain = SAND_GRAIN * grains.roughness
+        with np.errstate(divide="ignore"):
+            depth = shields * (s - 1) / np.maximum(grains.fall, 0)
+        # gravity without buoyancy, over that of a grain under water
+        self.dry = s / (s - 1)
+        self.depth = depth
 
     def keep(self, mask: BoolArray) -> None:
         """Keep some of the grains."""
@@ -306,16 +340,53 @@ class _Flow:
         along: FloatArray,
         normal: FloatArray,
         ustar: FloatArray,
-    ) -> tuple[FloatArray, FloatArray]:
-        """The fluid's speed at some heights, and drag over mass and relative speed.
-
-        `along` and `normal` are the speeds of the grains.
-        """
+    ) -> _Pull:
+        """What acts on grains at some heights that have some speeds."""
         unit = ustar / self.viscosity
-        above = (np.maximum(height, 0) + self.level) * unit
-        speed = ustar * velocity.law_of_the_wall(above, self.sand_grain * unit)
+        above = np.maximum(height, 0) + self.level
+        covered = self.depth - above
+        if (covered >= 0.5).all():
+            middle = above
+            area = weight = np.ones_like(above)
+        else:
+            # a grain that stands out of the water has drag and buoyancy below it
+            top = np.clip(covered, -0.5, 0.5)
+            area, volume = submerged(top)
+            middle = above + (top - 0.5) / 2
+            weight = volume + (1 - volume) * self.dry
+        part = np.minimum(middle / self.depth, 1.0)
+        rise = velocity.law_of_the_wall(middle * unit, self.sand_grain * unit)
+        speed = ustar * np.maximum(rise - velocity.shallow_defect(part), 0)
         reynolds = np.hypot(speed - along, normal) / self.viscosity
-        return speed, self.stokes * CLIFT_GAUVIN.factor(reynolds)
+        drag = self.stokes * area * CLIFT_GAUVIN.factor(reynolds)
+        return _Pull(speed, drag, weight * self.along, weight * self.normal)
+
+
+def submerged(top: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Compute the parts of a sphere that lie below the surface of the water.
+
+    Parameters
+    ----------
+    top
+        Height of the surface over the centre, d, between -0.5 and 0.5.
+
+    Returns
+    -------
+    area, volume
+        Parts of the cross-section and of the volume that are below; the area is never
+        zero.
+
+    Examples
+    --------
+    >>> area, volume = submerged(np.array([0.0, 0.25, 0.5]))
+    >>> print(area.round(3), volume.round(3))
+    [0.5   0.804 1.   ] [0.5   0.844 1.   ]
+    """
+    up = 2 * top
+    segment = np.arccos(-up) + up * np.sqrt(np.maximum(1 - up**2, 0))
+    area = np.maximum(segment / np.pi, 1e-9)
+    volume = (2 + 3 * up - up**3) / 4
+    return np.asarray(area), np.asarray(volume)
 
 
 class _Motion(NamedTuple):
@@ -327,28 +398,23 @@ class _Motion(NamedTuple):
 
     def later(
         self,
-        flow: _Flow,
-        fluid: FloatArray,
-        pull: FloatArray,
+        pull: _Pull,
         time: FloatArray,
     ) -> "_Motion":
-        """The motion after a time under a constant linear drag: exact for such a drag.
-
-        `fluid` is the fluid's speed, `pull` the drag over mass and relative speed.
-        """
-        decay = np.exp(-pull * time)
-        reach = -np.expm1(-pull * time) / pull
-        along_end = fluid + flow.along / pull
-        normal_end = -flow.normal / pull
+        """The motion after a time under a constant linear drag: exact for such a drag."""
+        decay = np.exp(-pull.drag * time)
+        reach = -np.expm1(-pull.drag * time) / pull.drag
+        along_end = pull.fluid + pull.along / pull.drag
+        normal_end = -pull.normal / pull.drag
         return _Motion(
             self.height + normal_end * time + (self.normal - normal_end) * reach,
             along_end + (self.along - along_end) * decay,
             normal_end + (self.normal - normal_end) * decay,
         )
 
-    def time_step(self, step: FloatArray, pull: FloatArray) -> FloatArray:
+    def time_step(self, step: FloatArray, drag: FloatArray) -> FloatArray:
         """A time step: longer than the given one where a grain sinks at its speed."""
-        sinks = (self.normal < 0) & (pull * step > 1)
+        sinks = (self.normal < 0) & (drag * step > 1)
         with np.errstate(divide="ignore", invalid="ignore"):
             to_bed = self.height / -self.normal
         return np.where(sinks, np.maximum(step, to_bed / SINKING_STEPS), step)
@@ -434,11 +500,10 @@ def fate(
         ustar = np.where(in_gust, flow.peak_ustar, flow.ustar)
         # a step ends where the gust does
         left = np.where(in_gust, flow.gust_end - clock, np.inf)
-        fluid, pull = flow.pull(*motion, ustar)
-        time = np.minimum(motion.time_step(step, pull), left)
-        middle = motion.later(flow, fluid, pull, time / 2)
-        fluid, pull = flow.pull(*middle, ustar)
-        end = motion.later(flow, fluid, pull, time)
+        pull = flow.pull(*motion, ustar)
+        time = np.minimum(motion.time_step(step, pull.drag), left)
+        middle = motion.later(pull, time / 2)
+        end = motion.later(flow.pull(*middle, ustar), time)
         clock = clock + time
         lands = end.height < 0
         if not lands.any():
@@ -524,6 +589,128 @@ class Thresholds:
         [0.025 0.01  0.006]
         """
         return np.asarray(np.maximum(self.steady / np.asarray(peak), self.cessation))
+
+
+def settling(grains: Grains) -> FloatArray:
+    """Compute the speed at which grains settle in their fluid at rest.
+
+    The drag is that of Clift and Gauvin, on a level bed's normal.
+
+    Parameters
+    ----------
+    grains
+        The grains.
+
+    Returns
+    -------
+    FloatArray
+        Settling speeds, sqrt(g' d), shape (n,).
+
+    Examples
+    --------
+    >>> sand = Grains([5.3, 127.0, 38.8], [2.65, 2.65, 2208.0])
+    >>> print(settling(sand).round(2))
+    [ 0.41  1.98 38.66]
+    """
+    s = grains.density_ratio
+    viscosity = np.sqrt(s) / grains.galileo
+    low = np.full(len(grains), np.log(1e-12))
+    high = np.full(len(grains), np.log(1e6))
+    for _ in range(SETTLING_HALVINGS):
+        middle = (low + high) / 2
+        speed = np.exp(middle)
+        drag = 18 * viscosity * speed * CLIFT_GAUVIN.factor(speed / viscosity)
+        is_held = drag > s
+        high = np.where(is_held, middle, high)
+        low = np.where(is_held, low, middle)
+    return np.asarray(np.exp((low + high) / 2))
+
+
+def hops(grains: Grains) -> BoolArray:
+    """Say which grains can hop over their bed.
+
+    A sphere that meets a wall in a viscous fluid does not rebound where the Stokes
+    number of the impact, ``s v d/(9 nu)``, is below some 10: the fluid between them
+    takes up its motion (G. G. Joseph et al. 2001, J. Fluid Mech. 433). The normal speed
+    of a hop's impact is at most the settling speed. A grain that cannot rebound even at
+    that rolls, moved by the stress of the moment alone.
+
+    Parameters
+    ----------
+    grains
+        The grains.
+
+    Returns
+    -------
+    BoolArray
+        Whether they can, shape (n,).
+
+    Examples
+    --------
+    0.2 and 1 mm in water, and 0.05 mm in air:
+
+    >>> print(hops(Grains([11.4, 127.0, 3.47], [2.65, 2.65, 2208.0])))
+    [False  True  True]
+    """
+    viscosity = np.sqrt(grains.density_ratio) / grains.galileo
+    stokes = grains.density_ratio * settling(grains) / (9 * viscosity)
+    return np.asarray(stokes >= REBOUNDS_FROM)
+
+
+class Motion(NamedTuple):
+    """The mean stress at which grains leave their pockets and go on.
+
+    Attributes
+    ----------
+    shields
+        Shields number of the mean flow, shape (n,).
+    goes_on
+        Whether going on decides; where it does not, leaving does.
+    """
+
+    shields: FloatArray
+    goes_on: BoolArray
+
+
+def motion(
+    leaves: ArrayLike,
+    goes_on: ArrayLike,
+    can_hop: ArrayLike,
+    peak: ArrayLike = PEAK,
+) -> Motion:
+    """Find the mean stress at which grains leave their pockets and go on.
+
+    A grain that can hop leaves in a gust and hops on after it: its threshold is the
+    larger of both mean stresses. One that cannot, goes on where the mean stress itself
+    turns it over the next grain: its threshold is that of leaving without a gust.
+
+    Parameters
+    ----------
+    leaves
+        Shields number that turns a grain over its neighbour, in a steady flow.
+    goes_on
+        Shields number of the mean flow at which it goes on, as `Thresholds.initiation`.
+    can_hop
+        Whether it can hop, as `hops`.
+    peak
+        Stress of the gust over that of the mean flow.
+
+    Returns
+    -------
+    Motion
+        Thresholds and what decides, of the broadcast shape.
+
+    Examples
+    --------
+    >>> found = motion([0.06, 0.06, 0.06], [0.01, 0.03, 0.5], [True, True, False], 2.0)
+    >>> print(found.shields, found.goes_on)
+    [0.03 0.03 0.06] [False  True False]
+    """
+    in_gust = np.asarray(leaves) / np.asarray(peak)
+    further = np.asarray(goes_on)
+    can = np.asarray(can_hop)
+    shields = np.where(can, np.maximum(in_gust, further), leaves)
+    return Motion(shields, can & ~(in_gust > further))
 
 
 FAST = 10.0
@@ -676,7 +863,7 @@ SLOPE_NODES_DEG = np.linspace(-30.0, 30.0, 13)
 """Nodes of the table."""
 
 
-def tabulated(grains: Grains) -> Thresholds:
+def tabulated(grains: Grains, *, at_most: bool = False) -> Thresholds:
     """Find the thresholds of grains from the table, or by `thresholds` where it ends.
 
     The thresholds are interpolated linearly: their logarithms over the logarithms of
@@ -686,6 +873,8 @@ def tabulated(grains: Grains) -> Thresholds:
     ----------
     grains
         The grains, which rebound as `BEADS`.
+    at_most
+        Whether they rebound as `weakest` says: the upper ends of the thresholds.
 
     Returns
     -------
@@ -703,6 +892,8 @@ def tabulated(grains: Grains) -> Thresholds:
         places = np.log([grains.galileo, grains.density_ratio])
     points = (*places, grains.slope_deg)
     is_inside = np.isclose(grains.roughness * SAND_GRAIN, 1, rtol=1e-6, atol=0)
+    is_inside &= grains.fall <= 0
+    table = _table()[2:] if at_most else _table()[:2]
     corners = []
     for nodes, point in zip(axes, points, strict=True):
         is_inside &= (point >= nodes[0]) & (point <= nodes[-1])
@@ -719,7 +910,7 @@ def tabulated(grains: Grains) -> Thresholds:
         for further, denser in itertools.product((0, 1), (0, 1)):
             along = over if further else 1 - over
             weight = along * (across if denser else 1 - across)
-            value = _table()[:, galileo + further, density + denser, slope + steeper]
+            value = table[:, galileo + further, density + denser, slope + steeper]
             # an infinite or missing threshold counts only where it has a weight
             sums += np.where(weight > 0, weight * value, 0.0)
         at_slopes.append(np.exp(sums))
@@ -730,15 +921,77 @@ def tabulated(grains: Grains) -> Thresholds:
     found[:, is_inside] = between[:, is_inside]
     outside = np.flatnonzero(~is_inside)
     if len(outside):
-        beyond = thresholds(grains.at(outside))
+        beyond = _beyond_table(grains.at(outside), at_most)
         found[0, outside] = beyond.steady
         found[1, outside] = beyond.cessation
     return Thresholds(steady=found[0], cessation=found[1])
 
 
+def weakest(density_ratio: FloatArray) -> FloatArray:
+    """Restitution of the weakest rebounds that are thought of, a key of `SIMULATED`.
+
+    In a gas it is 0.55, the least that simulations of sand in bulk take; collisions of
+    sand grains have some 0.7 (M. V. Carneiro et al. 2013, arXiv 1212.4603). In a liquid,
+    where it falls with the Stokes number of the impact, it is 0.25.
+
+    Parameters
+    ----------
+    density_ratio
+        Density of the grain over that of the fluid.
+
+    Returns
+    -------
+    FloatArray
+        Restitution, of the same shape.
+
+    Examples
+    --------
+    >>> print(weakest(np.array([2.65, 2208.0])))
+    [0.25 0.55]
+    """
+    return np.where(density_ratio < LIQUID_BELOW, 0.25, 0.55)
+
+
+def weakest_thresholds(grains: Grains) -> Thresholds:
+    """Find the thresholds of grains whose rebounds are those of `weakest`.
+
+    Parameters
+    ----------
+    grains
+        The grains.
+
+    Returns
+    -------
+    Thresholds
+        The thresholds, arrays of shape (n,).
+
+    Examples
+    --------
+    >>> sand = Grains([127.0, 38.8], [2.65, 2208.0])  # 1 mm in water, 0.25 mm in air
+    >>> print(weakest_thresholds(sand).cessation.round(3))
+    [0.054 0.009]
+    """
+    restitution = weakest(grains.density_ratio)
+    found = Thresholds(np.full(len(grains), np.nan), np.full(len(grains), np.nan))
+    for value in np.unique(restitution):
+        places = np.flatnonzero(restitution == value)
+        part = thresholds(grains.at(places), rebound=SIMULATED[float(value)])
+        found.steady[places] = part.steady
+        found.cessation[places] = part.cessation
+    return found
+
+
+def _beyond_table(grains: Grains, at_most: bool) -> Thresholds:
+    """The thresholds of grains that the table does not hold."""
+    return weakest_thresholds(grains) if at_most else thresholds(grains)
+
+
 @cache
 def _table() -> FloatArray:
-    """Logarithms of both thresholds at the nodes: (2, Galileo, density, slope)."""
+    """Logarithms of the thresholds at the nodes: (4, Galileo, density, slope).
+
+    They are steady and of cessation, and the same by the weakest rebounds.
+    """
     shape = (len(GALILEO_NODES), len(DENSITY_NODES), len(SLOPE_NODES_DEG))
     both = np.loadtxt(TABLE, delimiter=",", skiprows=1, unpack=True)
-    return np.log(both.reshape(2, *shape))
+    return np.log(both.reshape(4, *shape))

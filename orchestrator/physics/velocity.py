@@ -518,6 +518,33 @@ def law_of_the_wall(height: FloatArray, roughness: FloatArray) -> FloatArray:
     return np.asarray(np.maximum(log_layer + 7.8 * buffer - lowered, 0))
 
 
+def shallow_defect(part: FloatArray) -> FloatArray:
+    """Compute how far the speed lags the log law since the stress falls to the surface.
+
+    In an open uniform flow the stress falls linearly to zero at the surface. With the
+    mixing length ``kappa z`` the speed's gradient is ``sqrt(1 - z/h)`` of that of a
+    constant stress, and the integral of what lacks has the closed form
+    ``2 (1 - r) + 2 ln((1 + r)/2)`` over kappa, with ``r = sqrt(1 - z/h)``.
+
+    Parameters
+    ----------
+    part
+        Height over the depth of the flow, z/h, between 0 and 1.
+
+    Returns
+    -------
+    FloatArray
+        What the speed lacks, over ustar, of the same shape.
+
+    Examples
+    --------
+    >>> print(shallow_defect(np.array([0.0, 0.5, 1.0])).round(3))
+    [0.    0.656 1.497]
+    """
+    root = np.sqrt(1 - np.asarray(part))
+    return np.asarray((2 * (1 - root) + 2 * np.log((1 + root) / 2)) / KARMAN)
+
+
 def shift(roughness: FloatArray) -> FloatArray:
     """Compute the shift D of the wall by its roughness, in wall units.
 

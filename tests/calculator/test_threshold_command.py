@@ -11,6 +11,7 @@ import pytest
 
 from orchestrator import cli
 from orchestrator.calculator import QUANTITIES
+from orchestrator.physics import saltation
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import LAWS
 
@@ -244,7 +245,7 @@ def test_refusals_are_one_line_that_names_the_option(
 def test_gravel_is_answered_by_a_law_that_holds(run: Run) -> None:
     """The drag law of the law bridged ends at a particle Reynolds number of 1000."""
     gravel = ["--diameter", "0.03", "--density", "2650", "--fluid", "water"]
-    code, out, _ = run(*gravel)
+    code, out, _ = run(*gravel, "--criterion", "leaves")
     assert code == 0
     assert out.startswith(
         "Force law bridged-gravel: a grain of 30 mm starts to move at"
@@ -266,7 +267,7 @@ def test_gravel_is_answered_by_a_law_that_holds(run: Run) -> None:
 
 def test_grains_that_go_on_have_the_larger_of_two_stresses(run: Run) -> None:
     asked = [*QUARTZ_IN_WATER, "--depth", "1", "--json"]
-    leaves = _json(run(*asked))
+    leaves = _json(run(*asked, "--criterion", "leaves"))
     both = _json(run(*asked, "--criterion", "goes on"))
     for law in LAWS:
         of_law = both[law]
@@ -285,15 +286,49 @@ def test_grains_that_go_on_have_the_larger_of_two_stresses(run: Run) -> None:
     held = [record["bridged"]["tested_low"] for record in (both, leaves)]
     assert held[0] != pytest.approx(held[1], rel=0.01)
     assert both["zeng"]["tested_rows"] == 0
-    # the default is as it was, and names no criterion
-    assert _json(run(*asked, "--criterion", "leaves")) == leaves
+    # the default in a fluid by number is to go on, in the paper's fluid to leave
+    assert _json(run(*asked)) == both
     assert "decides" not in leaves["bridged"]
+    assert "decides" not in _json(run(*D, "--json"))["bridged"]
+    by_paper = _json(run(*asked, "--law", "paper"))
+    assert "decides" not in by_paper["bridged"]
+
+
+def test_the_interval_of_a_threshold_holds_what_was_measured(run: Run) -> None:
+    """Dry beach sand of 0.25 mm starts at a wind of some 9.3 m/s at 10 m."""
+    sand = ["--diameter", "2.5e-4", "--density", "2650", "--fluid", "air", "--json"]
+    record = _json(run(*sand))["bridged"]
+    assert record["wind_speed_10_m"] == pytest.approx(9.3, rel=0.15)
+    assert record["tested_rows"] == 11
+    assert record["tested_low"] < record["measured_curve"] < record["tested_high"]
+    assert record["shields_goes_on_high"] > record["shields"]
+    # on a slope it is wider, on a steep one there is none
+    on_slope = _json(run(*sand, "--slope", "15"))["bridged"]
+    width = record["tested_high"] / record["tested_low"]
+    assert on_slope["tested_high"] / on_slope["tested_low"] > width
+
+
+def test_a_grain_that_cannot_hop_is_turned_over_by_the_mean_stress(run: Run) -> None:
+    silt = ["--diameter", "6e-5", "--density", "2650", "--fluid", "water"]
+    found = _json(run(*silt, "--json"))["bridged"]
+    leaves = _json(run(*silt, "--json", "--criterion", "leaves"))["bridged"]
+    assert found["decides"] == "leaves"
+    assert found["shields_goes_on"] is None
+    assert found["shields"] == leaves["shields"]
+    assert found["valid"]
+    assert "such a grain does not hop" in run(*silt)[1]
+
+
+def test_the_papers_rule_has_no_grains_that_go_on(run: Run) -> None:
+    code, _, err = run(*D, "--law", "paper", "--criterion", "goes on")
+    assert code == 2
+    assert "--criterion: the paper's rule is one of grains that leave" in err
 
 
 def test_the_forces_on_a_grain_that_goes_on_are_those_of_the_gust(run: Run) -> None:
     # where leaving decides, the grain is turned over by the gust: the forces of its threshold
     sand = ["--diameter", "5e-4", "--density", "2650", "--fluid", "air", "--json"]
-    leaves = _json(run(*sand))["bridged"]
+    leaves = _json(run(*sand, "--criterion", "leaves"))["bridged"]
     both = _json(run(*sand, "--criterion", "goes on"))["bridged"]
     assert both["decides"] == "leaves"
     assert both["drag"] == pytest.approx(leaves["drag"])
@@ -303,32 +338,34 @@ def test_the_forces_on_a_grain_that_goes_on_are_those_of_the_gust(run: Run) -> N
 
 def test_text_says_which_criterion_decides(run: Run) -> None:
     one = run(*QUARTZ_IN_WATER, "--depth", "1", "--criterion", "goes on")[1]
-    assert "“goes on” decides; motion ceases below" in one
+    assert "“goes on” decides: of the mean flow" in one
     many = run(
         "--diameter", RANGE, "--density", "2650", *WATER, "--criterion", "goes on"
     )
     head, *rows = many[1].splitlines()[1:7]
     assert "leaves" in head
     assert "decides" in head
-    assert all("goes on" in row for row in rows[:5])
+    # grains that do not hop roll
+    assert all("leaves" in row for row in rows[:3])
+    assert all("goes on" in row for row in rows[3:5])
 
 
 def test_a_criterion_that_is_none_and_a_grain_that_never_goes_on_are_refused(
-    run: Run,
+    run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     code, _, err = run(*D, "--criterion", "gone")
     assert code == 2
-    assert "--criterion: no criterion 'gone' (choose leaves, goes on)" in err
-    dust = ["--diameter", "1e-6", "--density", "2650", *WATER]
-    code, _, err = run(*dust, "--criterion", "goes on")
+    assert "--criterion: no criterion 'gone' (choose leaves, goes on, auto)" in err
+    # where the largest stress that is tried is too small, it is not reached
+    monkeypatch.setattr(saltation, "MOST", 0.1)
+    grain = ["--density", "2650", *WATER, "--roughness", "d/5"]
+    code, _, err = run(*D, *grain)
     assert code == 2
     assert "not reached" in err
-    assert run(*dust)[0] == 0
+    assert run(*D, *grain, "--criterion", "leaves")[0] == 0
     # beside one that goes on it has a reason
-    records = _json(
-        run("--diameter", "1e-6:1e-3:2", *dust[2:], "--criterion", "goes on", "--json")
-    )
-    assert not records[0]["bridged"]["valid"]
-    assert "not reached" in records[0]["bridged"]["why_not"]
-    assert records[0]["bridged"]["shields"] is None
-    assert records[1]["bridged"]["valid"]
+    records = _json(run("--diameter", "1e-4:1e-3:2", *grain, "--json"))
+    assert records[0]["bridged"]["valid"]
+    assert not records[1]["bridged"]["valid"]
+    assert "not reached" in records[1]["bridged"]["why_not"]
+    assert records[1]["bridged"]["shields"] is None

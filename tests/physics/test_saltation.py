@@ -11,6 +11,10 @@ from scipy.optimize import brentq
 from orchestrator.physics import saltation
 from orchestrator.physics.laws import CLIFT_GAUVIN
 from orchestrator.physics.saltation import (
+    hops,
+    settling,
+    submerged,
+    weakest_thresholds,
     BEADS,
     ENDLESS,
     GOES_ON,
@@ -349,3 +353,47 @@ def test_initiation_is_the_larger_of_two() -> None:
         steady=np.array([0.03, 0.03, np.inf]), cessation=np.array([0.02, 0.001, 0.01])
     )
     assert found.initiation(2.0).tolist() == [0.02, 0.015, np.inf]
+
+
+def test_a_sphere_is_submerged_by_parts_that_add_up() -> None:
+    top = np.linspace(-0.5, 0.5, 2001)
+    area, volume = submerged(top)
+    # the volume is the integral of the discs, and half of either is below the middle
+    disc = np.pi * (0.25 - top**2)
+    summed = np.cumsum((disc[1:] + disc[:-1]) / 2 * np.diff(top)) / (np.pi / 6)
+    np.testing.assert_allclose(volume[1:], summed, atol=1e-6)
+    chord = 2 * np.sqrt(0.25 - top**2)
+    covered = np.cumsum((chord[1:] + chord[:-1]) / 2 * np.diff(top)) / (np.pi / 4)
+    np.testing.assert_allclose(area[1:], covered, atol=1e-4)
+    assert (area[1000], volume[1000]) == pytest.approx((0.5, 0.5))
+
+
+def test_grains_in_a_shallow_flow_need_more_stress_and_in_a_deep_one_as_much() -> None:
+    falls = np.array([0.0, 1e-6, 0.02, 0.2])
+    found = thresholds(Grains(5000.0, 2.65, fall=falls)).cessation
+    assert found[1] == pytest.approx(found[0], rel=1e-3)
+    assert (np.diff(found[1:]) > 0).all()
+
+
+def test_grains_settle_as_stokes_and_newton_have_it() -> None:
+    fine, coarse = settling(Grains([0.05, 3000.0], 2.65))
+    assert fine == pytest.approx(np.sqrt(2.65) * 0.05 / 18, rel=1e-3)
+    # 4/3 of the weight over a drag coefficient of some 0.42 to 0.44
+    assert coarse == pytest.approx(np.sqrt(4 / 3 * 2.65 / 0.43), rel=0.05)
+
+
+def test_fine_sand_in_water_does_not_hop_and_all_sand_in_air_does() -> None:
+    d = np.array([1e-4, 3e-4, 6e-4, 1e-3])
+    assert hops(Grains.of(d, **WATER)).tolist() == [False, False, True, True]
+    air = {"density": 2650.0, "fluid_density": 1.2, "viscosity": 1.5e-5}
+    assert hops(Grains.of(d, **air)).all()
+
+
+def test_the_weakest_rebounds_have_the_highest_thresholds() -> None:
+    grains = Grains([127.0, 38.8, 9e4], [2.65, 2208.0, 2.65], [0.0, 10.0, -10.0])
+    usual, most = tabulated(grains), tabulated(grains, at_most=True)
+    direct = weakest_thresholds(grains)
+    np.testing.assert_allclose(most.cessation, direct.cessation, rtol=3e-2)
+    np.testing.assert_allclose(most.steady, direct.steady, rtol=3e-2)
+    assert (most.steady > usual.steady).all()
+    assert (most.cessation > usual.cessation).all()
