@@ -113,7 +113,9 @@ def going_on_intervals(usual: dict[str, Any]) -> list[tuple[Any, ...]]:
     galileo = np.sqrt(excess * all_beds["d_m"] ** 3) / all_beds["nu_m2_s"]
     made = []
     hops = {each: saltation.hops(hoppers(all_beds, each)) for each in RATIOS}
-    further = {each: going_on(all_beds, GUST, leaves=False, ratio=each) for each in RATIOS}
+    further = {
+        each: going_on(all_beds, GUST, leaves=False, ratio=each) for each in RATIOS
+    }
     for law, beta, ratio in itertools.product(GOING_ON, BETAS, RATIOS):
         leaves = single(all_beds, law, beta, ratio).shields
         value = saltation.motion(leaves, further[ratio], hops[ratio], GUST).shields

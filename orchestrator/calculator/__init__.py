@@ -108,8 +108,8 @@ LEAVES, GOES_ON = "leaves", "goes on"
 CRITERIA = (LEAVES, GOES_ON)
 """What a grain must do to count: leave its pocket, or also go on after the gust."""
 BY_FLUID = "auto"
-"""The criterion that the fluid and the law decide: `GOES_ON` in natural fluids, `LEAVES`
-in the paper's fluid and under the paper's rule."""
+"""The criterion that fluid and law decide: `GOES_ON` in natural fluids, `LEAVES` in the
+paper's fluid and under the paper's rule."""
 OF_CRITERION = {
     "shields_leaves": "leaves",
     "shields_goes_on": "goes on",

@@ -237,7 +237,7 @@ def _criterion(grains: Table, asked: str) -> str:
 
 
 class _Hopping(NamedTuple):
-    """Whether grains can hop, and the thresholds at which they do, by their rebounds."""
+    """Whether grains can hop, and their thresholds by two laws of rebound."""
 
     can: BoolArray
     thresholds: saltation.Thresholds
@@ -274,17 +274,14 @@ def _going_on(
     gust. A law is valid where it holds
     for the grain that leaves.
     """
-    steady = block["shields"]
-    goes_on = hopping.thresholds.initiation(saltation.PEAK)
-    found = saltation.motion(steady, goes_on, hopping.can)
-    shields = found.shields
-    peak = np.where(hopping.can, saltation.PEAK, 1.0)
+    stresses = _criteria(block["shields"], hopping)
+    shields = stresses.pop("shields")
     density = grains["fluid_density"]
     excess = (grains["density"] - density) * grains["gravity"] * grains["diameter"]
     ustar = np.sqrt(shields * excess / density)
     law = LAWS[block["law"][0]]
-    in_gust = ustar * np.sqrt(peak)
-    changed = dict(block)
+    in_gust = ustar * np.sqrt(np.where(hopping.can, saltation.PEAK, 1.0))
+    changed = {**block, **stresses}
     changed |= measurable_speeds(
         ustar,
         roughness=grains["roughness"],
@@ -298,16 +295,8 @@ def _going_on(
     changed["reynolds"] = exposure.reynolds(ustar)
     changed["drag_n"] = law.drag(in_gust, exposure)
     changed["lift_n"] = law.lift(in_gust, exposure)
-    changed["shields_leaves"] = steady / peak
-    changed["shields_goes_on"] = np.where(hopping.can, goes_on, np.nan)
-    at_most = hopping.at_most.initiation(saltation.PEAK)
-    highest = saltation.motion(steady, at_most, hopping.can).shields
-    changed["shields_goes_on_high"] = np.where(hopping.can, highest, np.nan)
-    ceases = np.where(hopping.can, hopping.thresholds.cessation, steady)
-    changed["shields_cessation"] = ceases
-    decides = np.where(found.goes_on, GOES_ON, LEAVES)
-    changed["decides"] = decides.astype(object)
     changed["why_not"] = block["why_not"].copy()
+    goes_on = stresses["shields_goes_on"]
     is_missing = hopping.can & ~np.isfinite(goes_on)
     for row in np.flatnonzero(is_missing).tolist():
         reason = NO_START if np.isinf(goes_on[row]) else NO_END
@@ -315,6 +304,27 @@ def _going_on(
         changed["why_not"][row] = "; ".join(filter(None, reasons))
     changed["valid"] = block["valid"] & ~is_missing
     return changed
+
+
+def _criteria(steady: FloatArray, hopping: _Hopping) -> Table:
+    """The threshold of grains that go on, and the columns `OF_CRITERION`.
+
+    `steady` is the Shields number that turns them over their neighbours.
+    """
+    can = hopping.can
+    goes_on = hopping.thresholds.initiation(saltation.PEAK)
+    at_most = hopping.at_most.initiation(saltation.PEAK)
+    found = saltation.motion(steady, goes_on, can)
+    highest = saltation.motion(steady, at_most, can).shields
+    decides = np.where(found.goes_on, GOES_ON, LEAVES)
+    return {
+        "shields": found.shields,
+        "shields_leaves": np.where(can, steady / saltation.PEAK, steady),
+        "shields_goes_on": np.where(can, goes_on, np.nan),
+        "shields_goes_on_high": np.where(can, highest, np.nan),
+        "shields_cessation": np.where(can, hopping.thresholds.cessation, steady),
+        "decides": decides.astype(object),
+    }
 
 
 def _picked(

@@ -153,24 +153,15 @@ def kind_of(row: Mapping[str, Any]) -> str:
     Of single grains, and of strips of sand by the pivots at a fraction of their grains; there are
     none on slopes, and in a gas three, too few.
     """
+    if not _is_as_tested(row):
+        return ""
     goes_on = row.get("criterion") == GOES_ON
-    if row["alpha_s"] != LIFT_COEFFICIENT or row["cohesion_n_m"]:
-        return ""
-    if row["alpha_deg"] > (MOST_SLOPE_DEG if goes_on else 1):
-        return ""
-    if row.get("relative_size") not in (1.0, None):
-        return ""
-    is_gas = row["rho_f_kg_m3"] < GAS_BELOW
-    if is_gas and not goes_on:
-        return ""
-    if is_gas and not _is_quartz_in_air(row):
-        return ""
     words = [row["force_law"], f"z0 d/{row['d_m'] / row['z0_m']:.3g}"]
     if row.get("bed", "grain") == "grain":
         words += ["grain", f"beta {row['beta_deg']:g}"]
         if goes_on:
             words.append(GOES_ON)
-        if is_gas:
+        if row["rho_f_kg_m3"] < GAS_BELOW:
             words.append("air")
     elif _is_strip(row):
         words += ["strip", f"phi {row['phi_deg']:g}", f"{row['poured_depth']:g} d deep"]
@@ -186,6 +177,20 @@ def kind_of(row: Mapping[str, Any]) -> str:
     if isinstance(gusts, str):
         words.append(f"gusts {gusts}")
     return ", ".join(words)
+
+
+def _is_as_tested(row: Mapping[str, Any]) -> bool:
+    """Whether grains, fluid and slope are of a kind that was measured."""
+    goes_on = row.get("criterion") == GOES_ON
+    if row["alpha_s"] != LIFT_COEFFICIENT or row["cohesion_n_m"]:
+        return False
+    if row["alpha_deg"] > (MOST_SLOPE_DEG if goes_on else 1):
+        return False
+    if row.get("relative_size") not in (1.0, None):
+        return False
+    if row["rho_f_kg_m3"] >= GAS_BELOW:
+        return True
+    return goes_on and _is_quartz_in_air(row)
 
 
 def _is_quartz_in_air(row: Mapping[str, Any]) -> bool:

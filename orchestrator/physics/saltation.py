@@ -401,7 +401,7 @@ class _Motion(NamedTuple):
         pull: _Pull,
         time: FloatArray,
     ) -> "_Motion":
-        """The motion after a time under a constant linear drag: exact for such a drag."""
+        """The motion after a time, exact for a drag that is linear and constant."""
         decay = np.exp(-pull.drag * time)
         reach = -np.expm1(-pull.drag * time) / pull.drag
         along_end = pull.fluid + pull.along / pull.drag
@@ -931,8 +931,8 @@ def weakest(density_ratio: FloatArray) -> FloatArray:
     """Restitution of the weakest rebounds that are thought of, a key of `SIMULATED`.
 
     In a gas it is 0.55, the least that simulations of sand in bulk take; collisions of
-    sand grains have some 0.7 (M. V. Carneiro et al. 2013, arXiv 1212.4603). In a liquid,
-    where it falls with the Stokes number of the impact, it is 0.25.
+    sand grains have some 0.7 (M. V. Carneiro et al. 2013, arXiv 1212.4603). In a
+    liquid, where it falls with the Stokes number of the impact, it is 0.25.
 
     Parameters
     ----------

@@ -13,8 +13,7 @@ from orchestrator.bed.packing import Packing
 from orchestrator.errors import InputError
 from orchestrator.experiments import strips, validate
 from orchestrator.flow.stress import WallStress
-from orchestrator.physics import beside
-from orchestrator.physics import saltation
+from orchestrator.physics import beside, saltation
 from orchestrator.physics.curves import Air, iversen_white
 from orchestrator.study import fields, study
 from orchestrator.study.scene import Scene

@@ -11,10 +11,6 @@ from scipy.optimize import brentq
 from orchestrator.physics import saltation
 from orchestrator.physics.laws import CLIFT_GAUVIN
 from orchestrator.physics.saltation import (
-    hops,
-    settling,
-    submerged,
-    weakest_thresholds,
     BEADS,
     ENDLESS,
     GOES_ON,
@@ -24,9 +20,13 @@ from orchestrator.physics.saltation import (
     Rebound,
     Thresholds,
     fate,
+    hops,
+    settling,
+    submerged,
     tabulated,
     thresholds,
     under_gust,
+    weakest_thresholds,
 )
 from orchestrator.types import FloatArray
 
