@@ -16,7 +16,7 @@ from orchestrator.flow import theory
 from orchestrator.flow.case import WALL_STRESS, FlowCase
 from orchestrator.flow.stress import Measure, WallStress, bubble
 from orchestrator.runs import case, engine
-from orchestrator.study.parts import Flow
+from orchestrator.study.method import FlowMethod
 from orchestrator.study.scene import default_first_cell_height
 from orchestrator.types import FloatArray
 
@@ -45,7 +45,7 @@ MODELS = (
 def flow(slope: float, roughness: float) -> FlowCase:
     """The standard case of a slope and a roughness."""
     first = default_first_cell_height(HEIGHT, roughness)
-    settings = Flow(roughness=roughness, viscosity=1e-5, first_cell_height=first)
+    settings = FlowMethod(roughness=roughness, viscosity=1e-5, first_cell_height=first)
     return FlowCase(HEIGHT, slope, settings)
 
 
@@ -235,7 +235,7 @@ def wavy(slope: float, roughness: float) -> FlowCase:
     z = height / 2 * (1 - np.cos(2 * np.pi * x))
     line = BedLine((-10.0, *x.tolist(), 13.0), (0.0, *z.tolist(), 0.0), height)
     first = max(1 / 2000, 2.5 * roughness)
-    settings = Flow(roughness=roughness, viscosity=1e-5, first_cell_height=first)
+    settings = FlowMethod(roughness=roughness, viscosity=1e-5, first_cell_height=first)
     domain = {"lid": 5 / height, "upstream": 3 / height, "downstream": 3 / height}
     return FlowCase(height, slope, settings.model_copy(update=domain), line=line)
 

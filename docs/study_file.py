@@ -10,15 +10,17 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from orchestrator.fidelity import limits
-from orchestrator.study import fields, profile, scene
+from orchestrator.study import fields, profile, question, scene
 from orchestrator.study.fidelities import AUTO, WRITTEN
 from orchestrator.study.fields import Quantity
 from orchestrator.study.study import BED, TIME_LIMIT_S
 
 HEAD = f"""# Study files
 
-A study file is TOML. It has a table for each part of a scene: `[fluid]`, `[grain]`, `[bed]`,
-`[flow]`, `[forces]` and `[protocol]`. `[axes]` lists values; every combination is a scene:
+A study file is TOML. Six tables say what is asked: `[fluid]`, `[grain]`, `[bed]`, `[flow]` (what
+flows above), `[forces]` and `[threshold]` (what counts as motion). How it is answered is in
+`[method]`, `[method.flow]` and `[method.grains]`, all of which may be left out. `[axes]` lists
+values; every combination is a scene:
 
 ```toml
 title = "Two grains on three slopes"
@@ -44,12 +46,12 @@ add to them. The [glossary](glossary.md) explains the words.
 | `group` | one group | the experiments |
 
 The *scope* says on which scenes a field has an effect; on others its column in the tables is empty.
-The *column* is named as the field where none is given. A field marked *answer* is about how the
-question is answered, not about the question: the method `auto` and a tolerance may change it
-([ladder.md](ladder.md#how-a-scene-is-answered)), and column `answered_...` of the table of scenes
-has the value that was run. Whether a file writes a default or leaves it out is the same. Ranges are
-intervals; a parenthesis leaves out the end. The [limits](#limits) are what a study refuses within
-the ranges.
+The *column* is named as the field where none is given: the table `scenes` has what was asked, the
+table `methods` how each scene was answered. The method `auto` and a tolerance may change the fields
+of the method ([ladder.md](ladder.md#how-a-scene-is-answered)); `methods` has the values that were
+run. Whether a file writes a default or leaves it out is the same. Ranges are intervals; a
+parenthesis leaves out the end. The [limits](#limits) are what a study refuses within the ranges. A
+key that files of an earlier version had is refused, with what it is called now.
 """
 DAMPED = ", ".join(
     f"{step:g} up to a damping of {most:g}" for most, step in limits.TIMESTEPS
@@ -57,7 +59,7 @@ DAMPED = ", ".join(
 LOW, HIGH = limits.PILE_SLOPES_DEG
 LIMITS = {
     "grain.sizes": (
-        f"the largest grain is more than {scene.LARGEST_RATIO:g} times the smallest: the time of "
+        f"the largest grain is more than {question.LARGEST_RATIO:g} times the smallest: the time of "
         "DEM rises with the square",
         "merge the finest or the coarsest classes of the sieve",
     ),
@@ -77,23 +79,29 @@ LIMITS = {
         "60; single grains may have less",
     ),
     "bed.roughness": (
-        f"above {scene.ROUGHEST:.2g} d, or above the first cell's height",
+        f"above {question.ROUGHEST:.2g} d, or above the first cell's height",
         "d/30 is usual",
     ),
     "bed.height": ("less than five grains", "raise it, or take a level bed"),
-    "bed.width": (f"below {scene.LEAST_WIDTH:g} of the largest grains", "raise it"),
-    "flow.depth, flow.lid": (
-        f"less than {scene.LEAST_DEPTH:g} heights of the forms or obstacles",
+    "bed.width": (f"below {question.LEAST_WIDTH:g} of the largest grains", "raise it"),
+    "flow.depth, method.flow.lid": (
+        f"less than {question.LEAST_DEPTH:g} heights of the forms or obstacles",
         "raise it",
     ),
-    "flow.viscosity": ("a solved flow whose first cell is not turbulent", "lower it"),
-    "flow.model": (f"`waves` over a bed that rises by more than {HIGH:g}°", "`solve`"),
-    "grain.stiffness": (
+    "method.flow.viscosity": (
+        "a solved flow whose first cell is not turbulent",
+        "lower it",
+    ),
+    "method.flow.model": (
+        f"`waves` over a bed that rises by more than {HIGH:g}°",
+        "`solve`",
+    ),
+    "method.grains.stiffness": (
         f"above {scene.MOST_POURED_STIFFNESS:g} in DEM on a poured bed",
         "lower it",
     ),
-    "grain.damping": (f"below {limits.LEAST_DAMPING:g} in DEM", "0.1"),
-    "protocol.time_step": (f"above {DAMPED}", "lower it"),
+    "method.grains.damping": (f"below {limits.LEAST_DAMPING:g} in DEM", "0.1"),
+    "method.grains.time_step": (f"above {DAMPED}", "lower it"),
     "forces.law": ("`zeng-torque` by peeling or DEM", "the method `auto` or `pivot`"),
     "flow.gusts": ("DEM of single grains", "the method `auto` or `pivot`"),
     "grain.cohesion": ("by DEM", "the method `auto`, `peeling` or `pivot`"),
@@ -110,7 +118,7 @@ COLUMNS = "| field | symbol, unit, range | default | meaning | scope | column |"
 
 FIDELITIES = f"""## Fidelities
 
-`protocol.fidelity` names a fidelity, a set of numbers for flow and grains: `fidelity = "paper"` is
+`method.fidelity` names a fidelity, a set of numbers for flow and grains: `fidelity = "paper"` is
 the same as writing its numbers. A number that the file writes itself stands before that of the
 fidelity. With `"{AUTO}"`, the default, the program chooses one by known errors
 ([ladder.md](ladder.md)). A single grain takes the numbers of the grains alone, and over a level bed
@@ -127,13 +135,13 @@ def fidelities() -> str:
     for name, written in WRITTEN.items():
         numbers = [
             f"`{key}` {value}"
-            for key, value in (written["flow"] | written["grains"]).items()
+            for key, value in {**written.flow, **written.grains}.items()
         ]
         cell = ", ".join(numbers)
-        for packing, fields_on in written.get("on", {}).items():
+        for packing, fields_on in written.on.items():
             others = ", ".join(f"`{key}` {value}" for key, value in fields_on.items())
             cell += f"; {packing}: {others}"
-        rows.append(f"| `{name}` | {written['meaning']} | {cell} |")
+        rows.append(f"| `{name}` | {written.meaning} | {cell} |")
     return FIDELITIES + "\n".join(rows) + "\n"
 
 
@@ -146,7 +154,7 @@ def text() -> str:
             about = "One grain on two others, or a pile of grains."
         lines.append(f"## `[{part}]`\n\n{about}\n\n{COLUMNS}\n{'|---' * 6}|")
         rows = (
-            _row(each) for each in fields.FIELDS if each.name.startswith(f"{part}.")
+            _row(each) for each in fields.FIELDS if fields.table_of(each.name) == part
         )
         lines += [*(f"| {' | '.join(row)} |" for row in rows), ""]
     lines.append(fidelities())
@@ -156,7 +164,7 @@ def text() -> str:
 
 
 def _row(quantity: Quantity) -> list[str]:
-    part, _, name = quantity.name.partition(".")
+    part, _, name = quantity.name.rpartition(".")
     field, info = fields.PARTS[part].model_fields[name], quantity.info
     words = info.choices or {
         w: w for w in get_args(field.annotation) if isinstance(w, str)
@@ -174,7 +182,6 @@ def _row(quantity: Quantity) -> list[str]:
     elif value is None:
         default = ""
     scope = "" if info.scope == "every scene" else info.scope
-    role = "" if info.about == "question" else f"*{info.about}*"
     return [
         f"`{name}`",
         ", ".join(
@@ -182,7 +189,7 @@ def _row(quantity: Quantity) -> list[str]:
         ).replace("*", r"\*"),
         default,
         "<br>".join([quantity.meaning, *listed]).replace("*", r"\*"),
-        ", ".join(filter(None, (scope, role))),
+        scope,
         ""
         if quantity.column == name
         else f"`{quantity.column}`".replace("`-`", "none"),

@@ -33,7 +33,9 @@ SORT_S = (
     4.3e-3  # of `pace` on the machine of these times and of those that cases expect, s
 )
 BYTES = 2.2e6  # mean size of a case of the preset `paper`
-BY_DEM = 'protocol.method = "dem", without a tolerance, answers its scenes as they are written'
+BY_DEM = (
+    'method.kind = "dem", without a tolerance, answers its scenes as they are written'
+)
 """What to do where a run of a chosen fidelity has failed."""
 
 
@@ -154,7 +156,7 @@ def of(
     piles = _piles(decisions, cases)
     checking = _piles(checks or {}, cases)
     scenes = [answer.scene for asked, answer in decisions.items() if asked not in piles]
-    grains = {scene.id: scene for scene in scenes if scene.protocol.method == "dem"}
+    grains = {scene.id: scene for scene in scenes if scene.method.kind == "dem"}
     cells = tuple(batches(grains.values()))
     smoothings = {}
     for asked, pile in piles.items():

@@ -9,7 +9,7 @@ from orchestrator.study import study
 
 TITLE = """<script>alert(1)</script> & "sand" d'été"""
 TEXT = f"""title = '''{TITLE}'''
-protocol = {{ load_increment = 0.02, waiting_time = 6.0 }}
+method.grains = {{ load_increment = 0.02, waiting_time = 6.0 }}
 forces = {{ law = "paper" }}
 
 [[group]]
@@ -28,8 +28,8 @@ bed = {{ slope_deg = 15.0 }}
 
 [[group]]
 name = "pile"
-bed = {{ kind = "pile", slope_deg = 15.0, height = 0.01, mobile_layers = 1 }}
-protocol = {{ load_increment = 0.03 }}
+bed = {{ kind = "pile", slope_deg = 15.0, height = 0.01 }}
+method.grains = {{ mobile_layers = 1, load_increment = 0.03 }}
 grain = {{ diameter = 1e-3 }}
 # </pre><b>
 """

@@ -13,7 +13,7 @@ from orchestrator.errors import LONGEST, Fault, InputError, of_exception
 from tests.conftest import Command
 
 GRAINS = """
-protocol = { load_increment = 0.05 }
+method.grains.load_increment = 0.05
 [axes]
 "grain.diameter" = [7e-4, 1e-3]
 """

@@ -75,10 +75,10 @@ kind = "pile"
 slope_deg = 17.0
 height = 0.006
 roughness = "d/30"
-[flow]
+[method.flow]
 model = "waves"
-[protocol]
-method = "dem"
+[method]
+kind = "dem"
 """
 NUMBER = re.compile(rb"(?<![\w.])[-+]?(\d+\.\d+|\d+\.|\.\d+|\d+)(e[-+]?\d+)?(?![\w.])")
 

@@ -60,7 +60,7 @@ def test_a_bad_argument_gets_one_clear_error(
 def test_a_study_from_its_file_to_a_figure(tmp_path: Path) -> None:
     file, out = tmp_path / "grains.toml", tmp_path / "out"
     file.write_text(
-        'protocol.load_increment = 0.05\naxes."grain.diameter" = [7e-4, 1e-3]'
+        'method.grains.load_increment = 0.05\naxes."grain.diameter" = [7e-4, 1e-3]'
     )
     with pytest.raises(InputError, match="workers"):
         orchestrator.run(file, out=out, workers=0)
@@ -75,7 +75,7 @@ def test_a_study_from_its_file_to_a_figure(tmp_path: Path) -> None:
     rows = opened.thresholds
     assert rows["d_m"].tolist() == [7e-4, 1e-3]
     assert rows["usable"].all()
-    assert set(opened.tables) == {"scenes", "single_grain"}
+    assert set(opened.tables) == {"scenes", "methods", "single_grain"}
     assert [*rows][:5] == [
         "d_m",
         "alpha_deg",

@@ -10,7 +10,7 @@ from orchestrator.study.study import parse
 PILE = (
     "fluid.density = 1000.0; fluid.viscosity = 1e-6; grain.density = 2650.0; grain.diameter = 1e-3;"
     'bed.kind = "pile"; bed.slope_deg = 15.0; bed.height = 0.02;'
-    'flow.model = "waves"; protocol.method = "pivot"'
+    'method.flow.model = "waves"; method.kind = "pivot"'
 )
 PROFILE = "x_m,z_m\n0,0\n0.0746410162,0.02\n0.1492820323,0\n"
 
@@ -33,7 +33,7 @@ def shields(place: Path, changes: str) -> list[float]:
         * scene.grain.diameter
     )
     return [
-        each.tau / scale for each in pile.thresholds(place, scene.protocol.fractions)
+        each.tau / scale for each in pile.thresholds(place, scene.threshold.fractions)
     ]
 
 
@@ -43,14 +43,14 @@ def scaled(size: float) -> str:
     return f"{lengths}; fluid.viscosity = {1e-6 * size**1.5}"
 
 
-PEELING, FLAT = 'protocol.method = "peeling"', 'flow.model = "flat"'
+PEELING, FLAT = 'method.kind = "peeling"', 'method.flow.model = "flat"'
 DUNE, FLAT_BED = (
     'bed.shape = "dune"',
     f'bed.shape = "flat"; bed.slope_deg = 0.0; {FLAT}',
 )
 FENCE = '{ kind = "fence", x = -0.3, height = 0.01 }'
 BLOCK = '{ kind = "block", x = -0.1, height = 0.01 }'
-OBSTACLES = 'flow.model = "flat"; bed.obstacles = [{}, {}]'
+OBSTACLES = 'method.flow.model = "flat"; bed.obstacles = [{}, {}]'
 AS_PROFILE = 'bed.profile = "bed.csv"; bed.counted = "windward"'
 
 
@@ -62,8 +62,8 @@ AS_PROFILE = 'bed.profile = "bed.csv"; bed.counted = "windward"'
         ("fluid.density = 9e3; grain.density = 23850.0", "", 1e-6),
         # four times the submerged density
         (f"grain.density = {1000 + 4 * 1650.0}; fluid.viscosity = 2e-6", "", 1e-6),
-        ("bed.mobile_layers = 5", "", 1e-9),
-        ('protocol.method = "local"', "", 5e-3),
+        ("method.grains.mobile_layers = 5", "", 1e-9),
+        ('method.kind = "local"', "", 5e-3),
         ("bed.seed = 3", "", 1e-6),
         (f"bed.roughness = {1e-3 / 30}", 'bed.roughness = "d/30"', 1e-9),
         (f"{DUNE}; bed.lee_slope_deg = 30.0", DUNE, 1e-9),

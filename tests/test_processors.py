@@ -25,29 +25,36 @@ ROOT = Path(__file__).parents[1]
 POURED = """
 title = "Small poured beds"
 fluid = { density = 1000.0, viscosity = 1e-6 }
-grain = { diameter = 1e-3, density = 2650.0, stiffness = 1e3 }
-flow = { model = "flat" }
+grain = { diameter = 1e-3, density = 2650.0 }
+method.flow.model = "flat"
+method.grains.stiffness = 1e3
 
 [bed]
 kind = "pile"
 shape = "flat"
 packing = "poured"
 poured_depth = 3.0
+
+[method.grains]
 mobile_layers = 2
 
-[protocol]
-method = "dem"
+[threshold]
+fractions = [0.1, 0.3]
+
+[method]
+kind = "dem"
+
+[method.grains]
 load_increment = 0.05
 waiting_time = 6.0
 time_step = 0.3
 final_fraction = 0.5
-fractions = [0.1, 0.3]
 
 [[group]]
 name = "pile under its flow"
 grain = { sizes = { sigma_g = 1.2 } }
 bed = { shape = "triangle", slope_deg = 15.0, height = 0.006 }
-flow = { model = "solve", cells_per_face = 20 }
+method.flow = { model = "solve", cells_per_face = 20 }
 
 [[group]]
 name = "mixture"
@@ -57,7 +64,8 @@ bed = { length = 0.02 }
 [[group]]
 name = "strip"
 grain = { sizes = { sigma_g = 1.2 } }
-bed = { length = 0.005, width = 5.0, mobile_layers = 1 }
+bed = { length = 0.005, width = 5.0 }
+method.grains.mobile_layers = 1
 """
 OWN = {
     "cases/*/done.json": "has the times that the run took, and those of its files",

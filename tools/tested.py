@@ -92,7 +92,7 @@ def intervals(rows: pd.DataFrame, strip: Scene) -> pd.DataFrame:
         gusts = {"intensity": INTENSITY, "events": EVENTS} if model.gust > 1 else None
         scene = changed(strip, {**model.fields, "forces.law": law, "flow.gusts": gusts})
         part = flumes[flumes["model"] == model.name]
-        row = {**columns.asked(scene), **columns.answered(scene), "fraction": MOVED}
+        row = {**columns.used(scene), "fraction": MOVED}
         answers[kind_of(row)] = part["value"].to_numpy(float)
     made = going_on_intervals(usual)
     for kind, value in answers.items():

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from orchestrator import digits
 from orchestrator.errors import SolverError
-from orchestrator.study.parts import Grain, Gusts, Protocol, extremes
+from orchestrator.study.method import GrainMethod
+from orchestrator.study.parts import Grain, Gusts, extremes
 from orchestrator.types import FloatArray, IntArray
 
 MEANING = {
@@ -109,7 +110,8 @@ as those of 100."""
 
 def protocol(
     grain: Grain,
-    rules: Protocol,
+    method: GrainMethod,
+    displacement: float,
     enough: int = 0,
     smallest: float = 1,
     gusts: Gusts | None = None,
@@ -120,8 +122,10 @@ def protocol(
     ----------
     grain
         The grains of the scene.
-    rules
-        The protocol of the scene.
+    method
+        Contacts and load steps.
+    displacement
+        Displacement from which a grain counts as moved, d.
     enough
         The load steps end early when no more counted grains have not moved.
     smallest
@@ -138,10 +142,10 @@ def protocol(
     samples = max(round(event / SAMPLING_INTERVAL), 1)
     return {
         "friction": math.tan(math.radians(grain.friction_angle_deg)),
-        "stiffness": grain.stiffness,
-        "damping": grain.damping,
-        "time_step": rules.time_step,
-        "waiting_time": rules.waiting_time,
+        "stiffness": method.stiffness,
+        "damping": method.damping,
+        "time_step": method.time_step,
+        "waiting_time": method.waiting_time,
         "rest_energy": REST_ENERGY,
         "sampling_interval": event / samples,
         "events": gusts.events if gusts else 0,
@@ -150,8 +154,8 @@ def protocol(
         "most_settle": MOST_SETTLE,
         "noise": NOISE,
         "settle_drag": 0.0,
-        "displacement_criterion": rules.displacement_criterion,
-        "stir": min(STIR, rules.displacement_criterion * smallest / 2),
+        "displacement_criterion": displacement,
+        "stir": min(STIR, displacement * smallest / 2),
         "away": AWAY,
         "enough": enough,
     }
@@ -183,7 +187,7 @@ def cost_s(
     load_steps: float,
     grains: float,
     rest: float,
-    rules: Protocol,
+    method: GrainMethod,
     grain: Grain,
     exposed: float = math.nan,
 ) -> float:
@@ -198,8 +202,8 @@ def cost_s(
     rest
         Time until a load step of a lattice ends at rest, sqrt(d/g'); it ends at the
         latest after twice the waiting time.
-    rules, grain
-        The protocol and the grains of the scene. The smallest grain of a poured bed sets
+    method, grain
+        Contacts and load steps, and the grains of the scene. The smallest grain of a poured bed sets
         the time step.
     exposed
         Number of grains that a poured bed exposes; NaN for a lattice.
@@ -210,14 +214,14 @@ def cost_s(
         The time, s.
     """
     if math.isnan(exposed):
-        length = min(rest, 2 * rules.waiting_time)
+        length = min(rest, 2 * method.waiting_time)
         rate = LATTICE_RATE
     else:
         smallest, _ = extremes(grain.sizes, grain.diameter)
         small = math.pow(smallest, 1.5)
-        length = rules.waiting_time * (1 + exposed / SLOWED_BY) / small
+        length = method.waiting_time * (1 + exposed / SLOWED_BY) / small
         rate = POURED_RATE
-    steps = load_steps * length * math.sqrt(grain.stiffness) / rules.time_step
+    steps = load_steps * length * math.sqrt(method.stiffness) / method.time_step
     return 0.1 + steps * grains / rate
 
 

@@ -12,7 +12,8 @@ from math import pi, radians, tan
 import numpy as np
 
 from orchestrator.digits import DIGITS
-from orchestrator.study.parts import Obstacle, PileBed, Range, UnfitError
+from orchestrator.study.declare import UnfitError
+from orchestrator.study.parts import Obstacle, PileBed, Range
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
 UPSTREAM = 10.0

@@ -15,8 +15,9 @@ from numpy.typing import ArrayLike
 
 from orchestrator.bed.line import BedLine
 from orchestrator.digits import whole_up
+from orchestrator.study.declare import UnfitError
 from orchestrator.study.parts import Packing as Pattern
-from orchestrator.study.parts import Range, UnfitError
+from orchestrator.study.parts import Range
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
 TIE = 1e-6

@@ -142,7 +142,7 @@ def _check_exportable(asked: Study, planned: Plan, where: str) -> None:
     """Refuse a study of which a pack cannot hold the scenes."""
     if any(decision.is_chosen for decision in planned.decisions.values()):
         what = "levels were chosen for its scenes"
-        remedy = 'run it with protocol.method = "dem" and no tolerance'
+        remedy = 'run it with method.kind = "dem" and no tolerance'
         raise InputError(
             f"{what}: a pack has the answers of scenes as written",
             where,
@@ -150,9 +150,9 @@ def _check_exportable(asked: Study, planned: Plan, where: str) -> None:
         )
     remedy = "run the study without it into another directory"
     for pile in planned.piles.values():
-        if pile.scene.protocol.update or pile.bed.width:
+        if pile.scene.threshold.update or pile.bed.width:
             what = "a pack holds one flow over each bed, in its plane"
-            fields_of_it = "protocol.update or bed.width"
+            fields_of_it = "threshold.update or bed.width"
             raise InputError(f"{fields_of_it}: {what}", where, remedy)
     for scene in asked.scenes:
         has_gusts = scene.flow.gusts is not None
@@ -247,7 +247,7 @@ def _of_piles(
     """The problems of piles that DEM answers, under the given stress and with one's own."""
     for scene_id, pile in planned.piles.items():
         # replicas of lattices are in the intervals of the others
-        if pile.bed.is_replica or pile.scene.protocol.method != "dem":
+        if pile.bed.is_replica or pile.scene.method.kind != "dem":
             continue
         name = names[scene_id]
         if "pile" in kinds:

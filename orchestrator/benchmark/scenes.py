@@ -87,7 +87,7 @@ def parameters(scene: Scene, kind: str) -> Row:
         grain.density,
         scene.reduced_gravity,
         scene.weight,
-        grain.stiffness,
+        scene.method.grains.stiffness,
     )
     entries = {}
     for key in ENTRIES[kind].split():
@@ -142,7 +142,7 @@ def pivot(name: str, scene: Scene, ours: float) -> Problem:
     """
     threshold = float(study_form.closed_form(scene).friction_velocity)
     # the mean of two load steps is within half a step of what lies between them
-    half = float(np.sqrt(1 + scene.protocol.load_increment))
+    half = float(np.sqrt(1 + scene.method.grains.load_increment))
     ends = (threshold / half, threshold * half)
     row = expectation("ustar_m_s", threshold, PIVOT, None, *ends)
     row["ours"] = ours
@@ -181,7 +181,7 @@ def has_pivot(scene: Scene) -> bool:
     # back
     up_the_slope = np.tan(np.radians(scene.bed.slope_deg))
     rolls = bool(threshold.lift * up_the_slope < threshold.drag)
-    is_quiet = scene.protocol.waiting_time >= LEAST_QUIET
+    is_quiet = scene.method.grains.waiting_time >= LEAST_QUIET
     return study_form.law_holds(scene) and rolls and is_quiet
 
 

@@ -385,7 +385,8 @@ def _as_scene(point: Mapping[str, Any]) -> SingleGrain:
         part, _, field = PARAMETERS[name].field.partition(".")
         value = point[name]
         parts[part][field] = value if isinstance(value, str) else float(value)
-    scene = make_scene({**parts, "protocol": {"method": "pivot"}}, "threshold")
+    parts["method"]["kind"] = "pivot"
+    scene = make_scene(parts, "threshold")
     limits.check(scene, "threshold")
     return single_grain(scene)
 

@@ -17,7 +17,7 @@ from orchestrator.errors import InputError
 from orchestrator.experiments.experiment import Experiment, Results, Runs, label, piles
 from orchestrator.fidelity import limits, spread
 from orchestrator.fidelity.decision import Decision, on_fidelity
-from orchestrator.fidelity.fidelities import OWN, Fidelity, Fields, named
+from orchestrator.fidelity.fidelities import OWN, Fidelity, named
 from orchestrator.fidelity.spread import FROZEN
 from orchestrator.grains.pile import Pile
 from orchestrator.physics.laws import LAWS
@@ -26,6 +26,7 @@ from orchestrator.report.page import Section
 from orchestrator.report.results import FRACTION
 from orchestrator.report.style import Figure
 from orchestrator.study.closed_form import law_holds
+from orchestrator.study.fidelities import Fields
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study, changed, value_of
 from orchestrator.tables.rows import shields
@@ -108,7 +109,7 @@ class Choice:
         Fidelity
             The flow is that of `QUASI_STATIC`; a flow model that is not solved is kept.
         """
-        flow = QUASI_STATIC.flow if scene.flow.model == "solve" else OWN
+        flow = QUASI_STATIC.flow if scene.method.flow.model == "solve" else OWN
         grains = DYNAMIC.grains if self.dynamic else QUASI_STATIC.grains
         return Fidelity(f"{flow.name} | {grains.name}", "", flow, grains)
 
@@ -141,7 +142,7 @@ class Choice:
         others = "lattices" if scene.is_poured else "poured"
         if self.packings == others:
             return False
-        return scene.flow.model == "solve" or not self.of_solved_flow
+        return scene.method.flow.model == "solve" or not self.of_solved_flow
 
     def _holds(self, other: Scene) -> bool:
         """Whether a scene with an alternative is one to compare with."""
@@ -202,14 +203,14 @@ CHOICES: tuple[Choice, ...] = (
     _FirstCell(
         name="first cell",
         why="A wall function asks for no one height of the cells on the bed.",
-        field="flow.first_cell_height",
+        field="method.flow.first_cell_height",
         times=[0.5, 2.0],
         of_solved_flow=True,
     ),
     Choice(
         name="turbulence model",
         why="No model is right for all flows that separate.",
-        field="flow.turbulence_model",
+        field="method.flow.turbulence_model",
         values=["kEpsilon", "RNGkEpsilon", "realizableKE", "kOmegaSST"],
         of_solved_flow=True,
     ),
@@ -266,7 +267,7 @@ CHOICES: tuple[Choice, ...] = (
     Choice(
         name="criterion of motion",
         why="What counts as moved is a convention: a sixth to a half of a diameter.",
-        field="protocol.displacement_criterion",
+        field="threshold.displacement",
         values=[0.15, 0.5],
     ),
     Choice(
@@ -280,7 +281,7 @@ CHOICES: tuple[Choice, ...] = (
         name=FROZEN,
         why="The paper, and every level, keeps the flow of the whole pile until the "
         "last grain has gone. Else the bed line is drawn anew after each tenth.",
-        field="protocol.update",
+        field="threshold.update",
         values=[0.1],
         of_solved_flow=True,
     ),
@@ -408,7 +409,7 @@ def measure(listed: Sequence[Change], runs: Runs) -> pd.DataFrame:
     thresholds = {}
     for key, pile in runs.planned.piles.items():
         if runs.are_done(key):
-            fractions = pile.scene.protocol.fractions
+            fractions = pile.scene.threshold.fractions
             thresholds[key] = pile.thresholds(runs.cases, fractions)
     rows = []
     for change in done:

@@ -127,7 +127,8 @@ def names_of(scenes: Sequence[Scene]) -> list[str]:
     """A name for each of some different piles, from what tells it from the others."""
     table = pd.DataFrame([fields.asked(scene) for scene in scenes])
     differing = [name for name in table if table[name].nunique(dropna=False) > 1]
-    columns = fields.others(differing, *IN_NAME)
+    apart = set(differing) - {*IN_NAME, *fields.TWINS}
+    columns = [column for column in fields.COLUMNS if column in apart]
     found: list[str] = []
     for scene, (_, row) in zip(scenes, table.iterrows(), strict=True):
         bed = scene.bed

@@ -145,7 +145,7 @@ def _pair(flow: Rung, grains: Rung) -> Fidelity:
 
 def _pairs(scene: Scene, bed: PileBed) -> Iterator[Fidelity]:
     """The pairs of rungs that are measured on a pile."""
-    is_dem = scene.protocol.method == "dem"
+    is_dem = scene.method.kind == "dem"
     line = of_bed(bed)
     exposed = line.lengths[line.counted(bed.counts)].sum() / scene.grain.diameter - 1e-6
 
@@ -176,7 +176,7 @@ def points(pairs: Mapping[str, Decision], runs: Runs) -> pd.DataFrame:
             continue
         motion = pile.motion(runs.cases)
         here_s = 0.0 if pile.method.cases else time_alone_s(pile, runs.cases)
-        names = {f"tau_{at:g}": at for at in scene.protocol.fractions}
+        names = {f"tau_{at:g}": at for at in scene.threshold.fractions}
         names |= {f"curve_{at:.2f}": at for at in CURVE.tolist()}
         speed, density = pile.speed(runs.cases), scene.fluid.density
         row: Row = {
@@ -184,7 +184,7 @@ def points(pairs: Mapping[str, Decision], runs: Runs) -> pd.DataFrame:
             "scene": label(scene),
             **point(scene),
             "packing": packing(scene) + (", level bed" if pile.bed.is_level else ""),
-            "asked": scene.protocol.method,
+            "asked": scene.method.kind,
             **{f"class_{part}": scene_class(part, scene) for part in RUNGS},
             "count": motion.count,
             "flow_rung": pair.flow.name,

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orchestrator.bed.packing import Packing
-from orchestrator.fidelity.fidelities import Fields
 from orchestrator.grains import sheltering
 from orchestrator.grains.peeling import FINE_TABLE, RANGE, Force, ForceTable
 from orchestrator.physics.laws import CLIFT_GAUVIN, LAWS, Exposure
 from orchestrator.physics.threshold import weight
+from orchestrator.study.fidelities import Fields
 from orchestrator.types import FloatArray
 
 LAW = LAWS["bridged-gravel"]

@@ -30,7 +30,7 @@ from orchestrator.report.page import Section
 from orchestrator.report.style import Figure
 from orchestrator.runs import case
 from orchestrator.study.closed_form import resolved
-from orchestrator.study.fields import PARTS
+from orchestrator.study.keys import by_name
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import make_scene
 from orchestrator.types import Row
@@ -152,7 +152,7 @@ def _axis(axis: Mapping[str, Any]) -> Iterator[tuple[Any, Mapping[str, Any]]]:
     """The places of an axis: the label, and the fields that it sets."""
     if "fractions" in axis:
         fractions = [float(value) for value in axis["fractions"]]
-        yield None, {"protocol.fractions": fractions}
+        yield None, {"threshold.fractions": fractions}
     for entry in axis.get("entries", ()):
         yield entry["label"], entry["set"]
     for value in axis.get("values", ()):
@@ -175,13 +175,13 @@ def _scenes(
 
     In the transition it is one for each force law.
     """
-    parts = {part: dict(data.get(part, {})) for part in PARTS}
-    for key, value in changes.items():
-        part, _, field = key.partition(".")
-        parts[part].pop(field, None)
+    tables = by_name(data)
+    for name, value in changes.items():
+        table, _, field = name.rpartition(".")
+        tables[table].pop(field, None)
         if value != DEFAULT:
-            parts[part][field] = value
-    scenes = next(resolved([make_scene(parts, where)]))
+            tables[table][field] = value
+    scenes = next(resolved([make_scene(tables, where)]))
     return tuple(written(scene) for scene in scenes)
 
 
@@ -342,7 +342,7 @@ def _errors_of_pile(
 
     A fraction that neither reached has none.
     """
-    fractions = scene.protocol.fractions if fraction is None else (fraction,)
+    fractions = scene.threshold.fractions if fraction is None else (fraction,)
     pile = runs.planned.piles[scene.id]
     other = runs.planned.piles[reference.id]
     found = pile.thresholds(runs.cases, fractions)

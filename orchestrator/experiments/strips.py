@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 
 from orchestrator.bed.packing import Packing, Places
-from orchestrator.fidelity.fidelities import Fields
 from orchestrator.grains import peeling, threshold
 from orchestrator.grains.loads import Geometry
 from orchestrator.grains.threshold import EQUAL_MOBILITY
+from orchestrator.study.fidelities import Fields
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import changed
 from orchestrator.types import BoolArray, FloatArray

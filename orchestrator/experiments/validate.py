@@ -19,7 +19,6 @@ from orchestrator.experiments.experiment import Experiment, Results, Runs
 from orchestrator.experiments.sphere import speed_of, sphere
 from orchestrator.experiments.strips import PERCENTILES, ROUGH, Strips
 from orchestrator.fidelity.decision import as_asked
-from orchestrator.fidelity.fidelities import Fields
 from orchestrator.flow.stress import WallStress, bubble
 from orchestrator.physics import saltation
 from orchestrator.physics.constants import GAS_BELOW, GRAVITY
@@ -31,6 +30,7 @@ from orchestrator.physics.threshold import threshold as threshold_of
 from orchestrator.report import style
 from orchestrator.report.page import Section
 from orchestrator.report.style import Figure
+from orchestrator.study.fidelities import Fields
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
 from orchestrator.types import FloatArray

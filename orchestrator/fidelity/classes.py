@@ -10,7 +10,7 @@ import math
 from orchestrator.bed.line import of_bed
 from orchestrator.fidelity.fidelities import packing
 from orchestrator.study.closed_form import closed_form, outer_roughness
-from orchestrator.study.fields import PARTS
+from orchestrator.study.fields import default_of
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene, default_first_cell_height
 from orchestrator.study.study import value_of
@@ -30,26 +30,25 @@ NEAR_ROWS = ("aligned", f"disordered up to {LEAST_DISORDER:g} d")
 CURVED_SHAPES = ("cosine", "gaussian", "rushil")
 LIFTED_TO = 1.235  # largest lift over the weight normal to the bed that was measured
 SAME_CELL = 0.02  # relative difference of the first cell that changes no known error
-AT_LEAST = ("flow.lid", "flow.upstream", "flow.downstream")  # as good where larger
+AT_LEAST = (
+    "method.flow.lid",
+    "method.flow.upstream",
+    "method.flow.downstream",
+)  # as good where larger
 SETTINGS = (
     *AT_LEAST,
-    "flow.turbulence_model",
-    "flow.convection_scheme",
+    "method.flow.turbulence_model",
+    "method.flow.convection_scheme",
     "forces.averaging_length",
     "forces.loaded_grains",
     "forces.exposure",
     "forces.sheltering",
     "grain.cohesion",
-    "protocol.displacement_criterion",
+    "threshold.displacement",
 )
 
 
-def _default(name: str) -> object:
-    part, field = name.split(".")
-    return PARTS[part].model_fields[field].default
-
-
-DEFAULTS = {name: _default(name) for name in SETTINGS}
+DEFAULTS = {name: default_of(name) for name in SETTINGS}
 """Fields that move an answer and that the ladder keeps at their defaults."""
 
 
@@ -150,9 +149,9 @@ def unmeasured(scene: Scene) -> str:
         return f"a lift of {lift:.3g} times the weight normal to the bed"
     if scene.flow.gusts:
         return f"flow.gusts = {scene.flow.gusts}"
-    is_solved = scene.flow.model == "solve"
+    is_solved = scene.method.flow.model == "solve"
     for name, default in DEFAULTS.items():
-        if name.startswith("flow.") and not is_solved:
+        if name.startswith("method.flow.") and not is_solved:
             continue
         value = value_of(scene, name)
         is_other = value < default if name in AT_LEAST else value != default
@@ -163,7 +162,7 @@ def unmeasured(scene: Scene) -> str:
 
 def _unmeasured_solve(scene: Scene) -> str:
     """The number of a solved flow for which nothing was measured, in words."""
-    bed, roughness = scene.bed, scene.flow.roughness
+    bed, roughness = scene.bed, scene.method.flow.roughness
     assert isinstance(bed, PileBed)
     default = default_first_cell_height(bed.relief, scene.solve_roughness)
     if abs(scene.first_cell_height / default - 1) > SAME_CELL:
@@ -174,4 +173,4 @@ def _unmeasured_solve(scene: Scene) -> str:
     for near in (bed.roughness, outer_roughness(scene) or bed.roughness):
         if abs(math.log2(roughness / near)) <= 0.5 + 1e-6:
             return ""
-    return f"flow.roughness = {roughness:.3g} m"
+    return f"method.flow.roughness = {roughness:.3g} m"

@@ -2,7 +2,7 @@
 
 The decision depends on the values of the scene's fields and on the tolerance. It
 depends neither on other scenes of the study and their order, nor on how a study file
-spells the values: ``auto``, the default of `protocol.method`, is a value like any
+spells the values: ``auto``, the default of `method.kind`, is a value like any
 other.
 """
 
@@ -17,7 +17,7 @@ from orchestrator.fidelity.fidelities import FIDELITIES, LOCAL, Fidelity, fideli
 from orchestrator.fidelity.known import UNKNOWN, Known, known
 from orchestrator.grains.loads import LONGEST_PACKED, Geometry, has_rows_along
 from orchestrator.grains.pile import Pile
-from orchestrator.study.fields import FIELDS, PARTS
+from orchestrator.study.fields import FIELDS, default_of
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import changed, value_of
@@ -30,22 +30,19 @@ LONG_BED = f"more than {LONGEST_PACKED:g} grains long"
 ALONG = f"{LONG_BED}: closed form along the bed, checked where motion starts"
 CHOSEN = FIDELITIES[:-1]
 """The fidelities that a choice may take: errors are measured against the last one."""
-KEPT = ("flow.speed", "flow.viscosity")
+KEPT = ("method.flow.speed", "method.flow.viscosity")
 """Numbers of the solve that every fidelity keeps: u*/U_e is the same at each of them
 (docs/flow.md). Their values do not ask for DEM."""
+
+
+WITHOUT_NUMBER = ("method.kind", "method.flow.model", *KEPT)
 
 
 def _numbers() -> dict[str, object]:
     numbers = {}
     for field in FIELDS:
-        if field.info.about != "answer" or field.name in (
-            "protocol.method",
-            "flow.model",
-            *KEPT,
-        ):
-            continue
-        part, name = field.name.split(".")
-        numbers[field.name] = PARTS[part].model_fields[name].default
+        if field.is_method and field.name not in WITHOUT_NUMBER:
+            numbers[field.name] = default_of(field.name)
     return numbers
 
 
@@ -92,13 +89,13 @@ class Decision:
     @property
     def is_along(self) -> bool:
         """Whether the closed form along the bed answers because the bed is long."""
-        return self.fidelity is LOCAL and self.asked.protocol.method == "auto"
+        return self.fidelity is LOCAL and self.asked.method.kind == "auto"
 
     @property
     def is_unchecked(self) -> bool:
         """Whether it is a pile for which a fidelity without DEM was chosen."""
         is_pile = isinstance(self.scene.bed, PileBed)
-        return is_pile and self.is_chosen and self.scene.protocol.method != "dem"
+        return is_pile and self.is_chosen and self.scene.method.kind != "dem"
 
 
 def decide(scene: Scene, tolerance: float | None) -> Decision:
@@ -167,9 +164,9 @@ def on_fidelity(
 @cache
 def written(scene: Scene) -> Scene:
     """A scene as it is written, with the method that answers in place of ``auto``."""
-    if scene.protocol.method != "auto":
+    if scene.method.kind != "auto":
         return scene
-    return changed(scene, {"protocol.method": method_of(scene)[0]})
+    return changed(scene, {"method.kind": method_of(scene)[0]})
 
 
 @cache
@@ -181,7 +178,7 @@ def method_of(scene: Scene) -> tuple[str, str]:
     nor with what DEM does not know. There it is the closed form along the bed, else
     peeling, else pivots.
     """
-    method, bed = scene.protocol.method, scene.bed
+    method, bed = scene.method.kind, scene.bed
     if method != "auto":
         return method, f"the study asks for the method {method}"
     unknown = scene.unknown_to_dem
@@ -207,7 +204,7 @@ def is_along(scene: Scene) -> bool:
 
     Its rows have to lie along the bed, and each grain has to feel the flow by itself.
     """
-    if not has_rows_along(scene) or scene.protocol.update:
+    if not has_rows_along(scene) or scene.threshold.update:
         return False
     return scene.forces.sheltering == "none" and _is_long(scene)
 
@@ -222,15 +219,15 @@ def _is_long(scene: Scene) -> bool:
 def _of_grain(scene: Scene, tolerance: float | None) -> Decision:
     """The decision on a single grain: with a tolerance by an exact closed form."""
     as_written = as_asked(scene)
-    if tolerance is None or as_written.scene.protocol.method != "dem":
+    if tolerance is None or as_written.scene.method.kind != "dem":
         return as_written
-    if scene.protocol.waiting_time < LEAST_HELD:
+    if scene.method.grains.waiting_time < LEAST_HELD:
         return as_asked(scene, "the study asks for a ramp of the flow")
     if scene.bed.slope_deg > scene.bed.entrainment_angle_deg:
         return as_asked(
             scene, "a slope beyond the entrainment angle: the closed form is off"
         )
-    exact = changed(scene, {"protocol.method": "pivot"})
+    exact = changed(scene, {"method.kind": "pivot"})
     return Decision(scene, exact, None, UNKNOWN, EXACT, is_chosen=True)
 
 
@@ -239,7 +236,7 @@ def _why_as_written(scene: Scene, tolerance: float | None) -> str | None:
 
     It is empty where the method says it all.
     """
-    method = scene.protocol.method
+    method = scene.method.kind
     if method not in ("auto", "dem"):
         return ""
     if method == "auto" and (scene.unknown_to_dem or is_along(scene)):
@@ -250,11 +247,11 @@ def _why_as_written(scene: Scene, tolerance: float | None) -> str | None:
         if why := _why_not_by_default(scene):
             return why
     # the fidelities approximate DEM in a held, solved flow
-    if scene.flow.model != _best_model(scene):
-        return f"the study asks for the flow model {scene.flow.model}"
-    if scene.protocol.update:
+    if scene.method.flow.model != _best_model(scene):
+        return f"the study asks for the flow model {scene.method.flow.model}"
+    if scene.threshold.update:
         return "no error is known for a bed that changes"
-    if scene.protocol.waiting_time < LEAST_HELD:
+    if scene.method.grains.waiting_time < LEAST_HELD:
         return "the study asks for a ramp of the flow"
     beyond = unmeasured(scene)
     if beyond:
@@ -287,7 +284,7 @@ def _looked_up(scene: Scene, most: float) -> tuple[Fidelity | None, str]:
     reference: errors below that uncertainty cannot be ranked. No fidelity where no
     error is known.
     """
-    is_long = scene.protocol.method == "auto" and _is_long(scene)
+    is_long = scene.method.kind == "auto" and _is_long(scene)
     errors: dict[Fidelity, Known] = {}
     for one in CHOSEN:
         if is_long and one.is_dem:
@@ -323,7 +320,7 @@ def checks(answers: Iterable[Decision]) -> dict[str, Decision]:
     for answer in answers:
         if not answer.is_unchecked:
             continue
-        dem = changed(answer.asked, {"protocol.method": "dem"})
+        dem = changed(answer.asked, {"method.kind": "dem"})
         member = (Pile(dem).case.cost_s, answer.asked.id, dem)
         group = _check_group(answer.asked)
         cheapest[group] = min(

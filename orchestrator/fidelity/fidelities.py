@@ -8,28 +8,24 @@ writes each of them out.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
-from orchestrator.digits import rounded, whole_up
+from orchestrator.digits import rounded
 from orchestrator.physics.constants import KARMAN
-from orchestrator.study import fidelities as named_sets
+from orchestrator.study import fidelities as written
 from orchestrator.study.closed_form import closed_form, outer_roughness
-from orchestrator.study.parts import PileBed, extremes
-from orchestrator.study.scene import LEAST_WIDTH, Scene
+from orchestrator.study.fidelities import Fields
+from orchestrator.study.parts import PileBed
+from orchestrator.study.scene import Scene
 from orchestrator.study.study import changed, value_of
 
-Fields = Mapping[str, Any]  # values of a scene's fields, named as in a study file
-STRIP_WIDTH = (
-    5.0  # of the bed of the rung `strip`, d; more where the largest grains need it
-)
 FINER = {
-    "flow.cells_per_face": 1,
-    "flow.expansion_ratio": -1,
-    "bed.mobile_layers": 1,
-    "grain.stiffness": 1,
-    "protocol.time_step": -1,
-    "protocol.waiting_time": 1,
-    "protocol.load_increment": -1,
+    "method.flow.cells_per_face": 1,
+    "method.flow.expansion_ratio": -1,
+    "method.grains.mobile_layers": 1,
+    "method.grains.stiffness": 1,
+    "method.grains.time_step": -1,
+    "method.grains.waiting_time": 1,
+    "method.grains.load_increment": -1,
 }
 """Numbers of a fidelity, and whether a larger (1) or a smaller one (-1) is finer."""
 
@@ -49,8 +45,8 @@ class Rung:
     not_on
         The packings that it cannot answer.
     derived
-        The field that follows from the scene: "threshold_speed", "paper_stiffness",
-        "strip_width"; else empty.
+        The field that follows from the scene: "threshold_speed" or "paper_stiffness";
+        else empty.
     same_model
         Whether it is of the model of the reference, so that its difference is an error.
     most_grains
@@ -73,15 +69,15 @@ class Rung:
         """
         bed = scene.bed
         assert isinstance(bed, PileBed)
-        if self.sets.get("flow.model") == "waves":
+        if self.sets.get("method.flow.model") == "waves":
             return scene.flow.top == "boundary layer" and not bed.obstacles
         return packing(scene) not in self.not_on
 
     def changes(self, scene: Scene) -> Fields:
         """The fields that it sets where it answers: of fine sand z0, too."""
         fields = dict(self.fields(scene))
-        if self.sets.get("flow.model", "flat") != "flat":
-            fields["flow.roughness"] = outer_roughness(scene)
+        if self.sets.get("method.flow.model", "flat") != "flat":
+            fields["method.flow.roughness"] = outer_roughness(scene)
         return fields
 
     def describes(self, scene: Scene, *, or_finer: bool = False) -> bool:
@@ -105,15 +101,11 @@ class Rung:
         if self.derived == "threshold_speed":
             ustar = float(closed_form(scene).friction_velocity)
             speed = ustar / KARMAN * math.log1p(10 * bed.height / bed.roughness)
-            fields["flow.speed"] = float(f"{speed:.6g}")
-            fields["flow.first_cell_height"] = scene.first_cell_height
+            fields["method.flow.speed"] = float(f"{speed:.6g}")
+            fields["method.flow.first_cell_height"] = scene.first_cell_height
         elif self.derived == "paper_stiffness":
             stiffness = 1e6 * scene.grain.diameter / scene.weight  # of 1e6 N/m
-            fields["grain.stiffness"] = rounded(stiffness)
-        elif self.derived == "strip_width":
-            largest = extremes(scene.grain.sizes, scene.grain.diameter)[1]
-            least = max(STRIP_WIDTH, float(whole_up(LEAST_WIDTH * largest)))
-            fields["bed.width"] = least if scene.is_poured else 0.0
+            fields["method.grains.stiffness"] = rounded(stiffness)
         return fields
 
 
@@ -129,7 +121,7 @@ class Fidelity:
     @property
     def is_dem(self) -> bool:
         """Whether grains are moved by DEM."""
-        return bool(self.grains.sets["protocol.method"] == "dem")
+        return bool(self.grains.sets["method.kind"] == "dem")
 
     def takes(self, scene: Scene) -> bool:
         """Whether it can answer a pile."""
@@ -163,17 +155,16 @@ def packing(scene: Scene) -> str:
 
 def _load() -> tuple[Fidelity, ...]:
     loaded = []
-    for name, row in named_sets.WRITTEN.items():
-        meaning = row["meaning"]
-        flow = Rung(name, meaning, row["flow"])
-        grains = Rung(
-            name, meaning, row["grains"], row.get("on", {}), row.get("not_on", ())
-        )
-        loaded.append(Fidelity(name, meaning, flow, grains))
+    for name, row in written.WRITTEN.items():
+        flow = Rung(name, row.meaning, row.flow)
+        grains = Rung(name, row.meaning, row.grains, row.on, row.not_on)
+        loaded.append(Fidelity(name, row.meaning, flow, grains))
     return tuple(loaded)
 
 
-FLAT = Rung("flat", "log law on a flat bed: u*₀ everywhere", {"flow.model": "flat"})
+FLAT = Rung(
+    "flat", "log law on a flat bed: u*₀ everywhere", {"method.flow.model": "flat"}
+)
 FIDELITIES = _load()
 """The fidelities, from cheap to dear: the last one is the reference."""
 QUICK, REFERENCE = FIDELITIES[0], FIDELITIES[-1]
@@ -184,7 +175,7 @@ LOCAL = Fidelity(
     "local",
     "closed form along the bed line",
     OWN,
-    Rung("local", "closed form along the bed line", {"protocol.method": "local"}),
+    Rung("local", "closed form along the bed line", {"method.kind": "local"}),
 )
 """A way without grains, for beds that have too many: its error is that of pivots."""
 

@@ -21,7 +21,8 @@ from orchestrator.grains.loads import Geometry
 from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.study import units
-from orchestrator.study.parts import PileBed, UnfitError
+from orchestrator.study.declare import UnfitError
+from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import ASKED, Study
 
@@ -102,7 +103,9 @@ def exceeded(scene: Scene, *, grains: bool = True) -> Iterator[Limit]:
     if isinstance(bed, PileBed):
         yield from _pile(scene, bed) if grains else ()
         yield from (
-            _solve(scene, bed) if scene.flow.model == "solve" else _theory(scene, bed)
+            _solve(scene, bed)
+            if scene.method.flow.model == "solve"
+            else _theory(scene, bed)
         )
     if not grains:
         return
@@ -118,7 +121,7 @@ def exceeded(scene: Scene, *, grains: bool = True) -> Iterator[Limit]:
             "read it by DEM, which differs from the closed form, or lower the slope"
         )
         yield Limit("slope", "bed.slope_deg", what, remedy, refused=False)
-    if scene.protocol.method == "dem":
+    if scene.method.kind == "dem":
         yield from _dem(scene)
 
 
@@ -161,7 +164,7 @@ def _for_long(scene: Scene) -> str:
     if scene.is_poured:
         return "a shorter bed"
     if is_along(scene):
-        return 'protocol.method = "local", or a range of bed.counted'
+        return 'method.kind = "local", or a range of bed.counted'
     return "a range of bed.counted, or a shorter bed"
 
 
@@ -189,7 +192,7 @@ def _unfit(scene: Scene, bed: PileBed, line: BedLine) -> str:
 
 
 def _theory(scene: Scene, bed: PileBed) -> Iterator[Limit]:
-    if scene.flow.model == "flat":
+    if scene.method.flow.model == "flat":
         return
     line = of_bed(bed)
     seen = seen_by_the_flow(line)
@@ -198,21 +201,23 @@ def _theory(scene: Scene, bed: PileBed) -> Iterator[Limit]:
     if slope > PILE_SLOPES_DEG[1] + 1e-6:
         place = f"x = {seen.x[at]:.4g} m"
         what = f"a bed that rises by {slope:.3g} deg at {place} is no low one"
-        yield Limit("slope", "flow.model", what, 'choose "solve"')
+        yield Limit("slope", "method.flow.model", what, 'choose "solve"')
 
 
 def _solve(scene: Scene, bed: PileBed) -> Iterator[Limit]:
     z0, cell = scene.solve_roughness, scene.first_cell_height
     if bed.is_level:
         what = "over a flat bed there is nothing to solve: u* is u*_0 everywhere"
-        yield Limit("slope", "flow.model", what, 'choose "flat"')
+        yield Limit("slope", "method.flow.model", what, 'choose "flat"')
     if z0 > cell:
         what = f"z0 = {z0:g} m is above twice z_e = {cell / 2:g} m"
         what += ", the centre of the first cell"
-        remedy = "lower it, or raise flow.first_cell_height or bed.height"
+        remedy = "lower it, or raise method.flow.first_cell_height or bed.height"
         remedy += "; z_e of z0 is sound"
         yield Limit("first-cell", "bed.roughness", what, remedy)
-    ustar0 = float(log_law_ustar(scene.flow.speed, SPEED_HEIGHT * bed.relief, z0))
+    ustar0 = float(
+        log_law_ustar(scene.method.flow.speed, SPEED_HEIGHT * bed.relief, z0)
+    )
     ratio = KARMAN * ustar0 * cell / 2 / scene.solve_viscosity
     if ratio < 1:
         what = "not turbulent: the first cell's eddy viscosity"
@@ -220,33 +225,43 @@ def _solve(scene: Scene, bed: PileBed) -> Iterator[Limit]:
         remedy = (
             "take the field of a lower viscosity or a higher speed: u*/U_e is the same"
         )
-        yield Limit("similarity", "flow.viscosity", what, remedy)
-    if (scheme := scene.flow.convection_scheme) != "linearUpwind":
+        yield Limit("similarity", "method.flow.viscosity", what, remedy)
+    if (scheme := scene.method.flow.convection_scheme) != "linearUpwind":
         what = f"{scheme} does not converge to the same answer, or not at all"
-        field = "flow.convection_scheme"
+        field = "method.flow.convection_scheme"
         yield Limit("mesh-scheme-15", field, what, "linearUpwind", refused=False)
 
 
 def _dem(scene: Scene) -> Iterator[Limit]:
-    rules, damping = scene.protocol, scene.grain.damping
+    rules = scene.method.grains
+    damping = rules.damping
     if rules.time_step > (most := largest_timestep(damping)):
         what = f"{rules.time_step:g} sqrt(m/K) is above {most:g}"
         what += f" at a damping of {damping:g}"
         yield Limit(
-            "timestep-damping", "protocol.time_step", what, "lower it, or the damping"
+            "timestep-damping",
+            "method.grains.time_step",
+            what,
+            "lower it, or the damping",
         )
     if damping < LEAST_DAMPING:
         what = f"at a damping of {damping:g} a bed does not come to rest"
-        yield Limit("timestep-damping", "grain.damping", what, "0.1 is sound")
+        yield Limit("timestep-damping", "method.grains.damping", what, "0.1 is sound")
     if not isinstance(scene.bed, PileBed):
         return
     if rules.waiting_time < WAITING_TIME:
         what = f"load steps that wait {rules.waiting_time:g} sqrt(d/g')"
         what += " are a ramp of the flow"
         remedy = "raise it, unless a ramp is what you want"
-        yield Limit("quiet-step", "protocol.waiting_time", what, remedy, refused=False)
+        yield Limit(
+            "quiet-step", "method.grains.waiting_time", what, remedy, refused=False
+        )
     if (step := rules.load_increment) > COARSE_STEP:
         what = f"load steps {step:.0%} apart leave the threshold that wide an interval"
         yield Limit(
-            "quiet-step", "protocol.load_increment", what, "lower it", refused=False
+            "quiet-step",
+            "method.grains.load_increment",
+            what,
+            "lower it",
+            refused=False,
         )

@@ -5,7 +5,8 @@ import warnings
 from orchestrator.errors import InputError
 from orchestrator.fidelity import limits
 from orchestrator.grains.loads import has_rows_along
-from orchestrator.study.parts import PileBed, UnfitError
+from orchestrator.study.declare import UnfitError
+from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import changed
 
@@ -59,8 +60,8 @@ def _with_smoothing(scene: Scene, length: float) -> Scene:
     assert scene.bed.profile is not None
     fields = scene.bed.profile.smoothed(length)
     values = {f"bed.{name}": value for name, value in fields.items()}
-    values |= {"bed.smoothing": length, "protocol.method": "local"}
-    made = changed(scene, {**values, "protocol.update": 0.0})
+    values |= {"bed.smoothing": length, "method.kind": "local"}
+    made = changed(scene, {**values, "threshold.update": 0.0})
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the scene itself has warned
         limits.check(made, "")

@@ -72,7 +72,7 @@ def spread(scene: Scene, fraction: float) -> Spread:
     of a bed that changes already, nor of a flow that is not solved.
     """
     of_class = _spread(model_class(scene), fraction)
-    if scene.protocol.update or scene.flow.model != "solve":
+    if scene.threshold.update or scene.method.flow.model != "solve":
         return of_class._replace(frozen_bed=math.nan)
     return of_class
 

@@ -40,6 +40,7 @@ from orchestrator.physics.velocity import (
 from orchestrator.runs.case import Case
 from orchestrator.runs.files import canonical_json, digest_text
 from orchestrator.solvers import openfoam
+from orchestrator.study.method import FlowMethod
 from orchestrator.study.parts import Flow
 from orchestrator.study.profile import Profile
 from orchestrator.types import FloatArray
@@ -103,19 +104,23 @@ class FlowCase(Case):
     slope_deg
         Steepest slope of the windward faces, degrees; 0 if there are none.
     settings
-        The flow, with the roughness, the viscosity and the first cell given.
+        The numbers of the solve, with the roughness, the viscosity and the first cell
+        given.
     line
         The bed line, m; by default a triangle of the slope and the height, or a flat
         bed.
     profile
         A measured profile, of which the case gets a copy.
+    above
+        What is above the flow; it has no gusts.
     """
 
     height_m: float
     slope_deg: float
-    settings: Flow
+    settings: FlowMethod
     line: BedLine | None = None
     profile: Profile | None = field(default=None, compare=False)
+    above: Flow = field(default_factory=Flow)
 
     kind: ClassVar[str] = "flow"
     template: ClassVar[str] = "openfoam/pile"
@@ -136,6 +141,7 @@ class FlowCase(Case):
         """The settings, the height and the slope, and a digest of the bed line."""
         return {
             **self.settings.model_dump(mode="json"),
+            **self.above.model_dump(mode="json"),
             "height": float(self.height_m),
             "slope_deg": float(self.slope_deg),
             "bed_line": digest_text(canonical_json(self.bed_line.corners.tolist())),
@@ -159,8 +165,8 @@ class FlowCase(Case):
     @property
     def lid(self) -> float:
         """Height of the lid, or depth of a channel, over the flat bed, h."""
-        if self.settings.depth:
-            return self.settings.depth / self.height_m
+        if self.above.depth:
+            return self.above.depth / self.height_m
         return self.settings.lid
 
     @property
@@ -171,7 +177,7 @@ class FlowCase(Case):
     @property
     def is_closed(self) -> bool:
         """Whether the flow has a wall above it."""
-        return self.settings.top == "closed channel"
+        return self.above.top == "closed channel"
 
     @property
     def ustar0_m_s(self) -> float:
@@ -231,11 +237,11 @@ class FlowCase(Case):
         if self.growth > MOST_GROWTH:
             ratio = f"{self.growth:.3g}, more than {MOST_GROWTH:g}"
             what = f"neighbouring cells differ by {ratio}"
-            remedy = "lower it, or raise flow.cells_per_face"
-            raise InputError(what, where="flow.expansion_ratio", remedy=remedy)
-        if not self.settings.depth and self.lid < LEAST_LID:
+            remedy = "lower it, or raise method.flow.cells_per_face"
+            raise InputError(what, where="method.flow.expansion_ratio", remedy=remedy)
+        if not self.above.depth and self.lid < LEAST_LID:
             what = f"{self.lid:g} is below {LEAST_LID:g} heights of the forms"
-            raise InputError(what, where="flow.lid", remedy="raise it")
+            raise InputError(what, where="method.flow.lid", remedy="raise it")
         shortest, start, end = self.grid.shortest
         if shortest >= LEAST_CELL * self.first_cell_m:
             return
@@ -247,7 +253,7 @@ class FlowCase(Case):
             where = "bed.obstacles"
             remedy = (
                 "make the obstacle larger, leave it out,"
-                " or lower flow.first_cell_height"
+                " or lower method.flow.first_cell_height"
             )
         else:
             where = "bed.profile" if self.profile else "bed"
@@ -356,7 +362,7 @@ class FlowCase(Case):
         # ended.
         residual = RESIDUAL * min(1.0, CELLS_ALONG / self.grid.cells)
         return {
-            "top": TOPS[self.settings.top],
+            "top": TOPS[self.above.top],
             "speedHeight": SPEED_HEIGHT * self.height_m,
             "lidHeight": self.lid_m,
             "columnOffset": -self.height_m,
@@ -431,7 +437,7 @@ class FlowCase(Case):
         self._check_stress(stress, directory)
         stress.to_csv(directory / WALL_STRESS)
         mean_speed = None
-        if self.settings.depth:
+        if self.above.depth:
             mean_speed = self.mean_speed_over_log_law(solved)
         approach = solved.ustar0 / self.ustar0_m_s
         table = diagnostics(
@@ -484,7 +490,8 @@ class FlowCase(Case):
         if not is_right:
             span = f"{over.min():.3g} to {over.max():.3g}"
             what = f"z_e is {span} of that of the first cells"
-            remedy = "lower flow.expansion_ratio, or raise flow.first_cell_height"
+            lower = "lower method.flow.expansion_ratio"
+            remedy = f"{lower}, or raise method.flow.first_cell_height"
             raise SolverError(what, where=where, remedy=remedy)
 
 

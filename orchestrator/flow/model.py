@@ -10,6 +10,7 @@ from orchestrator.flow.case import SPEED_HEIGHT, WALL_STRESS, FlowCase
 from orchestrator.flow.stress import WallStress
 from orchestrator.physics.velocity import log_law_speed
 from orchestrator.runs.files import state_of
+from orchestrator.study.method import FlowMethod
 from orchestrator.study.parts import Flow, PileBed
 from orchestrator.study.profile import Profile
 from orchestrator.study.scene import Scene
@@ -54,7 +55,7 @@ class FlowModel:
         InputError
             If the flow cannot be meshed; it names the field.
         """
-        if self.scene.flow.model != "solve":
+        if self.scene.method.flow.model != "solve":
             return ()
         return (_case(self.scene),)
 
@@ -71,7 +72,7 @@ class FlowModel:
         WallStress
             The stress on each face of the bed, over the undisturbed one.
         """
-        model = self.scene.flow.model
+        model = self.scene.method.flow.model
         if model == "flat":
             return theory.flat(self.line)
         if model == "waves":
@@ -96,23 +97,25 @@ def _case(scene: Scene) -> FlowCase:
         "viscosity": scene.solve_viscosity,
         "first_cell_height": scene.first_cell_height,
     }
-    settings = scene.flow.model_copy(update=numbers)
+    settings = scene.method.flow.model_copy(update=numbers)
+    above = scene.flow.model_copy(update={"gusts": None})
     slope = bed.slope_deg
     if bed.profile and slope < FACE_DEG:
         # On a gentle profile cells are as fine as on flat bed.
         slope = 0.0
-    return _shared(bed.relief, slope, settings, of_bed(bed), bed.profile)
+    return _shared(bed.relief, slope, settings, above, of_bed(bed), bed.profile)
 
 
 @cache
 def _shared(
     height: float,
     slope_deg: float,
-    settings: Flow,
+    settings: FlowMethod,
+    above: Flow,
     line: BedLine,
     profile: Profile | None,
 ) -> FlowCase:
     """One case for all scenes that share it, checked and digested once."""
-    case = FlowCase(height, slope_deg, settings, line, profile)
+    case = FlowCase(height, slope_deg, settings, line, profile, above)
     case.check_mesh()
     return case

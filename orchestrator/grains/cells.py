@@ -32,9 +32,16 @@ LAST = 1.2
 SPACING = 3.0
 """Spacing of the cells across the flow, in diameters of the largest grain: grains of two cells
 never meet."""
-UNUSED = {"fractions", "final_fraction"}
+UNUSED: dict[str, Any] = {
+    "threshold": {"fractions"},
+    "method": {"grains": {"final_fraction"}},
+}
 """Fields of the protocol that mean nothing to one grain."""
-SCALED = {"diameter", "density", "sizes"}
+DIFFERENT: dict[str, Any] = {
+    "grain": {"diameter", "density", "sizes"},
+    "threshold": {"fractions"},
+    "method": {"grains": {"final_fraction"}},
+}
 """Fields of the grain that change the forces of a cell alone; all others change its contacts."""
 REST = 2.5
 """Mean time until the grains are at rest in a load step, sqrt(d/g')."""
@@ -75,17 +82,15 @@ class SingleGrainCase(GrainCase):
 
     scenes: tuple[Scene, ...]
     kind: ClassVar[str] = "cells"
-    recipe: ClassVar[int] = 10
+    recipe: ClassVar[int] = 11
 
     @property
     def parameters(self) -> dict[str, Any]:
         """The scenes, but for what only the reading of the results depends on."""
-        hidden = {"protocol": UNUSED}
-        return {
-            "scenes": [
-                scene.model_dump(mode="json", exclude=hidden) for scene in self.scenes
-            ]
-        }
+        scenes = []
+        for scene in self.scenes:
+            scenes.append(scene.model_dump(mode="json", exclude=UNUSED))
+        return {"scenes": scenes}
 
     @property
     def grain(self) -> Grain:
@@ -95,13 +100,13 @@ class SingleGrainCase(GrainCase):
     @property
     def cost_s(self) -> float:
         """Expected time of one core, s."""
-        rules = self.scenes[0].protocol
-        load_steps = np.log(1.02 / deck.START) / np.log1p(rules.load_increment)
-        return deck.cost_s(load_steps, 3 * len(self.scenes), REST, rules, self.grain)
+        method = self.scenes[0].method.grains
+        load_steps = np.log(1.02 / deck.START) / np.log1p(method.load_increment)
+        return deck.cost_s(load_steps, 3 * len(self.scenes), REST, method, self.grain)
 
     def write(self, directory: Path, cases: Path) -> None:
         """Write the grains with their forces, and the load steps of the protocol."""
-        rules = self.scenes[0].protocol
+        shared = self.scenes[0]
         parameters = {
             **{
                 "diameter": DIAMETER,
@@ -109,7 +114,9 @@ class SingleGrainCase(GrainCase):
                 "density": DENSITY,
                 "gravity": GRAVITY,
             },
-            **deck.protocol(self.grain, rules),
+            **deck.protocol(
+                shared.grain, shared.method.grains, shared.threshold.displacement
+            ),
             # a grain that falls out of its cell never comes to rest
             "noise": 0.0,
             # no face, no ceiling, no crest: the planes lie far outside the box
@@ -129,9 +136,13 @@ class SingleGrainCase(GrainCase):
         liggghts.check_log(directory)
         grains = self._grains()
         motion.check_rest(
-            directory, grains, WEIGHT, self.grain.stiffness, all_rest=False
+            directory,
+            grains,
+            WEIGHT,
+            self.scenes[0].method.grains.stiffness,
+            all_rest=False,
         )
-        criterion = self.scenes[0].protocol.displacement_criterion
+        criterion = self.scenes[0].threshold.displacement
         motion.read(directory, grains, criterion, falls_out=True).to_csv(
             directory, grains
         )
@@ -179,7 +190,7 @@ def cell(scene: Scene) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def flows(scene: Scene) -> FloatArray:
     """Friction velocity of the settling and of each load step, over that of the closed form."""
-    return deck.rising_flows(deck.START, LAST, scene.protocol.load_increment)
+    return deck.rising_flows(deck.START, LAST, scene.method.grains.load_increment)
 
 
 def force(scene: Scene, rising: FloatArray) -> FloatArray:
@@ -198,9 +209,10 @@ def batches(scenes: Iterable[Scene]) -> Iterator[SingleGrainCase]:
     """
     groups: dict[str, list[Scene]] = {}
     for scene in scenes:
-        contact = scene.grain.model_dump(mode="json", exclude=SCALED)
-        rules = scene.protocol.model_dump(mode="json", exclude=UNUSED)
-        groups.setdefault(canonical_json([contact, rules]), []).append(scene)
+        alike = scene.model_dump(
+            mode="json", include={"grain", "threshold", "method"}, exclude=DIFFERENT
+        )
+        groups.setdefault(canonical_json(alike), []).append(scene)
     for _, group in sorted(groups.items()):
         members = sorted(group, key=lambda scene: scene.id)
         for start in range(0, len(members), BLOCK):

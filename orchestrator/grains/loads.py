@@ -33,7 +33,8 @@ from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import LIFT_OFF, root, thresholds_of
 from orchestrator.runs.files import state_of
 from orchestrator.study.closed_form import closed_form, single_grain
-from orchestrator.study.parts import PileBed, Range, UnfitError
+from orchestrator.study.declare import UnfitError
+from orchestrator.study.parts import PileBed, Range
 from orchestrator.study.scene import Scene
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
@@ -66,7 +67,7 @@ def _poured(state: tuple[int, ...], directory: Path, *shown: Any) -> Packing:
 def has_rows_along(scene: Scene) -> bool:
     """Tell whether the grains of a pile lie in rows along its bed line, in like pockets.
 
-    The closed form along the bed line (`protocol.method` "local") then answers as pivots
+    The closed form along the bed line (`method.kind` "local") then answers as pivots
     do. Level rows make stairs of a slope, where each step holds the grains of the one
     below it, and each grain of a poured bed has a pocket of its own.
 
@@ -247,7 +248,7 @@ class Geometry:
     @property
     def length(self) -> float:
         """Length of bed that has grains, d."""
-        if self.scene.protocol.method == "local":
+        if self.scene.method.kind == "local":
             return 0.0
         return self.packed_line.x[-2] - self.packed_line.x[1]
 
@@ -312,7 +313,7 @@ class Geometry:
         """The packing, on whichever sides the flow runs back."""
         bed = self.bed
         d = self.scene.grain.diameter
-        if self.scene.protocol.method == "local":
+        if self.scene.method.kind == "local":
             return packing.along(self.line, self.counts)
         for run in self.pouring:
             assert self.cases is not None, "the grains of a poured bed lie in its run"
@@ -323,14 +324,14 @@ class Geometry:
                 self.line,
                 self.counts,
                 self.surface,
-                bed.mobile_layers,
+                self.scene.method.grains.mobile_layers,
                 bed.width,
             )
         lattice = Lattice(
             bed.entrainment_angle_deg,
             gap=bed.roughness / d,
             pattern=bed.packing,
-            mobile_layers=bed.mobile_layers,
+            mobile_layers=self.scene.method.grains.mobile_layers,
             disorder=bed.disorder if bed.packing == "disordered" else 0.0,
             seed=bed.seed,
         )
@@ -596,9 +597,8 @@ class Geometry:
             place = x / self.scene.grain.diameter
             start = max(start, place - LONGEST_PACKED / 2)
             end = min(end, place + LONGEST_PACKED / 2)
-        parts = {name: getattr(self.scene, name) for name in Scene.model_fields}
-        parts["protocol"] = self.scene.protocol.model_copy(update={"method": "pivot"})
-        return type(self)(Scene(**parts), self.cases, (start, end))
+        by_pivots = self.scene.by("pivot")
+        return type(self)(by_pivots, self.cases, (start, end))
 
     def row_hold(self, cases: Path) -> float:
         """Find by how much the grains of a lattice's rows hold one another.
@@ -622,7 +622,7 @@ class Geometry:
         if self.scene.is_poured or self.bed.is_wedge:
             return 1.0
         loads = self.loads(cases)
-        if self.scene.protocol.method != "local":
+        if self.scene.method.kind != "local":
             return loads.row_hold()
         alone = loads.alone()
         place = int(np.argmin(np.where(alone > 0, alone, np.inf)))
@@ -792,7 +792,7 @@ class Loads:
         packed = bed.packing
         loading = self.loading
         renew = None
-        if bed.is_balanced and bed.scene.protocol.method == "peeling":
+        if bed.is_balanced and bed.scene.method.kind == "peeling":
             there = self.present.copy()
             ratio = np.where(packed.mobile, self.ratio * np.sqrt(bed.scene.gust), 0.0)
             loading = replace(loading, ratio=ratio)
@@ -807,7 +807,7 @@ class Loads:
             packed.sizes,
             loading,
             self.tables,
-            bed.scene.protocol.displacement_criterion,
+            bed.scene.threshold.displacement,
             self.present,
             bed.scene.bond,
             renew,

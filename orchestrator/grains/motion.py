@@ -51,12 +51,10 @@ GROWS = 2.0
 settling has more than this times that of the second."""
 BURST = 10.0
 """Kinetic energy per grain, over W d, that no fall of a grain can give it."""
-REMEDY = (
-    "a smaller protocol.time_step or grain.damping, or look for grains that overlap"
-)
+REMEDY = "a smaller method.grains.time_step or method.grains.damping, or look for grains that overlap"
 POURED_REMEDY = (
     "another bed.seed, a gentler slope, or a larger grain.friction_angle_deg; the "
-    "springs of a poured bed are at most of grain.stiffness = 1e5"
+    "springs of a poured bed are at most of method.grains.stiffness = 1e5"
 )
 """Of poured beds. Grains that have come to rest on a slope roll off it when the springs
 or the fixed grains under them are others; a smaller time step changes nothing."""
@@ -466,7 +464,7 @@ def read_track(directory: Path, grains: GrainTable, samples: pd.DataFrame) -> Tr
     path = directory / PASSAGE
     steps, rows = read_dump(path, PASSAGE_COLUMNS)
     if rows.empty:
-        remedy = "a smaller protocol.time_step, or look for grains that overlap"
+        remedy = "a smaller method.grains.time_step, or look for grains that overlap"
         raise Exploded("every counted grain was lost", where=str(path), remedy=remedy)
     if not np.array_equal(steps[1:], samples["step"]):
         raise _of_another_run(path, "its samples are not those of samples.csv")

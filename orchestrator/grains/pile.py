@@ -1,6 +1,6 @@
 """A pile of grains and its answer: threshold methods, their runs, and the bed that changes.
 
-Without `protocol.update` the flow of the whole pile acts until the last grain has gone, as in the
+Without `threshold.update` the flow of the whole pile acts until the last grain has gone, as in the
 paper. With it the grains leave in rounds. After each, the bed line sinks by as much as the upper
 sides of the grains have, and the flow is solved over it; what is left goes on under its forces.
 """
@@ -135,7 +135,7 @@ class WornFlow(Case):
     @property
     def parameters(self) -> dict[str, Any]:
         """The scene, but for what only the reading of the results depends on."""
-        return self.scene.model_dump(mode="json", exclude={"protocol": {"fractions"}})
+        return self.scene.model_dump(mode="json", exclude={"threshold": {"fractions"}})
 
     @property
     def cost_s(self) -> float:
@@ -170,8 +170,8 @@ Flow = FlowCase | WornFlow
 
 def rounds(scene: Scene) -> int:
     """How many flows act on a pile one after another until the last of its fractions has moved."""
-    update = scene.protocol.update
-    return ceil(max(scene.protocol.fractions) / update - 1e-9) if update else 1
+    update = scene.threshold.update
+    return ceil(max(scene.threshold.fractions) / update - 1e-9) if update else 1
 
 
 def goal_part(scene: Scene, flow: Flow | None) -> float:
@@ -183,9 +183,9 @@ def goal_part(scene: Scene, flow: Flow | None) -> float:
     number = 1
     while isinstance(flow, WornFlow):
         flow, number = flow.before, number + 1
-    part = number * scene.protocol.update
+    part = number * scene.threshold.update
     if number == rounds(scene):
-        part = max(part, min(max(scene.protocol.fractions) + BEYOND_ASKED, 1.0))
+        part = max(part, min(max(scene.threshold.fractions) + BEYOND_ASKED, 1.0))
     return round(part, 9)
 
 
@@ -310,10 +310,10 @@ class PileCase(GrainCase):
     @property
     def parameters(self) -> dict[str, Any]:
         """The scene, but for what only the reading of the results depends on."""
-        asked = self.scene.model_dump(mode="json", exclude={"protocol": {"fractions"}})
-        asked["protocol"]["final_fraction"] = self.scene.last_fraction
-        if self.scene.protocol.update:
-            asked["protocol"]["goal"] = goal_part(self.scene, self.flow)
+        asked = self.scene.model_dump(mode="json", exclude={"threshold": {"fractions"}})
+        asked["method"]["grains"]["final_fraction"] = self.scene.last_fraction
+        if self.scene.threshold.update:
+            asked["threshold"]["goal"] = goal_part(self.scene, self.flow)
         # rules for which grains there are that came after other beds were run
         new = {"turned": self.geometry.turned, "part": self.geometry.is_part}
         return {**asked, **{rule: True for rule, holds in new.items() if holds}}
@@ -321,12 +321,9 @@ class PileCase(GrainCase):
     @property
     def cost_s(self) -> float:
         """Expected time of one core, s."""
-        rules, grain, width = (
-            self.scene.protocol,
-            self.scene.grain,
-            self.geometry.bed.width,
-        )
-        load_steps = np.log(3.5) / np.log1p(rules.load_increment) / rounds(self.scene)
+        method = self.scene.method.grains
+        width = self.geometry.bed.width
+        load_steps = np.log(3.5) / np.log1p(method.load_increment) / rounds(self.scene)
         # of a lattice the layers that may move take the time, and decks of one of four were timed
         size, exposed = 4 * self._length * self._layers, np.nan
         if self.geometry.pouring:
@@ -334,7 +331,8 @@ class PileCase(GrainCase):
                 self._size * (IN_SPACE if width else 1),
                 self._length * (width or 1),
             )
-        return deck.cost_s(load_steps, size, REST, rules, grain, exposed)
+        grain = self.scene.grain
+        return deck.cost_s(load_steps, size, REST, method, grain, exposed)
 
     @property
     def ranks(self) -> int:
@@ -351,7 +349,7 @@ class PileCase(GrainCase):
         """Mobile layers: at most the whole bed; a pile is half its rows thick on average."""
         bed = self.geometry.bed
         most = bed.poured_depth if self.geometry.pouring else self.geometry.line.h / 2
-        return min(bed.mobile_layers, most)
+        return min(self.scene.method.grains.mobile_layers, most)
 
     @property
     def _length(self) -> float:
@@ -361,18 +359,18 @@ class PileCase(GrainCase):
 
     def write(self, directory: Path, cases: Path) -> None:
         """Write the grains with their forces, and the load steps of the protocol."""
-        scene, rules, (loads, worn) = (
-            self.scene,
-            self.scene.protocol,
-            self._state(cases),
-        )
-        geometry, d = loads.geometry, scene.grain.diameter
+        scene = self.scene
+        method = scene.method.grains
+        loads, worn = self._state(cases)
+        geometry = loads.geometry
+        d = scene.grain.diameter
         if self.before is None:
             rising = flows(loads)
         else:
             reached = float(Motion.from_csv(cases / self.before.name).flow[-1])
             # the run goes on from the flow that the one before has reached
-            thresholds, step = loads.leaving(), rules.load_increment
+            thresholds = loads.leaving()
+            step = method.load_increment
             last = thresholds[np.isfinite(thresholds)].max(initial=reached)
             rising = deck.rising_flows(
                 reached, max(deck.BEYOND * last, reached * (1 + step)), step
@@ -382,7 +380,7 @@ class PileCase(GrainCase):
                 rising[0] = 0.0
         packed = geometry.packing
         enough = int((1 - scene.last_fraction) * packed.count + 1e-9)
-        if rules.update:
+        if scene.threshold.update:
             enough = packed.count - goal(geometry, self.flow)
         grains, (slope, ridge) = (
             table(loads, worn),
@@ -399,7 +397,14 @@ class PileCase(GrainCase):
                 "density": density,
                 "gravity": gravity,
             },
-            **deck.protocol(scene.grain, rules, enough, smallest, scene.flow.gusts),
+            **deck.protocol(
+                scene.grain,
+                method,
+                scene.threshold.displacement,
+                enough,
+                smallest,
+                scene.flow.gusts,
+            ),
             "settle_drag": deck.POURED_DRAG if scene.is_poured else 0.0,
             **{"slope": slope, "ceiling_x": ridge[0] * d, "ceiling_z": ridge[1] * d},
             "behind": behind,
@@ -420,14 +425,14 @@ class PileCase(GrainCase):
             directory,
             grains,
             scene.weight,
-            scene.grain.stiffness,
+            scene.method.grains.stiffness,
             all_rest=True,
             remedy=motion.POURED_REMEDY if scene.is_poured else motion.REMEDY,
         )
-        criterion = scene.protocol.displacement_criterion
+        criterion = scene.threshold.displacement
         moved = motion.read(directory, grains, criterion, falls_out=False)
         moved.to_csv(directory, grains)
-        if not scene.protocol.update:
+        if not scene.threshold.update:
             return
         # the grains when the run has ended; those that have moved are taken off the bed
         left = worn.left.copy()
@@ -455,7 +460,7 @@ def flows(loads: Loads) -> FloatArray:
 
     Raises an InputError if no counted grain is held by its contacts and can leave them.
     """
-    geometry, rules = loads.geometry, loads.geometry.scene.protocol
+    geometry = loads.geometry
     pivots = np.sort(loads.alone())
     if geometry.packing.width:
         # no peeling in space says which grain frees which
@@ -485,7 +490,8 @@ def flows(loads: Loads) -> FloatArray:
     last = max(last, first)
     # gusts that are too short do nothing: then the mean stress moves the grains
     beyond = deck.BEYOND * np.sqrt(geometry.scene.gust)
-    return deck.rising_flows(deck.START * first, beyond * last, rules.load_increment)
+    step = geometry.scene.method.grains.load_increment
+    return deck.rising_flows(deck.START * first, beyond * last, step)
 
 
 def in_time(gusts: Gusts, loads: Loads, rising: FloatArray) -> FloatArray:
@@ -591,7 +597,7 @@ class Peeling(Method):
 
     def motion(self, cases: Path) -> Motion:
         """Motion at the flows that `orchestrator.grains.peeling` finds."""
-        if self.geometry.scene.protocol.update:
+        if self.geometry.scene.threshold.update:
             return Motion.of_flows(
                 self.last(cases).left[self.geometry.packing.windward]
             )
@@ -651,7 +657,7 @@ class Pile(Geometry):
     @cached_property
     def method(self) -> Method:
         """How its threshold is found; the scene's method is not left open (``auto``)."""
-        return METHODS[self.scene.protocol.method](self)
+        return METHODS[self.scene.method.kind](self)
 
     @cached_property
     def runs(self) -> tuple[Case, ...]:
@@ -693,7 +699,7 @@ class Pile(Geometry):
 
         On a bed that changes it is that of the round in which a grain moved.
         """
-        changes = bool(self.scene.protocol.update)
+        changes = bool(self.scene.threshold.update)
         ratio = self.method.last(cases).speed if changes else self.loads(cases).ratio
         return np.asarray(ratio[self.packing.windward])
 

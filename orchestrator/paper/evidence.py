@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.study import fields
-from orchestrator.tables import COLUMNS, Tables
+from orchestrator.tables import COLUMNS, Tables, with_methods
 from orchestrator.types import BoolArray, FloatArray
 
 Verdict = Literal["reproduced", "partly", "not", "no data"]
@@ -156,7 +156,7 @@ class Evidence:
     @cached_property
     def scenes(self) -> pd.DataFrame:
         """Every scene of the paper's grains and gas, once."""
-        table = self._tables["scenes"].drop_duplicates("scene_id")
+        table = with_methods(self._tables["scenes"], self._tables["methods"])
         return table[(table[list(PAPER)] == pd.Series(PAPER)).all(axis=1)]
 
     def joined(self, name: str) -> pd.DataFrame:
@@ -176,7 +176,7 @@ class Evidence:
         table = table.merge(scenes, on="scene_id", validate="many_to_one")
         if name in ANSWERS:
             return table
-        return table[table["answered_method"] == "dem"]
+        return table[table["method"] == "dem"]
 
     @cached_property
     def grains(self) -> pd.DataFrame:

@@ -45,11 +45,11 @@ OF_KIND = (
         "bed_shape",
         "profile",
         "obstacles",
-        "answered_width",
+        "width",
         "sizes",
     ),
     *(
-        "answered_method",
+        "method",
         "exposure",
         "sheltering",
         "fraction",
@@ -57,7 +57,7 @@ OF_KIND = (
         "phi_deg",
         "poured_depth",
     ),
-    *("answered_mobile_layers", "counted", "loaded_grains", "length", "h_m"),
+    *("mobile_layers", "counted", "loaded_grains", "length", "h_m"),
     "criterion",
 )
 """Columns that the kind of a threshold follows from."""
@@ -166,8 +166,8 @@ def kind_of(row: Mapping[str, Any]) -> str:
     elif _is_strip(row):
         words += ["strip", f"phi {row['phi_deg']:g}", f"{row['poured_depth']:g} d deep"]
         words += [
-            f"{row['answered_width']:g} d wide",
-            f"{row['answered_mobile_layers']:g} layers",
+            f"{row['width']:g} d wide",
+            f"{row['mobile_layers']:g} layers",
         ]
         words += [str(row["sizes"]), row["exposure"], row["sheltering"]]
         words += [f"n/N {row['fraction']:g}"]
@@ -206,7 +206,7 @@ def _is_strip(row: Mapping[str, Any]) -> bool:
         return False
     if row["counted"] not in (None, "all"):
         return False
-    if not row["answered_width"] or row["answered_method"] != "pivot":
+    if not row["width"] or row["method"] != "pivot":
         return False
     if row["loaded_grains"] != "exposed":
         return False

@@ -160,7 +160,7 @@ def draw(results: Results) -> Iterator[Figure]:
 
 def words(results: Results, pile: Pile) -> str:
     """The caption: how the pile was answered, and what of it is shown."""
-    rules = pile.scene.protocol
+    displacement = pile.scene.threshold.displacement
     columns = ["z0_over_d", "packing", "force_law"]
     columns += labels.varying(results.beds("pile"), "alpha_deg", "d_m", *columns)
     properties = []
@@ -173,10 +173,10 @@ def words(results: Results, pile: Pile) -> str:
         width=pile.bed.width,
         by_dem=pile.by_dem,
         flow=bool(pile.model.cases),
-        method=rules.method,
-        update=rules.update,
+        method=pile.scene.method.kind,
+        update=pile.scene.threshold.update,
         part=window(pile)[1],
-        criterion=labels.value("displacement_criterion", rules.displacement_criterion),
+        criterion=labels.value("displacement_criterion", displacement),
         properties=", ".join(properties),
     )
 

@@ -22,7 +22,7 @@ from orchestrator.report.style import Figure, Look
 from orchestrator.runs.case import is_whole
 from orchestrator.runs.files import state_of
 from orchestrator.study import fields
-from orchestrator.study.parts import Turbulence
+from orchestrator.study.method import Turbulence
 from orchestrator.types import FloatArray
 
 ESTIMATES: dict[str, Look] = {
@@ -233,13 +233,13 @@ def over_u_e(
     heights = np.where(is_outside, 1.0, np.maximum(above, 1e-12))
     values = _solved(cases / pile.flow.name).at("U", x, heights, bed)
     grid = np.where(is_outside[..., None], np.nan, values.reshape(*above.shape, 3))
-    return np.asarray(grid.swapaxes(0, 1) / pile.scene.flow.speed)
+    return np.asarray(grid.swapaxes(0, 1) / pile.scene.method.flow.speed)
 
 
 def flow(results: Results) -> Iterator[Figure]:
     """Speed and streamlines: a panel for each slope and height, at its least z0."""
     for name, title, shown in style.pages(drawn(results)):
-        settings = [pile.scene.flow for pile in shown]
+        settings = [pile.scene.method.flow for pile in shown]
         models = [
             labels.value("turbulence_model", each.turbulence_model) for each in settings
         ]
@@ -248,7 +248,7 @@ def flow(results: Results) -> Iterator[Figure]:
             "flow",
             models=", ".join(dict.fromkeys(models)),
             speeds=", ".join(dict.fromkeys(speeds)),
-            lid=not any(each.depth for each in settings),
+            lid=not any(pile.scene.flow.depth for pile in shown),
         )
         cases = tuple(pile.flow.name for pile in shown)
         figure = _speeds(results, shown)

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.study import fields
-from orchestrator.study.parts import Info
+from orchestrator.study.declare import Info
 
 RE_AXIS = "Re* = u* d/ν"
 TAU_AXIS = r"threshold Shields number $τ_c$"
@@ -18,7 +18,7 @@ WIDTH = 52
 OTHERS = {
     "fraction": Info("n/N", "n/N", "%"),
     "by": Info("by"),
-    "answered_method": fields.ANSWERS["answered_method"].info,
+    "asked": Info("method asked for"),
 }
 """Words of columns of tables that are no fields."""
 OF_METHODS = {"DEM", "DEM of piles", "DEM and peeling", "DEM and peeling of piles"}
@@ -256,15 +256,15 @@ def methods(rows: pd.DataFrame) -> str:
     Parameters
     ----------
     rows
-        The rows, with a column ``answered_method``.
+        The rows, with a column ``method``.
 
     Returns
     -------
     str
         The methods' labels, in the order in which they are declared.
     """
-    used = set(rows["answered_method"])
-    choices = fields.ANSWERS["answered_method"].info.choices
+    used = set(rows["method"])
+    choices = fields.COLUMNS["method"].info.choices
     return ", ".join(label for method, label in choices.items() if method in used)
 
 
@@ -286,11 +286,9 @@ def varying(table: pd.DataFrame, *shown: str) -> list[str]:
     list of str
         Names of further columns.
     """
-    columns = []
-    for column in fields.others(table, *shown):
-        field = fields.COLUMNS.get(column)
-        if field is not None and field.info.about != "replica":
-            columns.append(column)
+    columns = fields.others(table, "seed", *shown)
+    if "asked" in table:
+        columns.append("asked")
     listed: list[str] = []
     groups = table.groupby(list(shown), dropna=False).ngroup().to_numpy()
     for column in sorted(columns, key=_rank):
@@ -304,9 +302,10 @@ def varying(table: pd.DataFrame, *shown: str) -> list[str]:
 
 def _rank(column: str) -> int:
     """Place of a field among those that tell rows apart; the lowest comes first."""
-    info = fields.COLUMNS[column].info
     if column == "method":
         return 1
-    if info.about != "question":
+    if column == "asked":
+        return 4
+    if column in fields.OF_METHOD:
         return 3
-    return 2 if info.scope in OF_METHODS else 0
+    return 2 if fields.COLUMNS[column].info.scope in OF_METHODS else 0

@@ -66,7 +66,7 @@ def draw(results: Results) -> Iterator[Figure]:
         return
     rows = results.joined("pile_grain")
     rows = rows[rows["size_over_d"].notna()]
-    by_method = rows.drop_duplicates("answered_method").sort_values("answered_method")
+    by_method = rows.drop_duplicates("method").sort_values("method")
     firsts = by_method["scene_id"]
     # a grain that lies loose goes at no flow at all
     goes = rows["scene_id"].isin(firsts) & drawable(rows, "ustar0_m_s")
@@ -86,7 +86,7 @@ def draw(results: Results) -> Iterator[Figure]:
 def _bed(pile: Pile, grains: pd.DataFrame, norm: LogNorm) -> Figure:
     """The middle of a bed, seen from the side, or a strip seen from above."""
     packing = pile.packing
-    name = grains["answered_method"].iloc[0]
+    name = grains["method"].iloc[0]
     method = labels.value("method", name)
     left, right, low, high = _frame(packing)
     drawn_height = style.WIDTH * (high - low) / (right - left)
@@ -165,7 +165,7 @@ def _pivots(results: Results, rows: pd.DataFrame) -> Figure:
     rows = rows.drop_duplicates(["grain_id", "s_m", "pivot_deg"])
     figure = style.canvas(3.4)
     ax = figure.subplots()
-    widths = rows.assign(width=rows["answered_width"].fillna(0.0))
+    widths = rows.assign(width=rows["width"].fillna(0.0))
     for (width,), part in split(widths, "width"):
         angles = np.sort(part["pivot_deg"].to_numpy(float))
         percent = 100 * (np.arange(len(angles)) + 0.5) / len(angles)
@@ -191,7 +191,7 @@ def _pivots(results: Results, rows: pd.DataFrame) -> Figure:
 
 def _hiding(rows: pd.DataFrame) -> Figure:
     """Thresholds of size classes over that of the median size, panels by method."""
-    keys = ["answered_method"]
+    keys = ["method"]
     (sheet,) = shields.sheets(rows, keys, 2.7, *HIDING_AXES, columns=3)
     colours = style.palette("fraction", sorted(set(rows["fraction"])))
     known = rows[["hiding", "hiding_low", "hiding_high"]].to_numpy(float)

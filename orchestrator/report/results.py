@@ -13,7 +13,7 @@ from orchestrator.plan import Plan
 from orchestrator.runs.case import is_whole
 from orchestrator.study import fields
 from orchestrator.study.study import Study
-from orchestrator.tables import Tables
+from orchestrator.tables import Tables, with_methods
 from orchestrator.tables.rows import measured_hill
 
 FRACTION = 0.3  # n/N at which one threshold stands for all of its pile
@@ -32,8 +32,8 @@ class Results:
 
     @cached_property
     def scenes(self) -> pd.DataFrame:
-        """Every scene once, whichever groups asked for it."""
-        return self.tables["scenes"].drop_duplicates("scene_id").reset_index(drop=True)
+        """Every scene once, whichever groups asked for it, with its method."""
+        return with_methods(self.tables["scenes"], self.tables["methods"])
 
     def beds(self, kind: str) -> pd.DataFrame:
         """The scenes with one kind of bed."""
@@ -87,9 +87,7 @@ class Results:
         if self.at_fraction.empty:
             return self.at_fraction
         here = seeds_as_one(self.at_fraction[self.at_fraction["shields"].notna()])
-        order = here.assign(
-            dem=here["answered_method"] == "dem", wears=here["update"] > 0
-        )
+        order = here.assign(dem=here["method"] == "dem", wears=here["update"] > 0)
         by = ["alpha_deg", "usable", "d_m", "dem", "wears", "z0_over_d"]
         return order.sort_values(
             by, ascending=[True, *[False] * 4, True], kind="stable"
@@ -144,7 +142,7 @@ def seeds_as_one(rows: pd.DataFrame) -> pd.DataFrame:
 
     Columns ``seeds``, ``of_seeds``: how many, of how many; ``least``, ``largest`` of them.
     """
-    keys = [*fields.others(rows, "seed"), "fraction"]
+    keys = [*fields.others(rows, "seed"), "asked", "fraction"]
     usable = valid(rows)
     twins = usable.groupby([rows[key] for key in keys], dropna=False)
     is_told = usable | ~twins.transform("any")
@@ -175,7 +173,7 @@ def held(table: pd.DataFrame) -> "pd.Series[bool]":
 
 def by_dem(table: pd.DataFrame) -> pd.DataFrame:
     """The rows that DEM answered; an empty table as it is."""
-    return table[table["answered_method"] == "dem"] if len(table) else table
+    return table[table["method"] == "dem"] if len(table) else table
 
 
 def valid(table: pd.DataFrame) -> "pd.Series[bool]":

@@ -104,7 +104,7 @@ def single_grains(results: Results) -> pd.DataFrame:
     rows = results.joined("single_grain")
     if rows.empty:
         return rows
-    is_dem = rows["answered_method"] == "dem"
+    is_dem = rows["method"] == "dem"
     exact = rows["shields_closed_form"]
     re = rows["reynolds"].where(is_dem, rows["reynolds_closed_form"])
     values = {}
@@ -318,11 +318,11 @@ def parameters(results: Results) -> pd.DataFrame:
     """
     rows = []
     for column, item in fields.COLUMNS.items():
-        asked = _values(results.scenes[column])
-        answered = asked
-        twin = fields.ANSWERED + column
-        if twin in fields.ANSWERS:
-            answered = _values(results.scenes[twin])
+        answered = _values(results.scenes[column])
+        asked = answered
+        if item.is_method:
+            written = [item.asked(scene) for scene in results.study.scenes]
+            asked = _values(pd.Series(written, dtype=object))
         if not asked and not answered:
             continue
         name = item.info.label

@@ -124,7 +124,7 @@ def parted(table: pd.DataFrame, *shown: str) -> tuple[list[str], pd.DataFrame]:
         scenes are answered.
     """
     columns = labels.varying(table, *shown)
-    panels = [name for name in columns if fields.COLUMNS[name].info.about == "question"]
+    panels = [name for name in columns if name in fields.OF_QUESTION]
     looks = [name for name in columns if name not in panels]
     while looks and _combinations(table, looks).ngroups > len(SHAPES):
         panels.append(looks.pop(0))
@@ -152,10 +152,10 @@ def about(rows: pd.DataFrame) -> dict[str, Any]:
     """The values of the captions of a figure that follow from its rows."""
     if rows.empty:
         return {}
-    is_dem = rows["answered_method"] == "dem"
+    is_dem = rows["method"] == "dem"
 
     def used(column: str, scale: float = 1.0) -> str:
-        values = rows.loc[is_dem, f"answered_{column}"] * scale
+        values = rows.loc[is_dem, column] * scale
         return ", ".join(f"{value:.6g}" for value in sorted(set(values)))
 
     drawn = theory.drawn(rows["force_law"])

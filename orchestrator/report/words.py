@@ -389,7 +389,7 @@ def contents(results: Results, failures: Mapping[str, str]) -> dict[str, Any]:
     eq10 = None
     if results.flows:
         eq10 = flows.eq10_over_wall(results, tuple(results.flows))
-    has_strips = "answered_width" in scenes and scenes["answered_width"].any()
+    has_strips = scenes["width"].any()
     return {
         "answer": answer(results),
         "doubts": doubts(results),
@@ -407,7 +407,7 @@ def contents(results: Results, failures: Mapping[str, str]) -> dict[str, Any]:
         "links": links,
         "paper_pair": scenes["force_law"].isin(theory.PAIR).any(),
         "eq10": eq10,
-        "methods": set(scenes["answered_method"]),
+        "methods": set(scenes["method"]),
         "mixed": any(sizes is not None for sizes in mixtures),
         "strips": has_strips,
     }

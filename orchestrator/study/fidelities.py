@@ -1,23 +1,81 @@
-"""The fidelities as a study file names them: sets of fields that answer a pile.
+"""The fidelities as a study file names them: named methods that answer a pile.
 
 ``fidelities.toml`` writes each of them out.
 """
 
 import tomllib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import InputError
+from orchestrator.study.fields import FIDELITY
 
 AUTO = "auto"
 """Leaves the fidelity to the program, which chooses by known errors."""
-WRITTEN: Mapping[str, Mapping[str, Any]] = tomllib.loads(
-    Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
-)
-"""Each fidelity by its name, from cheap to dear: `meaning`, the fields of `flow` and of
-`grains`, those that it sets to something else `on` a packing, and the packings `not_on`
-which it answers none."""
+FLOW = "method.flow."
+"""Beginning of the names of the fields of the flow."""
+Fields = Mapping[str, Any]
+"""Values of the fields of a method, named as in a study file."""
+
+
+@dataclass(frozen=True)
+class Written:
+    """A fidelity as ``fidelities.toml`` writes it.
+
+    Attributes
+    ----------
+    meaning
+        What it does, in words.
+    flow, grains
+        The fields that it sets for the flow over a pile, and for its grains.
+    on
+        By packing, the fields of the grains that it sets to something else there.
+    not_on
+        The packings that it does not answer.
+    """
+
+    meaning: str
+    flow: Fields
+    grains: Fields
+    on: Mapping[str, Fields]
+    not_on: tuple[str, ...]
+
+
+def _read() -> dict[str, Written]:
+    """Every fidelity by its name, from cheap to dear."""
+    text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+    found = {}
+    for name, table in tomllib.loads(text).items():
+        fields = _by_name(table["method"])
+        on = {}
+        for packing, changed in table.get("on", {}).items():
+            on[packing] = _by_name(changed)
+        found[name] = Written(
+            meaning=table["meaning"],
+            flow={name: fields[name] for name in fields if name.startswith(FLOW)},
+            grains={name: fields[name] for name in fields if not name.startswith(FLOW)},
+            on=on,
+            not_on=tuple(table.get("not_on", ())),
+        )
+    return found
+
+
+def _by_name(method: Mapping[str, Any]) -> Fields:
+    """The fields of a table ``method`` by their names in a study file."""
+    fields = {}
+    for key, value in method.items():
+        if isinstance(value, dict):
+            for inner, number in value.items():
+                fields[f"method.{key}.{inner}"] = number
+        else:
+            fields[f"method.{key}"] = value
+    return fields
+
+
+WRITTEN: Mapping[str, Written] = _read()
+"""The fidelities by their names, from cheap to dear: the last one is the reference."""
 
 
 def packing_of(bed: Mapping[str, Any]) -> str:
@@ -26,7 +84,7 @@ def packing_of(bed: Mapping[str, Any]) -> str:
     return "strip" if packing == "poured" and bed.get("width") else packing
 
 
-def fields_of(name: str, bed: Mapping[str, Any], where: str) -> dict[str, Any]:
+def fields_of(name: str, bed: Mapping[str, Any], where: str) -> Fields:
     """The fields that a fidelity sets on a bed, by their names in a study file.
 
     Parameters
@@ -34,8 +92,7 @@ def fields_of(name: str, bed: Mapping[str, Any], where: str) -> dict[str, Any]:
     name
         The fidelity.
     bed
-        The table of the bed. On one grain, which has neither a solved flow nor layers,
-        the rest is set.
+        The table of the bed. One grain has no flow that is solved.
     where
         The file, for messages.
 
@@ -44,23 +101,18 @@ def fields_of(name: str, bed: Mapping[str, Any], where: str) -> dict[str, Any]:
     InputError
         For a name that is none, and on a bed that the fidelity does not answer.
     """
+    place = f"{where}: {FIDELITY}"
     if name not in WRITTEN:
         known = ", ".join([AUTO, *WRITTEN])
-        raise InputError(
-            f"{name!r} is no fidelity", f"{where}: protocol.fidelity", known
-        )
-    written, packing = WRITTEN[name], packing_of(bed)
-    if packing in written.get("not_on", ()):
-        others = [
-            one for one in WRITTEN if packing not in WRITTEN[one].get("not_on", ())
-        ]
+        raise InputError(f"{name!r} is no fidelity", place, known)
+    written = WRITTEN[name]
+    packing = packing_of(bed)
+    if packing in written.not_on:
+        others = [one for one in WRITTEN if packing not in WRITTEN[one].not_on]
         what = f"{name} does not answer a poured bed in space"
-        raise InputError(
-            what, f"{where}: protocol.fidelity", f"write {', '.join(others)}"
-        )
-    fields = {**written["grains"], **written.get("on", {}).get(packing, {})}
+        raise InputError(what, place, f"write {', '.join(others)}")
+    fields = {**written.grains, **written.on.get(packing, {})}
     if bed.get("kind") == "grain":
-        return {
-            field: fields[field] for field in fields if not field.startswith("bed.")
-        }
-    return {**written["flow"], **fields}
+        fields.pop("method.grains.mobile_layers", None)
+        return fields
+    return {**written.flow, **fields}

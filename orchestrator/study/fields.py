@@ -1,4 +1,8 @@
-"""The registry of the fields of a scene: what follows from where each is declared."""
+"""The registry of the fields of a scene: what follows from where each is declared.
+
+A field is about the method if it stands in one of the tables of the method; all others
+are about the question.
+"""
 
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -8,65 +12,133 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from orchestrator.study.closed_form import regime_of
-from orchestrator.study.parts import Gusts, Info, LogNormal, Part, PileBed
+from orchestrator.study.declare import Info, Part
+from orchestrator.study.method import FlowMethod, GrainMethod, Method
+from orchestrator.study.parts import (
+    Flow,
+    Fluid,
+    Forces,
+    Grain,
+    Gusts,
+    LogNormal,
+    PileBed,
+    Threshold,
+)
 from orchestrator.study.profile import Profile
 from orchestrator.study.scene import CLOSED, Scene
 
-PARTS: Mapping[str, type[Part]] = {
-    name: PileBed if name == "bed" else declared.annotation  # type: ignore[misc]
-    for name, declared in Scene.model_fields.items()
+QUESTION: Mapping[str, type[Part]] = {
+    "fluid": Fluid,
+    "grain": Grain,
+    # a bed of one grain has no field that a pile has not
+    "bed": PileBed,
+    "flow": Flow,
+    "forces": Forces,
+    "threshold": Threshold,
 }
-"""The tables of a study file; a bed of one grain has no field that a pile has not."""
-ANSWERED = "answered_"
-"""Before the column of a field: its value in the scene that was run in place of the one asked."""
+"""The tables of a study file that ask."""
+METHOD: Mapping[str, type[Part]] = {
+    "method": Method,
+    "method.flow": FlowMethod,
+    "method.grains": GrainMethod,
+}
+"""The tables of a study file that say how to answer."""
+PARTS: Mapping[str, type[Part]] = {**QUESTION, **METHOD}
+"""The tables of a study file."""
+SEED = "bed.seed"
+"""The field that tells apart beds that are alike."""
+FIDELITY = "method.fidelity"
+"""The key of a study file that names a set of fields of the method."""
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A field of a study file, or a quantity that follows from fields."""
+    """A field of a study file, or a quantity that follows from fields.
 
-    name: str  # as a study file writes it, such as bed.slope_deg; empty for one that follows
-    column: str  # of the tables
+    Attributes
+    ----------
+    name
+        As a study file writes it, such as bed.slope_deg; empty for one that follows.
+    column
+        Its column in tables.
+    info
+        Its words.
+    meaning
+        Its meaning.
+    read
+        Finds its value in a scene, None where that leaves it open.
+    """
+
+    name: str
+    column: str
     info: Info
     meaning: str
-    read: Callable[[Scene], Any]  # its value in a scene, None where that leaves it open
+    read: Callable[[Scene], Any]
+
+    @property
+    def is_method(self) -> bool:
+        """Whether it says how a scene is answered."""
+        return table_of(self.name) in METHOD
 
     def asked(self, scene: Scene) -> Any:
-        """Its value as a scene asks for it; None where it has no effect.
-
-        What a scene leaves open of the question is its default, of the way to answer it None.
-        """
+        """Its value as a scene has it written; None where it has no effect or is left open."""
         if not APPLIES[self.info.scope](scene):
             return None
-        if self.info.about == "question" and self.info.read:
-            return plain(getattr(scene, self.info.read))
         return plain(self.read(scene))
 
     def used(self, scene: Scene) -> Any:
         """Its value as a scene uses it; None where it has no effect."""
-        if self.info.read and APPLIES[self.info.scope](scene):
-            return getattr(scene, self.info.read)
-        return self.asked(scene)
+        if not APPLIES[self.info.scope](scene):
+            return None
+        if self.info.read:
+            return plain(getattr(scene, self.info.read))
+        return plain(self.read(scene))
 
     @property
     def phrase(self) -> str:
         """Its meaning with its unit, its scope and the meaning of its words."""
-        unit = f", {self.info.unit}" if self.info.unit else ""
-        scope = "" if self.info.scope == "every scene" else f" ({self.info.scope})"
-        words = (f"; {word}: {meaning}" for word, meaning in self.info.choices.items())
-        return f"{self.meaning}{unit}{scope}{''.join(words)}"
+        phrase = self.meaning
+        if self.info.unit:
+            phrase += f", {self.info.unit}"
+        if self.info.scope != "every scene":
+            phrase += f" ({self.info.scope})"
+        for word, meaning in self.info.choices.items():
+            phrase += f"; {word}: {meaning}"
+        return phrase
+
+
+def table_of(name: str) -> str:
+    """The table of a field, such as ``bed`` or ``method.flow``.
+
+    Examples
+    --------
+    >>> table_of("method.flow.speed"), table_of("bed.height")
+    ('method.flow', 'bed')
+    """
+    return name.rpartition(".")[0]
+
+
+def default_of(name: str) -> Any:
+    """The default of a field, named as in a study file."""
+    table, _, field = name.rpartition(".")
+    return PARTS[table].model_fields[field].default
 
 
 def plain(value: Any) -> Any:
     """A value as a cell of a table: words and numbers stay, all else becomes a text."""
     if isinstance(value, tuple):
-        # a class of a sieve table: diameter and part of the mass
-        classes = (
-            f"{1e3 * e[0]:g} mm {100 * e[1]:g} %" if type(e) is tuple else e
-            for e in value
-        )
-        return "; ".join(map(str, classes)) or None
-    return str(value) if isinstance(value, Profile | LogNormal | Gusts) else value
+        return "; ".join(_item(each) for each in value) or None
+    if isinstance(value, Profile | LogNormal | Gusts):
+        return str(value)
+    return value
+
+
+def _item(item: Any) -> str:
+    """A text for an item of a list: of a sieve table a size and its part of the mass."""
+    if isinstance(item, tuple):
+        diameter, part = item
+        return f"{1e3 * diameter:g} mm {100 * part:g} %"
+    return str(item)
 
 
 def _of_piles(condition: Callable[[Scene, PileBed], Any]) -> Callable[[Scene], bool]:
@@ -89,77 +161,98 @@ APPLIES: Mapping[str, Callable[[Scene], bool]] = {
     "random beds and replicas": _of_piles(
         lambda _, bed: bed.packing in RANDOM or bed.is_replica
     ),
-    "solved flows": _of_piles(lambda scene, bed: scene.flow.model == "solve"),
-    "DEM": lambda scene: scene.protocol.method in MAYBE_DEM,
-    "DEM of piles": _of_piles(lambda scene, bed: scene.protocol.method in MAYBE_DEM),
-    "DEM and peeling": lambda scene: scene.protocol.method not in CLOSED,
+    "solved flows": _of_piles(lambda scene, bed: scene.method.flow.model == "solve"),
+    "DEM": lambda scene: scene.method.kind in MAYBE_DEM,
+    "DEM of piles": _of_piles(lambda scene, bed: scene.method.kind in MAYBE_DEM),
+    "DEM and peeling": lambda scene: scene.method.kind not in CLOSED,
     "DEM and peeling of piles": _of_piles(
-        lambda scene, bed: scene.protocol.method not in CLOSED
+        lambda scene, bed: scene.method.kind not in CLOSED
     ),
 }
 """The scenes on which a field has an effect, by the `scope` of its `Info`."""
 
 
-def _quantity(part: str, name: str, declared: FieldInfo) -> Quantity:
+def _quantity(table: str, name: str, declared: FieldInfo) -> Quantity:
     info = next(each for each in declared.metadata if isinstance(each, Info))
-    text, *words = (declared.description or "").split("\n- ")
-    choices = info.choices or dict(word.split(": ", 1) for word in words)
+    meaning, *words = (declared.description or "").split("\n- ")
+    choices = dict(word.split(": ", 1) for word in words)
     label = info.label or name.removesuffix("_deg").replace("_", " ")
-    info, read = (
-        replace(info, label=label, choices=choices),
-        attrgetter(f"{part}.{name}"),
-    )
     return Quantity(
-        f"{part}.{name}", info.column or name, info, " ".join(text.split()), read
+        name=f"{table}.{name}",
+        column=info.column or name,
+        info=replace(info, label=label, choices=info.choices or choices),
+        meaning=" ".join(meaning.split()),
+        read=attrgetter(f"{table}.{name}"),
     )
 
 
-FIELDS: tuple[Quantity, ...] = tuple(
-    _quantity(part, name, declared)
-    for part, model in PARTS.items()
-    for name, declared in model.model_fields.items()
-)
+def _declared() -> tuple[Quantity, ...]:
+    quantities = []
+    for table, part in PARTS.items():
+        for name, declared in part.model_fields.items():
+            # the tables within the method have fields of their own
+            if f"{table}.{name}" not in PARTS:
+                quantities.append(_quantity(table, name, declared))
+    return tuple(quantities)
+
+
+FIELDS: tuple[Quantity, ...] = _declared()
 """Every field of a study file, in the order of the file."""
-_REGIME = "forces that are valid at the threshold of a single grain of the scene, or transition"
-_RATIO, _Z0 = "roughness length over diameter", Info("roughness length", "z_0", "d")
-DERIVED = (
+
+
+def _z0_over_d(scene: Scene) -> float:
     # rounded: d/30 over d is not 1/30 to the last digit, and figures group by it
+    return round(scene.bed.roughness / scene.grain.diameter, 9)
+
+
+DERIVED = (
     Quantity(
-        "",
-        "z0_over_d",
-        _Z0,
-        _RATIO,
-        lambda s: round(s.bed.roughness / s.grain.diameter, 9),
+        name="",
+        column="z0_over_d",
+        info=Info(label="roughness length", symbol="z_0", unit="d"),
+        meaning="roughness length over diameter",
+        read=_z0_over_d,
     ),
-    Quantity("", "regime", Info("regime"), _REGIME, regime_of),
+    Quantity(
+        name="",
+        column="regime",
+        info=Info(label="regime"),
+        meaning=(
+            "forces that are valid at the threshold of a single grain of the scene, "
+            "or transition"
+        ),
+        read=regime_of,
+    ),
 )
 COLUMNS: Mapping[str, Quantity] = {
     each.column: each for each in (*FIELDS, *DERIVED) if each.column != "-"
 }
-"""By the columns of a table: what a scene asks for."""
-ANSWERS: Mapping[str, Quantity] = {
-    f"{ANSWERED}{column}": each
-    for column, each in COLUMNS.items()
-    if each.info.about == "answer"
-}
-"""By the columns of a table: how a scene was answered."""
-FOLLOW = (
-    "z0_m",
-    "regime",
-    *(column for column, each in ANSWERS.items() if each.info.read),
-)
-"""Columns that follow from others: of the two roughness lengths, the ratio to the diameter tells
-beds apart that are alike but for the size of their grains."""
+"""The quantities of a scene by their columns in tables."""
+OF_QUESTION = tuple(name for name, each in COLUMNS.items() if not each.is_method)
+"""Columns of what is asked."""
+OF_METHOD = tuple(name for name, each in COLUMNS.items() if each.is_method)
+"""Columns of how a scene is answered."""
+TWINS = ("z0_m", "regime")
+"""Columns that say again what others say: of the two roughness lengths, the ratio to the diameter
+tells beds apart that are alike but for the size of their grains."""
+LEFT_OPEN = tuple(column for column in OF_METHOD if COLUMNS[column].info.read)
+"""Columns of the method that follow from the question where a study leaves them open."""
+
+
+def question(scene: Scene) -> dict[str, Any]:
+    """What a scene asks, by column."""
+    return {column: COLUMNS[column].used(scene) for column in OF_QUESTION}
+
+
+def method(scene: Scene) -> dict[str, Any]:
+    """How a scene is answered, by column; what it leaves open is worked out."""
+    return {column: COLUMNS[column].used(scene) for column in OF_METHOD}
 
 
 def asked(scene: Scene) -> dict[str, Any]:
-    """Values that a scene asks for, by column."""
-    return {column: each.asked(scene) for column, each in COLUMNS.items()}
-
-
-def answered(scene: Scene) -> dict[str, Any]:
-    """How the scene that was run answers, by column."""
-    return {column: each.used(scene) for column, each in ANSWERS.items()}
+    """What a scene asks and how its method is written, by column; None is left open."""
+    written = {column: COLUMNS[column].asked(scene) for column in OF_METHOD}
+    return question(scene) | written
 
 
 def used(scene: Scene) -> dict[str, Any]:
@@ -167,7 +260,25 @@ def used(scene: Scene) -> dict[str, Any]:
     return {column: each.used(scene) for column, each in COLUMNS.items()}
 
 
+def written(scene: Scene) -> str:
+    """The fields of the method that a scene does not leave at their defaults.
+
+    Returns
+    -------
+    str
+        For each its name in the table ``[method]`` and its value; ``auto`` if there is none.
+    """
+    texts = []
+    for each in FIELDS:
+        if not each.is_method:
+            continue
+        value = each.asked(scene)
+        if value is not None and value != default_of(each.name):
+            texts.append(f"{each.name.removeprefix('method.')} = {value}")
+    return ", ".join(texts) or "auto"
+
+
 def others(columns: Iterable[Hashable], *but: str) -> list[str]:
     """The columns of fields among some, but for a few and for those that follow from others."""
-    rest = set(columns) - {*but, *FOLLOW}
-    return [column for column in (*COLUMNS, *ANSWERS) if column in rest]
+    rest = set(columns) - {*but, *TWINS, *LEFT_OPEN}
+    return [column for column in COLUMNS if column in rest]

@@ -1,34 +1,30 @@
-"""The parts of a scene: fluid, grain, bed, flow, forces and protocol; frozen, validated, SI.
+"""The parts of what is asked: fluid, grain, bed, flow above, forces, and what counts as motion.
 
-Each field is declared here once: its name and default are the study file's, its words and the text
-under it are what tables, figures and the reference of study files say of it. Lines of the text that
-begin with a dash give the meaning of one word each. Angles are in degrees and say so in their
-names; all else is in SI units or in the unit that is declared. Ranges are limits of nature.
+Every part is frozen and validated. How the question is answered is in `method`.
 """
 
-import dataclasses
-from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import partial
 from math import log, radians, tan
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 import pydantic
 from numpy.typing import ArrayLike
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    InstanceOf,
-    PlainSerializer,
-    model_validator,
-)
-from pydantic.fields import FieldInfo
+from pydantic import Field, InstanceOf, PlainSerializer
 
 from orchestrator.digits import rounded
 from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
 from orchestrator.physics.laws import LAWS
+from orchestrator.study.declare import (
+    Fraction,
+    Height,
+    Length,
+    List,
+    Part,
+    Roughness,
+    Viscosity,
+    field,
+)
 from orchestrator.study.profile import Profile
 from orchestrator.study.shapes import SHAPES, Shape
 from orchestrator.types import FloatArray
@@ -39,99 +35,16 @@ LAW_LABELS = {
     **{name: law.label for name, law in LAWS.items()},
 }
 SHAPE_MEANINGS = {name: shape.meaning for name, shape in SHAPES.items()}
-Turbulence = Literal["kEpsilon", "RNGkEpsilon", "realizableKE", "kOmegaSST"]
 Packing = Literal["aligned", "horizontal", "disordered", "poured"]
 if TYPE_CHECKING:
     ShapeName = str
     LawName = str
 else:
     ShapeName, LawName = Literal[tuple(SHAPES)], Literal[tuple(LAW_LABELS)]
-List = Field(strict=False)  # beside a type of tuples: a list of TOML is taken as one
 Range = Annotated[tuple[float, float], List]
-Fraction = Annotated[float, Field(ge=1e-6, le=1)]
 File = Annotated[
     InstanceOf[Profile], PlainSerializer(lambda profile: profile and profile.digest)
 ]
-Roughness = Annotated[
-    float, Field(ge=1e-12, le=10)
-]  # from smooth walls to the largest boulder
-Height = Annotated[
-    float, Field(ge=1e-6, le=1e4)
-]  # from five of the smallest grains to mountains
-Length = Annotated[
-    float, Field(ge=1e-12, le=1e4)
-]  # the least that the fields above allow
-Viscosity = Annotated[
-    float, Field(ge=1e-8, le=1e3)
-]  # liquid helium, 2e-8, to thin gases and lava
-
-
-class UnfitError(ValueError):
-    """Two fields of a scene that do not go together: which, why and what would."""
-
-    def __init__(self, field: str, what: str, remedy: str = "leave it out") -> None:
-        self.field, self.what, self.remedy = field, what, remedy
-        super().__init__(f"{field}: {what} ({remedy})")
-
-
-@dataclass(frozen=True)
-class Info:
-    """The words for a field; its meaning is the text under its declaration."""
-
-    label: str = ""
-    symbol: str = ""  # as formulas write it, an index after an underscore
-    unit: str = ""
-    column: str = (
-        ""  # of tables, with the unit, where that is not its name; "-" for none
-    )
-    scope: str = (
-        "every scene"  # the scenes on which it has an effect, a key of `fields.APPLIES`
-    )
-    about: Literal["question", "answer", "replica"] = "question"
-    """A question to nature, a way to answer it (levels change these), or one of many alike."""
-    choices: Mapping[str, str] = dataclasses.field(
-        default_factory=dict
-    )  # meanings of words
-    read: str = ""  # property of a scene with the value in use, where the field may be left open
-
-
-def field(default: Any = ..., *words: str, since: bool = False, **settings: Any) -> Any:
-    """Declare a field: default (none: required), symbol, unit, column, label, `read` of `Info`.
-
-    `settings` are further words of `Info`, and rules of `pydantic.Field` such as ``ge``. A field
-    that came after the first studies is `since`: scenes that have its default keep their id.
-    """
-    about = {
-        name: settings.pop(name) for name in Info.__annotations__ if name in settings
-    }
-    about |= dict(
-        zip(("symbol", "unit", "column", "label", "read"), words, strict=False)
-    )
-    if since:
-        settings["exclude_if"] = lambda value: value == default
-    declared: FieldInfo = Field(default, **settings)
-    declared.metadata.append(Info(**about))
-    return declared
-
-
-class Part(BaseModel):
-    """Base of a scene's parts: immutable, exact types, no unknown keys, no NaN."""
-
-    model_config = ConfigDict(
-        frozen=True,
-        extra="forbid",
-        strict=True,
-        allow_inf_nan=False,
-        use_attribute_docstrings=True,
-    )
-
-    @model_validator(mode="after")
-    def _without_minus_zero(self) -> Self:
-        """Make one number of 0.0 and -0.0, which are equal: else they are two scenes."""
-        vars(self).update(
-            {n: 0.0 for n, v in vars(self).items() if type(v) is float and not v}
-        )
-        return self
 
 
 class LogNormal(Part):
@@ -174,11 +87,8 @@ _kind = pydantic.Discriminator(
 Sizes = Annotated[Annotated[LogNormal, pydantic.Tag("")] | Sieve, _kind]
 """In a study file ``[[5e-4, 0.4], [1e-3, 0.6]]``, or ``{ sigma_g = 1.3 }``."""
 _pile = partial(field, scope="piles")
-_answer = partial(field, scope="piles", about="answer")
 _dune = partial(field, scope="dunes", since=True)
 _poured = partial(field, scope="poured beds", since=True)
-_solved = partial(field, scope="solved flows", about="answer")
-_dem = partial(field, scope="DEM", about="answer")
 
 
 class Fluid(Part):
@@ -189,34 +99,47 @@ class Fluid(Part):
 
     # from the vapour that ripples a comet to mercury, 13,500, and melts of metals
     density: float = field(
-        1.0, "ρ_f", "kg/m³", "rho_f_kg_m3", "fluid density", ge=1e-7, le=2e4
+        1.0,
+        symbol="ρ_f",
+        unit="kg/m³",
+        column="rho_f_kg_m3",
+        label="fluid density",
+        ge=1e-7,
+        le=2e4,
     )
     """density of the fluid"""
-    viscosity: Viscosity = field(1e-5, "ν", "m²/s", "nu_m2_s")
+    viscosity: Viscosity = field(1e-5, symbol="ν", unit="m²/s", column="nu_m2_s")
     """kinematic viscosity that the grains feel"""
-    gravity: float = field(GRAVITY, "g", "m/s²", "g_m_s2", ge=1e-6, le=1e4)
+    gravity: float = field(
+        GRAVITY, symbol="g", unit="m/s²", column="g_m_s2", ge=1e-6, le=1e4
+    )
     """acceleration of gravity"""
 
 
 class Grain(Part):
-    """Spheres and their contact law."""
+    """Spheres: their size, their weight, their friction and cohesion."""
 
     # smaller ones are carried by Brownian motion, larger ones no flood has moved
-    diameter: float = field(..., "d", "m", "d_m", ge=1e-7, le=10)
+    diameter: float = field(..., symbol="d", unit="m", column="d_m", ge=1e-7, le=10)
     """grain diameter"""
     # from aerogels, 0.2, to osmium, 22,600
     density: float = field(
-        2500.0, "ρ_sol", "kg/m³", "rho_sol_kg_m3", "grain density", ge=0.1, le=25_000
+        2500.0,
+        symbol="ρ_sol",
+        unit="kg/m³",
+        column="rho_sol_kg_m3",
+        label="grain density",
+        ge=0.1,
+        le=25_000,
     )
     """density of the grains"""
-    friction_angle_deg: float = field(35.0, "φ", "°", "phi_deg", ge=1, le=89)
+    friction_angle_deg: float = field(
+        35.0, symbol="φ", unit="°", column="phi_deg", ge=1, le=89
+    )
     """angle of Coulomb's friction between grains"""
-    # softer grains sink into one another by a hundredth, harder ones are harder than steel
-    stiffness: float = _dem(1e4, "K d/W", ge=1e2, le=1e9)
-    """spring constant of a contact, normal and tangential, times the diameter over the weight"""
-    damping: float = _dem(0.1, ge=0, le=1)
-    """damping ratio of a collision"""
-    cohesion: float = field(0.0, "", "N/m", "cohesion_n_m", since=True, ge=0, le=1e3)
+    cohesion: float = field(
+        0.0, unit="N/m", column="cohesion_n_m", since=True, ge=0, le=1e3
+    )
     """pull of a contact over the diameter, of two sizes over their harmonic mean; by pivots and
     peeling alone"""
     sizes: Sizes | None = _poured(None)
@@ -234,7 +157,7 @@ class Forces(Part):
     )
     """drag and lift on an exposed grain"""
     lift_coefficient: float = field(
-        LIFT_COEFFICIENT, "α_s", "", "alpha_s", ge=0, le=100
+        LIFT_COEFFICIENT, symbol="α_s", column="alpha_s", ge=0, le=100
     )
     """lift coefficient"""
     stress: Literal["wall", "eq10"] = _pile("wall")
@@ -259,52 +182,6 @@ class Forces(Part):
     - balanced: drags on a patch add up to its stress, by peeling or updates anew as grains leave"""
 
 
-class Protocol(Part):
-    """How the threshold is found; by DEM the flow rises in load steps."""
-
-    method: Literal["auto", "dem", "peeling", "pivot", "local"] = field(
-        "auto", label="threshold method", about="answer"
-    )
-    """how the threshold is found: DEM, peeling (pivots that free one another), the pivot of each
-    grain by itself, or the closed form along the bed line, without grains and for any length; left
-    open, the program chooses one by known errors and by what each method knows
-    - auto: chosen for the scene
-    - dem: DEM
-    - peeling: peeling
-    - pivot: pivot
-    - local: closed form along the bed line"""
-    load_increment: float = _dem(0.02, "Δu*/u*", ge=1e-4, le=0.2)
-    """relative rise of u* from one load step to the next"""
-    waiting_time: float = _dem(10.0, unit="√(d/g′)", ge=1, le=1e4)
-    """time without a passage of the displacement criterion that ends a load step without rest"""
-    displacement_criterion: float = _dem(
-        0.3, "", "d", scope="DEM and peeling", ge=1e-3, le=0.5
-    )
-    """displacement along the bed from which a grain counts as moved"""
-    final_fraction: Fraction = _dem(
-        0.9, label="last fraction", scope="DEM of piles", read="last_fraction"
-    )
-    """fraction of the exposed grains that should have moved by the last load step, or 0.05 more
-    than the largest of `fractions` if that is more"""
-    fractions: Annotated[tuple[Fraction, ...], List] = _pile(
-        (0.1, 0.3, 0.5, 0.7), "n/N", column="-", min_length=1
-    )
-    """fractions of the exposed grains at which the thresholds of a pile are reported"""
-    time_step: float = _dem(0.2, unit="√(m/K)", ge=1e-3, le=2)
-    """time step of the grains' integration"""
-    update: Annotated[float, Field(ge=0, le=0.5)] = field(
-        0.0,
-        "",
-        "of N",
-        "",
-        "update of the bed",
-        scope="DEM and peeling of piles",
-        since=True,
-    )
-    """part of the counted grains after which the flow is solved over the bed line of the remaining
-    ones, up to the last fraction; 0 keeps the first flow, as in the paper"""
-
-
 class Gusts(Part):
     """Peaks of the turbulent stress."""
 
@@ -322,82 +199,24 @@ class Gusts(Part):
 
 
 class Flow(Part):
-    """The flow over the bed, and how a grain feels it."""
+    """What flows above the bed: its top, its depth and its gusts."""
 
-    model: Literal["solve", "waves", "flat"] = _answer(
-        "solve", "", "", "flow_model", "flow model"
-    )
-    """where the stress on a pile comes from
-    - solve: OpenFOAM
-    - waves: linear theory with A and B of each wavelength (Fourrière et al. 2010)
-    - flat: log law of a flat bed, u* = u*₀"""
-    speed: float = _solved(
-        10.0, "U_e", "m/s", "solve_u_e_m_s", "speed of the solve", ge=1e-6, le=1e3
-    )
-    """speed 10 h above the flat bed at which the flow is solved; the stress is scaled from it"""
-    viscosity: Viscosity | None = _solved(
-        None, "ν", "m²/s", "solve_nu_m2_s", "viscosity of the solve", "solve_viscosity"
-    )
-    """kinematic viscosity of the solve, over a rough wall; by default 1e-5, or less where the first
-    cells would not be turbulent"""
-    first_cell_height: Length | None = _solved(
-        None, "", "m", "first_cell_m", "first cell", "first_cell_height"
-    )
-    """height of the cells on the bed; by default h/40, more on a rough bed and where the given
-    viscosity needs it"""
-    cells_per_face: int = _solved(40, ge=10, le=400)
-    """cells of the mesh along each face of the pile"""
-    expansion_ratio: float = _solved(1.1, ge=1.01, le=2)
-    """ratio of neighbouring cells up from the bed and away from the pile, for 40 cells along a
-    face"""
-    roughness: Roughness | None = _answer(
-        None,
-        "z_0",
-        "m",
-        "solve_z0_m",
-        "roughness length of the solve",
-        "solve_roughness",
-    )
-    """roughness length at which the flow is solved, which similar beds can share; by default the
-    bed's"""
-    turbulence_model: Turbulence = _solved("kEpsilon")
-    """OpenFOAM's turbulence model
-    - kEpsilon: k-ε
-    - RNGkEpsilon: RNG k-ε
-    - realizableKE: realizable k-ε
-    - kOmegaSST: k-ω SST"""
-    convection_scheme: Literal["linearUpwind", "upwind", "limitedLinear"] = _solved(
-        "linearUpwind"
-    )
-    """OpenFOAM's scheme for the convection of U"""
     gusts: Gusts | None = field(None, since=True)
     """peaks of the turbulent stress, { intensity = 0.4, events = 100, duration = 1 }: independent,
     log-normal events, by default none; by pivots and peeling the largest acts, by DEM of piles all
     in each load step, each for a duration in √(d/g′), by default 1, of an eddy of 3 d in water"""
     top: Literal["open water", "closed channel", "boundary layer"] = field(
-        "boundary layer", "", "", "flow_top", "top of the flow", since=True
+        "boundary layer", column="flow_top", label="top of the flow", since=True
     )
     """what the flow has above
     - open water: a level surface without stress
     - closed channel: a wall as rough as the bed
     - boundary layer: the log layer goes on above"""
-    depth: Length | None = field(None, "D", "m", "depth_m", since=True)
+    depth: Length | None = field(
+        None, symbol="D", unit="m", column="depth_m", since=True
+    )
     """depth of open water or of a closed channel over the flat bed, at least three heights of forms
     and obstacles, over a level bed three of the largest grains"""
-    lid: float = _solved(100.0, unit="h", since=True, ge=3, le=1000)
-    """height of a boundary layer's lid above the flat bed, in undisturbed flow"""
-    upstream: float = _solved(
-        80.0, "", "h", "", "flat bed upstream", since=True, ge=3, le=1000
-    )
-    """flat bed from the inlet to the forms"""
-    downstream: float = _solved(
-        100.0, "", "h", "", "flat bed downstream", since=True, ge=3, le=1000
-    )
-    """flat bed from the forms to the outlet"""
-    non_orthogonal_correctors: int = _solved(
-        1, label="non-orthogonal correctors", ge=0, le=5
-    )
-    """repeated solves of the pressure in each iteration"""
 
 
 class Obstacle(Part):
@@ -430,16 +249,20 @@ class Obstacle(Part):
 class Bed(Part):
     """Common fields of all beds. Subclasses add the grains."""
 
-    slope_deg: float = field(0.0, "α", "°", "alpha_deg", ge=0, lt=90)
+    slope_deg: float = field(0.0, symbol="α", unit="°", column="alpha_deg", ge=0, lt=90)
     """slope of the bed; the flow goes up it"""
     # at 60 the two grains below touch, at 0 the grain falls between them
-    entrainment_angle_deg: float = field(60.0, "β", "°", "beta_deg", ge=1, le=60)
+    entrainment_angle_deg: float = field(
+        60.0, symbol="β", unit="°", column="beta_deg", ge=1, le=60
+    )
     """angle at which a grain leaves its pocket, between neighbours 2 d cos β apart"""
-    roughness: Roughness = field(..., "z_0", "m", "z0_m", "roughness length")
+    roughness: Roughness = field(
+        ..., symbol="z_0", unit="m", column="z0_m", label="roughness length"
+    )
     """roughness length of the bed, or a part of the diameter of its grains, "d/30" """
     # a smaller grain falls through the pores of a bed, a larger one lies on many grains
     relative_size: float = field(
-        1.0, "D/d", scope="single grains", since=True, ge=0.1, le=10
+        1.0, symbol="D/d", scope="single grains", since=True, ge=0.1, le=10
     )
     """diameter of a single grain over that of its two neighbours"""
 
@@ -457,7 +280,7 @@ class PileBed(Bed):
     """what the bed is made of
     - grain: one grain on its two fixed neighbours, in an undisturbed boundary layer
     - pile: grains under any bed line: a form, a train of forms, a profile"""
-    height: Height = _pile(0.02, "h", "m", "h_m")
+    height: Height = _pile(0.02, symbol="h", unit="m", column="h_m")
     """height of the forms; that of a profile follows. A flat bed has none: with obstacles lengths
     in h are heights of the tallest, without any they are of 20 diameters, whatever is given"""
     shape: ShapeName = _pile(
@@ -472,10 +295,10 @@ class PileBed(Bed):
     lee_slope_deg: float | None = _pile(None, unit="°", since=True, gt=0, le=60)
     """slope of a straight lee side or a step down; by default the windward side's, 30 of a dune and
     a step down"""
-    brink_radius: float = _dune(0.0, "", "m", ge=0, le=1e3)
+    brink_radius: float = _dune(0.0, unit="m", ge=0, le=1e3)
     """radius with which a dune's brink is rounded; 0 leaves it sharp"""
     length: Length | None = field(
-        None, "", "m", scope="beds with level parts", since=True
+        None, unit="m", scope="beds with level parts", since=True
     )
     """length of level bed with grains: a trapezoid's top, a flat bed, before or behind a step; by
     default 4 h, of a flat bed 80 diameters"""
@@ -486,7 +309,7 @@ class PileBed(Bed):
     profile: File | None = _pile(None, since=True)
     """file with the bed line, in place of a shape: columns x_m and z_m; its path is relative to the
     study file"""
-    smoothing: float = field(0.0, "", "m", scope="profiles", since=True, ge=0, le=1e3)
+    smoothing: float = field(0.0, unit="m", scope="profiles", since=True, ge=0, le=1e3)
     """length over which a noisy profile is smoothed"""
     obstacles: Annotated[tuple[Obstacle, ...], List] = _pile((), since=True)
     """fences, blocks and half-cylinders, which carry no grains: tables with `kind`, `x`, `height`
@@ -505,22 +328,18 @@ class PileBed(Bed):
     - horizontal: level rows
     - disordered: rows along the slope with random gaps
     - poured: poured by LIGGGHTS into a mould of the bed line, settled and cut to it"""
-    disorder: float = field(0.02, "", "d", scope="disordered piles", ge=1e-6, le=0.2)
+    disorder: float = field(0.02, unit="d", scope="disordered piles", ge=1e-6, le=0.2)
     """largest gap between two grains of the row under the four uppermost"""
-    poured_depth: float = _poured(6.0, "", "d", "", "depth of the mould", ge=3, le=100)
-    """vertical depth of a poured bed under the bed line, to a row of fixed grains"""
-    width: float = _poured(
-        0.0, "", "d", "", "width of the strip", about="answer", ge=0, le=50
+    poured_depth: float = _poured(
+        6.0, unit="d", label="depth of the mould", ge=3, le=100
     )
+    """vertical depth of a poured bed under the bed line, to a row of fixed grains"""
+    width: float = _poured(0.0, unit="d", label="width of the strip", ge=0, le=50)
     """width of a strip of poured grains with periodic sides, at least 3 of the largest; 0 is one
     layer in the plane of the flow"""
-    seed: int = field(
-        0, scope="random beds and replicas", about="replica", ge=0, le=10**9
-    )
+    seed: int = field(0, scope="random beds and replicas", ge=0, le=10**9)
     """which of the many random packings; of a lattice 0 is itself, any other a replica with grains
     up to 1e-6 d aside"""
-    mobile_layers: int = _answer(2, ge=1, le=1000)
-    """layers that may move, of a poured bed by default 4; those below are fixed"""
 
     @property
     def form(self) -> Shape:
@@ -542,6 +361,11 @@ class PileBed(Bed):
         """Height of what the flow goes over, m: of the forms, on a flat bed of its obstacles."""
         is_flat = self.shape == "flat" and not self.profile and self.obstacles
         return max(each.height for each in self.obstacles) if is_flat else self.height
+
+    @property
+    def highest(self) -> float:
+        """Height of the highest form or obstacle, m."""
+        return max([self.relief, *(each.height for each in self.obstacles)])
 
     @property
     def counts(self) -> str | Range:
@@ -584,6 +408,34 @@ class PileBed(Bed):
     def is_replica(self) -> bool:
         """Whether it is a lattice but for shifts that matter to nothing but round-off."""
         return self.packing in ("aligned", "horizontal") and self.seed > 0
+
+
+class Threshold(Part):
+    """What is counted as motion, and at which parts of the grains."""
+
+    displacement: float = field(
+        0.3,
+        unit="d",
+        column="displacement_criterion",
+        label="displacement criterion",
+        scope="DEM and peeling",
+        ge=1e-3,
+        le=0.5,
+    )
+    """displacement along the bed from which a grain counts as moved"""
+    fractions: Annotated[tuple[Fraction, ...], List] = _pile(
+        (0.1, 0.3, 0.5, 0.7), symbol="n/N", column="-", min_length=1
+    )
+    """fractions of the exposed grains at which the thresholds of a pile are reported"""
+    update: Annotated[float, Field(ge=0, le=0.5)] = field(
+        0.0,
+        unit="of N",
+        label="update of the bed",
+        scope="DEM and peeling of piles",
+        since=True,
+    )
+    """part of the counted grains after which the flow is solved over the bed line of the remaining
+    ones, up to the last fraction; 0 keeps the first flow, as in the paper"""
 
 
 def percentile(sizes: Sizes | None, diameter: float, part: float) -> float:

@@ -7,20 +7,49 @@ shape is one entry of `SHAPES`; mesh, packing, checks, labels and the study file
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import cos, exp, pi, radians, sin, sqrt, tan
-from typing import TYPE_CHECKING, Literal
+from typing import Literal, Protocol
 
 import numpy as np
 
 from orchestrator.physics.measured import rushil_aspect, rushil_form
 from orchestrator.types import FloatArray
 
-if TYPE_CHECKING:
-    from orchestrator.study.parts import PileBed
-
 CHORDS, ARC_DEG = 40, 2.0
 """Chords of a windward side that is a curve, and the bend between two of a rounded brink."""
 GAUSSIAN_END = 3.5
 """Where a Gaussian hill is cut, standard deviations: it is let down by 0.2 % of its height."""
+
+
+class Form(Protocol):
+    """What the corners of a form follow from: fields of a bed, lengths in m."""
+
+    @property
+    def shape(self) -> str:
+        """Name of the shape."""
+
+    @property
+    def height(self) -> float:
+        """Height of the form."""
+
+    @property
+    def slope_deg(self) -> float:
+        """Slope of its windward side, degrees."""
+
+    @property
+    def lee_slope(self) -> float:
+        """Slope of its lee side, degrees."""
+
+    @property
+    def level_length(self) -> float:
+        """Length of its level part."""
+
+    @property
+    def windward(self) -> str:
+        """Whether the windward side is straight or curved."""
+
+    @property
+    def brink_radius(self) -> float:
+        """Radius of its brink."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +58,7 @@ class Shape:
 
     name: str
     meaning: str
-    corners: Callable[["PileBed"], FloatArray]  # of one form of a bed
+    corners: Callable[[Form], FloatArray]  # of one form of a bed
     fields: tuple[
         str, ...
     ] = ()  # of the bed that not all shapes have, and this one has
@@ -39,7 +68,7 @@ class Shape:
     counted: Literal["windward", "all"] = "windward"  # exposed grains, by default
 
 
-def _faces(bed: "PileBed") -> FloatArray:
+def _faces(bed: Form) -> FloatArray:
     """Two straight faces."""
     up, down = (
         bed.height / tan(radians(slope)) for slope in (bed.slope_deg, bed.lee_slope)
@@ -47,12 +76,12 @@ def _faces(bed: "PileBed") -> FloatArray:
     return np.array([[0, 0], [up, bed.height], [up + down, 0]])
 
 
-def _trapezoid(bed: "PileBed") -> FloatArray:
+def _trapezoid(bed: Form) -> FloatArray:
     foot, crest, toe = _faces(bed)
     return np.array([foot, crest, *np.add([crest, toe], [bed.level_length, 0])])
 
 
-def _dune(bed: "PileBed") -> FloatArray:
+def _dune(bed: Form) -> FloatArray:
     """A windward side, straight or curved, and a slip face; its brink sharp or rounded."""
     if bed.windward == "curved":
         t = np.linspace(0, 1, CHORDS + 1)
@@ -95,13 +124,13 @@ def _rounded(corners: FloatArray, radius: float) -> FloatArray:
     )
 
 
-def _cosine(bed: "PileBed") -> FloatArray:
+def _cosine(bed: Form) -> FloatArray:
     t = np.linspace(0, 1, 2 * CHORDS + 1)
     length = pi * bed.height / tan(radians(bed.slope_deg))
     return np.column_stack([length * t, bed.height / 2 * (1 - np.cos(2 * pi * t))])
 
 
-def _gaussian(bed: "PileBed") -> FloatArray:
+def _gaussian(bed: Form) -> FloatArray:
     t = np.linspace(-GAUSSIAN_END, GAUSSIAN_END, 3 * CHORDS + 1)
     deviation = bed.height / tan(radians(bed.slope_deg)) / sqrt(exp(1))
     end = exp(-(GAUSSIAN_END**2) / 2)
@@ -109,12 +138,12 @@ def _gaussian(bed: "PileBed") -> FloatArray:
     return np.column_stack([deviation * (t + GAUSSIAN_END), z])
 
 
-def _rushil(bed: "PileBed") -> FloatArray:
+def _rushil(bed: Form) -> FloatArray:
     x, z = rushil_form(rushil_aspect(bed.slope_deg))
     return bed.height * np.column_stack([x - x[0], z])
 
 
-def _level(bed: "PileBed") -> FloatArray:
+def _level(bed: Form) -> FloatArray:
     """Level bed, behind a face up to it or before a face down from it."""
     height, length = bed.height, bed.level_length
     if bed.shape == "step up":

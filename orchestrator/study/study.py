@@ -1,4 +1,4 @@
-"""A study file: fluid, grain, bed, flow, protocol and axes in TOML, read into scenes.
+"""A study file: the tables of what is asked, of the method, and axes, read into scenes.
 
 The tables at the top hold for every scene. Each ``[[group]]`` overrides some of them, and its
 ``axes`` span a grid: every combination of the listed values is a scene.
@@ -26,40 +26,38 @@ from orchestrator.errors import InputError
 from orchestrator.physics import fluids
 from orchestrator.study import units
 from orchestrator.study.closed_form import resolved
+from orchestrator.study.declare import List, Part, UnfitError
 from orchestrator.study.fidelities import AUTO, fields_of
-from orchestrator.study.fields import PARTS
-from orchestrator.study.parts import List, Part, PileBed, Sizes, UnfitError, percentile
+from orchestrator.study.fields import FIDELITY, PARTS, SEED, default_of, table_of
+from orchestrator.study.keys import (
+    GONE_KEYS,
+    GONE_VALUES,
+    Table,
+    Tables,
+    by_name,
+    check_moved,
+    nested,
+)
+from orchestrator.study.parts import PileBed, Sizes, percentile
 from orchestrator.study.profile import LARGEST_NUMBER, Files, decoded, read_bytes
 from orchestrator.study.scene import Scene, roughness_length
 from orchestrator.study.shapes import SHAPES
 from orchestrator.study.source import Source, find, presets
 
 TIME_LIMIT_S = 3600.0
-BED = {
-    "kind": "grain",
-    "roughness": "d/30",
-}  # fields of a bed that a file may leave out
+BED = {"kind": "grain", "roughness": "d/30"}
+"""Fields of a bed that a file may leave out."""
+POURED_LAYERS = 4
+"""Mobile layers of a poured bed: the fewest that are near the reference (docs/poured.md)."""
 LEVEL_HEIGHT = 20.0
 """Diameters that stand for the height of a level bed. Its length is four heights by default: level
 beds of all grains are alike."""
-NO_TOLERANCE = 'leave it out; protocol.method = "dem" answers by DEM'
-MOST_SCENES, MOST_BYTES = 100_000, 2**24  # a file that lists so many scenes is smaller
-GONE_KEYS = {
-    "flow.nodes": (
-        "flows are no longer interpolated between roughness lengths",
-        "leave it out; beds that are alike share a flow with one flow.roughness, in m",
-    ),
-}
-"""Keys that study files had before: what became of them, and what to write now."""
-GONE_VALUES = {
-    ("flow.model", "hill"): (
-        "the linear theory of one low hill is gone",
-        'write "waves", the linear theory of each wavelength, or "solve"',
-    ),
-}
-"""Values that keys of study files had before: what became of them, and what to write now."""
-UNKNOWN, MISSING = "unknown key", "is missing"
-Table = dict[str, Any]
+NO_TOLERANCE = 'leave it out; method.kind = "dem" answers by DEM'
+MOST_SCENES = 100_000
+MOST_BYTES = 2**24
+"""Largest study file: one that lists so many scenes is smaller."""
+UNKNOWN = "unknown key"
+MISSING = "is missing"
 Wind = Annotated[float, Field(gt=0, le=150)]
 MIXTURE: TypeAdapter[Sizes | None] = TypeAdapter(Sizes | None)
 
@@ -82,7 +80,8 @@ class _Tables(Part):
     bed: Table = Field(default={})
     flow: Table = Field(default={})
     forces: Table = Field(default={})
-    protocol: Table = Field(default={})
+    threshold: Table = Field(default={})
+    method: Table = Field(default={})
     axes: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(default={})
     seeds: int | None = Field(default=None, ge=0, le=1000)
 
@@ -204,17 +203,17 @@ def _values_of(scenes: Sequence[Scene]) -> dict[str, list[float]]:
     return values
 
 
-def _values_in(parts: Mapping[str, Table]) -> dict[str, list[float]]:
+def _values_in(tables: Mapping[str, Table]) -> dict[str, list[float]]:
     """The values of the fields `ASKED` in the tables of one scene, which may be wrong."""
-    given = {name: dict(parts.get(name, {})) for name in PARTS}
+    given = {name: dict(tables.get(name, {})) for name in PARTS}
     with suppress(InputError):
         given["fluid"] = fluids.numbers_of(given["fluid"])
     values = {}
-    for field in ASKED:
-        part, _, name = field.partition(".")
-        value = given[part].get(name, PARTS[part].model_fields[name].default)
+    for name in ASKED:
+        table, _, field = name.partition(".")
+        value = given[table].get(field, default_of(name))
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        values[field] = [value] if is_number and abs(value) < LARGEST_NUMBER else []
+        values[name] = [value] if is_number and abs(value) < LARGEST_NUMBER else []
     return values
 
 
@@ -289,35 +288,43 @@ def parse(text: str, *, name: str, where: str, files: Files | None = None) -> St
         With the field and the remedy.
     """
     try:
-        file = _File.model_validate(tomllib.loads(text))
-    except ValidationError as error:
-        raise _explained(error, where) from None
+        data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise _not_toml(str(error), text, where) from None
+    _check_keys(data, where)
+    try:
+        file = _File.model_validate(data)
+    except ValidationError as error:
+        raise _explained(error, where) from None
     if files is None:
         files = Files(Path(where).parent)
     files.carried = dict(file.profiles)
-    tables = file.group or (_Group(),)
+    groups_of_file = file.group or (_Group(),)
     places = [where]
     if file.group:
-        places = [f"{where}: group {number}" for number in range(1, len(tables) + 1)]
+        places = [_place(where, number) for number in range(len(file.group))]
     listed: list[list[Scene]] = []
     count = 0
-    for table, place in zip(tables, places, strict=True):
-        axes = _axes(file, table, place)
+    for group, place in zip(groups_of_file, places, strict=True):
+        axes = _axes(file, group, place)
         count += math.prod(map(len, axes.values()))
         if count > MOST_SCENES:
             what = f"more than {MOST_SCENES} scenes in the study"
             raise InputError(what, f"{place}: axes", "shorten the lists")
-        parts = {n: {**getattr(file, n), **getattr(table, n)} for n in PARTS}
-        listed.append([*_scenes(parts, axes, place, files)])
+        tables = by_name(dict(file))
+        for part, table in by_name(dict(group)).items():
+            tables[part] |= table
+        listed.append([*_scenes(tables, axes, place, files)])
     # force laws are found for the scenes of all groups at once
-    laws = resolved([*itertools.chain(*listed)])
+    laws = [*resolved([*itertools.chain(*listed)])]
     groups = []
-    for number, (table, place) in enumerate(zip(tables, places, strict=True), 1):
-        count = len(listed[number - 1])
-        scenes = tuple(itertools.chain(*itertools.islice(laws, count)))
-        groups.append(Group(table.name or f"group {number}", scenes, place))
+    first = 0
+    for number, group in enumerate(groups_of_file):
+        last = first + len(listed[number])
+        scenes = tuple(itertools.chain(*laws[first:last]))
+        name_of_group = group.name or f"group {number + 1}"
+        groups.append(Group(name_of_group, scenes, places[number]))
+        first = last
     return Study(
         name=name,
         title=file.title or name,
@@ -330,115 +337,174 @@ def parse(text: str, *, name: str, where: str, files: Files | None = None) -> St
     )
 
 
+def _place(where: str, group: int) -> str:
+    """The place of a group in messages; `group` counts from 0."""
+    return f"{where}: group {group + 1}"
+
+
+def _check_keys(data: Mapping[str, Any], where: str) -> None:
+    """Refuse keys that study files had before, at the top and in the groups."""
+    check_moved(data, where)
+    groups = data.get("group")
+    if not isinstance(groups, list):
+        return
+    for number, group in enumerate(groups):
+        if isinstance(group, dict):
+            check_moved(group, _place(where, number))
+
+
 def _axes(file: "_File", table: "_Group", where: str) -> dict[str, list[Any]]:
     """The axes of a group, with the seeds that it asks for."""
     axes = {**file.axes, **table.axes}
     seeds = file.seeds if table.seeds is None else table.seeds
     if not seeds:
         return axes
-    if "bed.seed" in {**axes, **{f"bed.{key}": 0 for key in {**file.bed, **table.bed}}}:
-        what = f"it asks for the seeds 0 to {seeds - 1}, and bed.seed for others"
+    if SEED in axes or "seed" in file.bed or "seed" in table.bed:
+        what = f"it asks for the seeds 0 to {seeds - 1}, and {SEED} for others"
         raise InputError(what, f"{where}: seeds", "leave out one of the two")
-    axes["bed.seed"] = [*range(seeds)]
+    axes[SEED] = [*range(seeds)]
     return axes
 
 
 def _scenes(
-    tables: Mapping[str, Table], axes: Mapping[str, list[Any]], where: str, files: Files
+    tables: Tables, axes: Mapping[str, list[Any]], where: str, files: Files
 ) -> Iterator[Scene]:
     """A scene for each combination of the axes' values; each must be a scene of its own."""
-    keys = [key.partition(".") for key in axes]
-    for part, _, name in keys:
-        if part not in PARTS or not name:
-            what, remedy = (
-                "not a table and a field of it",
-                'write "grain.diameter" = [1e-4, 1e-3]',
-            )
-            raise InputError(what, f"{where}: axes.{part}", remedy)
+    for name in axes:
+        if table_of(name) not in PARTS:
+            first = name.partition(".")[0]
+            remedy = 'write "grain.diameter" = [1e-4, 1e-3]'
+            what = "not a table and a field of it"
+            raise InputError(what, f"{where}: axes.{first}", remedy)
     points: dict[str, tuple[Any, ...]] = {}
     for point in itertools.product(*axes.values()):
-        parts = {part: dict(tables[part]) for part in PARTS}
-        for (part, _, name), value in zip(keys, point, strict=True):
-            parts[part][name] = value
-        try:
-            scene = make_scene(parts, where, files)
-        except InputError as error:
-            if error.what in (UNKNOWN, MISSING):
-                raise
-            asked = units.of_sieve(_sieve_in(parts, files, where))
-            if asked:  # the diameter and all that depends on it follow from the table
-                raise units.first(asked, error, where, ()) from None
-            asked = units.questions(_values_in(parts), {})
-            raise units.first(asked, error, where, ASKED) from None
-        if (same := points.setdefault(scene.id, point)) is not point:
-            what = f"{', '.join(map(str, same))} and {', '.join(map(str, point))} are one scene"
+        made = {name: dict(table) for name, table in tables.items()}
+        for name, value in zip(axes, point, strict=True):
+            table, _, field = name.rpartition(".")
+            made[table][field] = value
+        scene = _scene_at(made, where, files)
+        same = points.setdefault(scene.id, point)
+        if same is not point:
+            one = ", ".join(map(str, same))
+            other = ", ".join(map(str, point))
+            what = f"{one} and {other} are one scene"
             raise InputError(what, f"{where}: axes", "list each value once")
         yield scene
 
 
-def make_scene(
-    parts: Mapping[str, Table], where: str, files: Files | None = None
-) -> Scene:
-    """Validate the tables of one scene, by their names; `where` names the file in messages.
-
-    A part of the diameter such as d/30 is worked out, and so are the d50 of a sieve table and the
-    numbers of a fluid's kind. `files` are those that the tables may name. The first thing wrong
-    raises an `InputError`.
-    """
-    tables = {name: dict(parts.get(name, {})) for name in PARTS}
-    bed, grain, flow, fluid = (
-        tables[name] for name in ("bed", "grain", "flow", "fluid")
-    )
-    for key, default in BED.items():
-        bed.setdefault(key, default)
-    kind = bed["kind"]
-    if kind in [*SHAPES] and bed.get("shape", kind) == kind:
-        bed |= {"kind": "pile", "shape": kind}
-    elif kind not in ("grain", "pile"):
-        remedy = f"write grain, pile, or a shape: {', '.join(SHAPES)}"
-        raise InputError(f"{kind!r} is no bed", f"{where}: bed.kind", remedy)
-    is_level = bed.get("shape") == "flat" and not (
-        bed.get("profile") or bed.get("obstacles")
-    )
-    fidelity = tables["protocol"].pop("fidelity", AUTO)
-    if fidelity != AUTO:
-        for name, value in fields_of(fidelity, bed, where).items():
-            part, _, key = name.partition(".")
-            if not (is_level and part == "flow"):
-                tables[part].setdefault(key, value)
-    if is_level:
-        flow.setdefault("model", "flat")  # over a level bed there is nothing to solve
-    if bed.get("packing") == "poured":
-        bed.setdefault(
-            "mobile_layers", 4
-        )  # the cheapest near the reference: docs/poured.md
+def _scene_at(tables: Tables, where: str, files: Files) -> Scene:
+    """A scene; a refusal stands behind questions on numbers in another unit."""
     try:
-        fluid = fluids.numbers_of(fluid)
+        return make_scene(tables, where, files)
+    except InputError as error:
+        if error.what in (UNKNOWN, MISSING):
+            raise
+        asked = units.of_sieve(_sieve_in(tables, files, where))
+        if asked:  # the diameter and all that depends on it follow from the table
+            raise units.first(asked, error, where, ()) from None
+        asked = units.questions(_values_in(tables), {})
+        raise units.first(asked, error, where, ASKED) from None
+
+
+def make_scene(
+    tables: Mapping[str, Table], where: str, files: Files | None = None
+) -> Scene:
+    """Validate the tables of one scene.
+
+    A part of the diameter such as d/30 is worked out, and so are the d50 of a sieve table, the
+    numbers of a fluid's kind and those of a fidelity.
+
+    Parameters
+    ----------
+    tables
+        The tables by the names of `fields.PARTS`; one may be missing.
+    where
+        The file, for messages.
+    files
+        The files that the tables may name.
+
+    Raises
+    ------
+    InputError
+        For the first thing that is wrong.
+    """
+    made = {name: dict(tables.get(name, {})) for name in PARTS}
+    for name in tables.keys() - PARTS.keys():
+        made[name] = dict(tables[name])
+    bed = made["bed"]
+    _name_shape(bed, where)
+    is_flat = bed.get("shape") == "flat"
+    is_level = is_flat and not (bed.get("profile") or bed.get("obstacles"))
+    _write_method(made, is_level, where)
+    try:
+        made["fluid"] = fluids.numbers_of(made["fluid"])
     except InputError as error:
         raise InputError(error.what, f"{where}: {error.where}", error.remedy) from None
-    if files and bed["kind"] == "pile" and isinstance(bed.get("profile"), str):
-        bed.update(files.bed(bed, where))
-    if files and isinstance(grain.get("sizes"), str):
-        grain["sizes"] = files.sieve(grain["sizes"], where)
+    if files:
+        _read_files(made, files, where)
     try:
-        # values of a wrong type or range are left to the validation of the scene
-        with suppress(ValidationError, KeyError, TypeError, OverflowError):
-            mixture = MIXTURE.validate_python(grain.get("sizes"))
-            if isinstance(mixture, tuple):
-                grain.setdefault("diameter", percentile(mixture, 1.0, 0.5))
-            if is_level and bed.get("height", 1.0) > 0:
-                # it has no height of its own; digits as those that a file has
-                bed["height"] = float(f"{LEVEL_HEIGHT * grain['diameter']:.12g}")
-            if isinstance(bed["roughness"], str):
-                relative = bed.get("relative_size", 1.0)
-                is_size = isinstance(relative, int | float) and 1e-3 < relative < 1e3
-                d = grain["diameter"] / (relative if is_size else 1.0)
-                bed["roughness"] = roughness_length(bed["roughness"], d, mixture)
-        return Scene.model_validate({**parts, **tables, "fluid": fluid})
+        _write_lengths(made["grain"], bed, is_level)
+        return Scene.model_validate(nested(made))
     except UnfitError as error:
         raise InputError(error.what, f"{where}: {error.field}", error.remedy) from None
     except ValidationError as error:
         raise _explained(error, where) from None
+
+
+def _name_shape(bed: Table, where: str) -> None:
+    """Write the kind and the shape of a bed, whose kind may name the shape."""
+    for key, default in BED.items():
+        bed.setdefault(key, default)
+    kind = bed["kind"]
+    if kind in [*SHAPES] and bed.get("shape", kind) == kind:
+        bed["kind"] = "pile"
+        bed["shape"] = kind
+    elif kind not in ("grain", "pile"):
+        remedy = f"write grain, pile, or a shape: {', '.join(SHAPES)}"
+        raise InputError(f"{kind!r} is no bed", f"{where}: bed.kind", remedy)
+
+
+def _write_method(tables: Tables, is_level: bool, where: str) -> None:
+    """Write the numbers of a fidelity, and those that follow from the bed."""
+    bed = tables["bed"]
+    fidelity = tables["method"].pop("fidelity", AUTO)
+    if fidelity != AUTO:
+        for name, value in fields_of(fidelity, bed, where).items():
+            table, _, field = name.rpartition(".")
+            # over a level bed there is nothing to solve
+            if not (is_level and table == "method.flow"):
+                tables[table].setdefault(field, value)
+    if is_level:
+        tables["method.flow"].setdefault("model", "flat")
+    if bed.get("packing") == "poured":
+        tables["method.grains"].setdefault("mobile_layers", POURED_LAYERS)
+
+
+def _read_files(tables: Tables, files: Files, where: str) -> None:
+    """Write what the files say that the tables name."""
+    bed = tables["bed"]
+    grain = tables["grain"]
+    if bed["kind"] == "pile" and isinstance(bed.get("profile"), str):
+        bed.update(files.bed(bed, where))
+    if isinstance(grain.get("sizes"), str):
+        grain["sizes"] = files.sieve(grain["sizes"], where)
+
+
+def _write_lengths(grain: Table, bed: Table, is_level: bool) -> None:
+    """Write the lengths that follow from the grains: d50, height of a level bed, roughness."""
+    # values of a wrong type or range are left to the validation of the scene
+    with suppress(ValidationError, KeyError, TypeError, OverflowError):
+        mixture = MIXTURE.validate_python(grain.get("sizes"))
+        if isinstance(mixture, tuple):
+            grain.setdefault("diameter", percentile(mixture, 1.0, 0.5))
+        if is_level and bed.get("height", 1.0) > 0:
+            # it has no height of its own; digits as those that a file has
+            bed["height"] = float(f"{LEVEL_HEIGHT * grain['diameter']:.12g}")
+        if isinstance(bed["roughness"], str):
+            relative = bed.get("relative_size", 1.0)
+            is_size = isinstance(relative, int | float) and 1e-3 < relative < 1e3
+            d = grain["diameter"] / (relative if is_size else 1.0)
+            bed["roughness"] = roughness_length(bed["roughness"], d, mixture)
 
 
 def value_of(scene: Scene, name: str) -> Any:
@@ -448,13 +514,17 @@ def value_of(scene: Scene, name: str) -> Any:
 
 def changed(scene: Scene, fields: Mapping[str, Any]) -> Scene:
     """A scene with some fields changed; an `InputError` for a value that a field cannot have."""
-    parts: dict[str, dict[str, Any]] = {
-        name: dict(getattr(scene, name)) for name in PARTS
-    }
+    tables = {name: dict(attrgetter(name)(scene)) for name in PARTS}
+    # the tables within the method stand beside it
+    for name in PARTS:
+        outer, _, inner = name.rpartition(".")
+        if outer:
+            del tables[outer][inner]
     for name, value in fields.items():
-        part, _, field = name.partition(".")
-        parts.setdefault(part, {})[field] = value
-    return make_scene(parts, "fields that are changed")
+        table, _, field = name.rpartition(".")
+        # a name without a table is refused as one
+        tables.setdefault(table or name, {})[field] = value
+    return make_scene(tables, "fields that are changed")
 
 
 def _not_toml(error: str, text: str, where: str) -> InputError:
@@ -475,51 +545,74 @@ def _explained(error: ValidationError, where: str) -> InputError:
         error.errors(),
         key=lambda e: e["type"] != "extra_forbidden" and "sizes" not in e["loc"],
     )
-    if isinstance(cause := first.get("ctx", {}).get("error"), UnfitError):
+    cause = first.get("ctx", {}).get("error")
+    if isinstance(cause, UnfitError):
         return InputError(cause.what, f"{where}: {cause.field}", cause.remedy)
-    path, keys = [*first["loc"]], [*_File.model_fields]
+    path = [*first["loc"]]
+    keys = [*_File.model_fields]
     if path[0] == "group" and len(path) > 2:
-        where, path, keys = (
-            f"{where}: group {int(path[1]) + 1}",
-            path[2:],
-            [*_Group.model_fields],
-        )
-    branch = path.pop(1) if path[0] == "bed" and path[1:] else ""
-    path = [step for step in path if step not in ("", "rows")]
-    name, key = ".".join(map(str, path)), str(path[-1])
-    place, value = f"{where}: {name}", first.get("input")
-    if name in GONE_KEYS:
-        what, remedy = GONE_KEYS[name]
-        return InputError(what, place, remedy)
-    if isinstance(value, str) and (name, value) in GONE_VALUES:
-        what, remedy = GONE_VALUES[name, value]
-        return InputError(f"{value!r}: {what}", place, remedy)
+        where = _place(where, int(path[1]))
+        path = path[2:]
+        keys = [*_Group.model_fields]
+    branch = ""
+    if path[0] == "bed" and len(path) > 1:
+        branch = str(path.pop(1))
+    # tags of unions are no keys
+    names = [str(step) for step in path if step not in ("", "rows")]
+    name = ".".join(names)
+    value = first.get("input")
+    gone = _gone(name, value, where)
+    if gone is not None:
+        return gone
+    place = f"{where}: {name}"
     if first["type"] == "missing":
         return InputError(MISSING, place, "add it to the file")
     if first["type"] != "extra_forbidden":
-        remedy = (
-            first["msg"].lower().replace("dictionary", "table").replace("tuple", "list")
-        )
-        if isinstance(value, str):
-            remedy = units.meant(value) or remedy
-        return InputError(f"{value!r} is not accepted", place, remedy)
-    if branch == "grain" and key in PileBed.model_fields:
-        return InputError(
-            "a bed of one grain has none", place, 'a pile has it: kind = "pile"'
-        )
-    here = str(path[0]) if path[1:] else ""
+        return _not_accepted(value, first["msg"], place)
+    if branch == "grain" and names[-1] in PileBed.model_fields:
+        remedy = 'a pile has it: kind = "pile"'
+        return InputError("a bed of one grain has none", place, remedy)
+    return InputError(UNKNOWN, place, _meant(names, keys))
+
+
+def _gone(name: str, value: Any, where: str) -> InputError | None:
+    """The refusal of a key or a value that study files had before; None for any other."""
+    if name in GONE_KEYS:
+        what, remedy = GONE_KEYS[name]
+        return InputError(what, f"{where}: {name}", remedy)
+    if isinstance(value, str) and (name, value) in GONE_VALUES:
+        what, remedy = GONE_VALUES[name, value]
+        return InputError(f"{value!r}: {what}", f"{where}: {name}", remedy)
+    return None
+
+
+def _not_accepted(value: Any, message: str, place: str) -> InputError:
+    """The refusal of a value, in the words of a study file."""
+    remedy = message.lower().replace("dictionary", "table").replace("tuple", "list")
+    if isinstance(value, str):
+        remedy = units.meant(value) or remedy
+    return InputError(f"{value!r} is not accepted", place, remedy)
+
+
+def _meant(names: Sequence[str], keys: Sequence[str]) -> str:
+    """The key that an unknown one is nearest to, as a question.
+
+    `names` is the path of the unknown key, `keys` are those of the file or of the group.
+    """
     tables: dict[str, type[Part]] = {**PARTS, "erosion": Erosion}
-    written = {
-        name: f"{name}, above the first table" for name in keys if name not in tables
-    }
-    written |= {
-        n: f"{part}.{n}"
-        for part in reversed([*tables])
-        for n in tables[part].model_fields
-    }
-    written |= {name: name for name in (tables[here].model_fields if here else keys)}
-    close = difflib.get_close_matches(key, written, n=1)
-    listed = "known keys: docs/study-file.md"
-    return InputError(
-        UNKNOWN, place, f"did you mean {written[close[0]]}?" if close else listed
-    )
+    here = ".".join(names[:-1])
+    written = {}
+    for key in keys:
+        if key not in tables:
+            written[key] = f"{key}, above the first table"
+    for table in reversed([*tables]):
+        for field in tables[table].model_fields:
+            written[field] = f"{table}.{field}"
+    written["fidelity"] = FIDELITY
+    own = tables[here].model_fields if here in tables else keys
+    for key in own:
+        written[key] = key
+    close = difflib.get_close_matches(names[-1], written, n=1)
+    if not close:
+        return "known keys: docs/study-file.md"
+    return f"did you mean {written[close[0]]}?"

@@ -41,8 +41,6 @@ def _meanings() -> dict[str, str]:
     meanings = dict(zip(of_others["column"], of_others["meaning"], strict=True))
     for column, field in fields.COLUMNS.items():
         meanings[column] = field.phrase
-    for column, field in fields.ANSWERS.items():
-        meanings[column] = f"{field.phrase}: as it was run"
     return meanings
 
 
@@ -84,7 +82,9 @@ def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
             smoothed = _smoothed(plan, scene_id, done)
             decision = plan.decisions[scene_id]
             answers.append(rows.Answer(decision, pile, cases, smoothed))
-    asked = pd.DataFrame(rows.scenes(study, plan))
+    scenes = pd.DataFrame(rows.scenes(study, plan))
+    methods = pd.DataFrame(rows.methods(plan))
+    asked = with_methods(scenes, methods)
     cells = [cell for cell in plan.cells if cell.name in done]
     grains = pd.DataFrame(rows.single_grain(plan, cells, cases))
     thresholds = with_scatter(_listed(rows.pile_threshold, answers), asked)
@@ -92,7 +92,8 @@ def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
     against = contradictions(checks)
     stress = [rows.wall_stress(pile, cases) for pile in flows.values()]
     made = {
-        "scenes": asked,
+        "scenes": scenes,
+        "methods": methods,
         "single_grain": with_usable(grains, asked, study.tolerance),
         "wall_stress": _stacked(stress),
         "flow": pd.DataFrame([rows.flow(pile, cases) for pile in flows.values()]),
@@ -105,6 +106,26 @@ def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
         "check": checks,
     }
     return {name: table for name, table in made.items() if not table.empty}
+
+
+def with_methods(scenes: pd.DataFrame, methods: pd.DataFrame) -> pd.DataFrame:
+    """List every scene once, with how it is answered.
+
+    Parameters
+    ----------
+    scenes
+        The table ``scenes``, in which a scene has a row for each group that asks for it.
+    methods
+        The table ``methods``.
+
+    Returns
+    -------
+    DataFrame
+        The columns of both.
+    """
+    once = scenes.drop_duplicates("scene_id")
+    # one block: columns may be added to more than a hundred others
+    return once.merge(methods, on="scene_id", how="left").copy()
 
 
 def _smoothed(plan: Plan, scene_id: str, done: Container[str]) -> dict[float, Pile]:

@@ -22,7 +22,7 @@ from orchestrator.physics.velocity import measurable_speeds, outer_roughness
 from orchestrator.plan import Plan
 from orchestrator.study import fields
 from orchestrator.study.closed_form import closed_form, law_holds
-from orchestrator.study.parts import UnfitError
+from orchestrator.study.declare import UnfitError
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study, changed
 from orchestrator.types import BoolArray, FloatArray, Row
@@ -66,11 +66,11 @@ def point(scene: Scene) -> Row:
     dict
         Its columns `POINT`.
     """
-    return {column: fields.COLUMNS[column].asked(scene) for column in POINT}
+    return {column: fields.COLUMNS[column].used(scene) for column in POINT}
 
 
 def scenes(study: Study, plan: Plan) -> Iterator[Row]:
-    """List the scenes of each group, as asked, and as answered.
+    """List the scenes of each group: what they ask, and the cases that answer them.
 
     Parameters
     ----------
@@ -98,13 +98,35 @@ def scenes(study: Study, plan: Plan) -> Iterator[Row]:
             yield {
                 "scene_id": asked.id,
                 "group": group.name,
-                **fields.asked(asked),
-                **fields.answered(scene),
+                **fields.question(asked),
                 "law_holds": law_holds(asked),
-                "why": decision.why,
-                "case": case if scene.protocol.method == "dem" else None,
+                "case": case if scene.method.kind == "dem" else None,
                 "flow_case": flow_case,
             }
+
+
+def methods(plan: Plan) -> Iterator[Row]:
+    """List how each scene is answered.
+
+    Parameters
+    ----------
+    plan
+        The plan of the study.
+
+    Yields
+    ------
+    dict
+        A row for each scene, with the fields of its method as they are used.
+    """
+    for scene_id, decision in plan.decisions.items():
+        yield {
+            "scene_id": scene_id,
+            "asked": fields.written(decision.asked),
+            "fidelity": decision.fidelity.name if decision.fidelity else None,
+            "error_estimate": decision.error_estimate,
+            "why": decision.why,
+            **fields.method(decision.scene),
+        }
 
 
 class _ByDem(NamedTuple):
@@ -139,7 +161,7 @@ def single_grain(
     by_dem = _single_grains_by_dem(cells, cases)
     for asked, decision in plan.decisions.items():
         scene = decision.scene
-        is_missing = scene.protocol.method == "dem" and scene.id not in by_dem
+        is_missing = scene.method.kind == "dem" and scene.id not in by_dem
         if asked in plan.piles or is_missing:
             continue
         found = by_dem.get(scene.id, _ByDem())
@@ -149,7 +171,6 @@ def single_grain(
         row = {
             "scene_id": asked,
             **point(scene),
-            "answered_method": scene.protocol.method,
             "reynolds": float(exact.reynolds) * found.value,
             "reynolds_closed_form": float(exact.reynolds),
             "shields_closed_form": shields,
@@ -491,7 +512,7 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
     pivots = pile.pivot_thresholds(answer.speed)
     first_x, first_ustar0 = answer.first
     checked_x, checked_ustar0 = answer.checked
-    for fraction in scene.protocol.fractions:
+    for fraction in scene.threshold.fractions:
         found = answer.at(fraction)
         model = spread.spread(answer.decision.asked, fraction)
         value = shields(scene, found.tau)
@@ -526,8 +547,6 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
             "share_against_flow": found.against_the_flow,
             "row_hold": answer.row_hold,
             **_smoothing(answer),
-            "fidelity": _fidelity(answer.decision),
-            "error_estimate": error,
             "case": pile.runs[-1].name if pile.runs else None,
         }
 
@@ -560,7 +579,7 @@ def _interval(
 
 def _smooth_bed(scene: Scene, ustar0: float) -> float:
     """How far at most tau_c moves, relative, if the flow has the z0 of its bed."""
-    if scene.flow.model == "flat":
+    if scene.method.flow.model == "flat":
         return 0.0
     outer = float(outer_roughness(scene.bed.roughness, ustar0, scene.fluid.viscosity))
     return PER_E_FOLD * log(outer / scene.solve_roughness)
@@ -577,12 +596,6 @@ def _smoothing(answer: Answer) -> Row:
     for factor, column in SMOOTHED.items():
         row[column] = answer.smoothed.get(factor, np.nan)
     return row
-
-
-def _fidelity(decision: Decision) -> str:
-    """The name of the fidelity that answers a pile."""
-    assert decision.fidelity
-    return decision.fidelity.name
 
 
 def size_class(answer: Answer) -> Iterator[Row]:
@@ -615,7 +628,7 @@ def size_class(answer: Answer) -> Iterator[Row]:
             classes.append(each._replace(chosen=is_free))
     sizes = np.array([each.size for each in classes])
     mobility = sizes**-threshold.EQUAL_MOBILITY
-    for fraction in pile.scene.protocol.fractions:
+    for fraction in pile.scene.threshold.fractions:
         level = threshold.first_level(motion, fraction)
         has_moved = None if level is None else motion.moved_by(level)
         found = [answer.at(fraction, each.chosen) for each in classes]
@@ -680,7 +693,7 @@ def forms(answer: Answer) -> Iterator[Row]:
     x = pile.packing.centres[pile.packing.windward, 0] * pile.scene.grain.diameter
     form = np.clip(np.floor(x / period).astype(int), 0, bed.forms - 1)
     ustar0 = threshold.of_grains(answer.motion).value
-    for fraction in pile.scene.protocol.fractions:
+    for fraction in pile.scene.threshold.fractions:
         first = np.nan
         for number in range(bed.forms):
             # a grain that has not moved is not a number, which sorts last
@@ -725,13 +738,13 @@ def bed_changes(answers: Sequence[Answer]) -> Iterator[Row]:
     frozen = {each.pile.scene.id: each for each in answers}
     for answer in answers:
         scene = answer.pile.scene
-        if not scene.protocol.update:
+        if not scene.threshold.update:
             continue
-        twin = frozen.get(changed(scene, {"protocol.update": 0.0}).id)
+        twin = frozen.get(changed(scene, {"threshold.update": 0.0}).id)
         if twin is None:
             continue
         count = answer.motion.count
-        moved = np.arange(1, _needed(max(scene.protocol.fractions), count) + 1)
+        moved = np.arange(1, _needed(max(scene.threshold.fractions), count) + 1)
         tau, ustar = _thresholds_of(answer, moved / count)
         tau_frozen, ustar_frozen = _thresholds_of(twin, moved / count)
         change = tau / tau_frozen - 1
@@ -783,7 +796,7 @@ def check(plan: Plan, cases: Path, done: Container[str]) -> Iterator[Row]:
         if not (pile.is_run(done) and dem.is_run(done)):
             continue
         scene = pile.scene
-        fractions = scene.protocol.fractions
+        fractions = scene.threshold.fractions
         found = pile.thresholds(cases, fractions)
         by_dem = dem.thresholds(cases, fractions)
         for ours, theirs in zip(found, by_dem, strict=True):
@@ -792,7 +805,6 @@ def check(plan: Plan, cases: Path, done: Container[str]) -> Iterator[Row]:
                 **point(scene),
                 "packing": dem.bed.packing,
                 "fraction": ours.fraction,
-                "fidelity": _fidelity(plan.decisions[asked]),
                 "shields": shields(scene, ours.tau),
                 "shields_dem": shields(scene, theirs.tau),
                 "shields_dem_low": shields(scene, theirs.tau_low),

@@ -32,7 +32,7 @@ SIMILAR = ["layout", "lifted", "alpha_deg", "force_law", "fraction"]
 collide or do not."""
 LAYOUTS = {"aligned": "rows along the bed", "disordered": "rows along the bed"}
 """Packings whose grains lie alike: a lattice scatters as one with small random gaps."""
-POURED = ["answered_width", "sizes", "poured_depth"]
+POURED = ["width", "sizes", "poured_depth"]
 """Columns in which poured beds agree whose grains lie alike."""
 
 
@@ -50,7 +50,7 @@ def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame
     thresholds
         Thresholds of piles.
     scenes
-        Their scenes.
+        Their scenes with their methods, each once.
 
     Returns
     -------
@@ -59,8 +59,9 @@ def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame
     """
     if thresholds.empty:
         return thresholds
-    of_scene = scenes.drop_duplicates("scene_id").set_index("scene_id")
-    replicas = of_scene.groupby(fields.others(of_scene, "seed"), dropna=False).ngroup()
+    of_scene = scenes.set_index("scene_id")
+    alike = [*fields.others(of_scene, "seed"), "asked"]
+    replicas = of_scene.groupby(alike, dropna=False).ngroup()
     ids = thresholds["scene_id"]
     table = thresholds.assign(
         layout=ids.map(_layouts(of_scene)),
@@ -103,7 +104,7 @@ def with_usable(
     table
         The thresholds; each is judged at its own Re*.
     scenes
-        Their scenes.
+        Their scenes with their methods, each once.
     tolerance
         The relative error that is allowed, if one was asked for.
     contradicted
@@ -117,10 +118,9 @@ def with_usable(
     if table.empty:
         return table
     columns = [name for name in scenes if name not in table or name == "scene_id"]
-    of_scene = scenes.drop_duplicates("scene_id")[columns]
-    rows = table.merge(of_scene, on="scene_id", how="left")
+    rows = table.merge(scenes[columns], on="scene_id", how="left")
     if "reynolds_closed_form" in rows:
-        is_dem = rows["answered_method"] == "dem"
+        is_dem = rows["method"] == "dem"
         rows["reynolds"] = rows["reynolds"].where(is_dem, rows["reynolds_closed_form"])
     ustar = rows["reynolds"] * rows["nu_m2_s"] / rows["d_m"]
     rows["law"] = ""
@@ -154,7 +154,7 @@ def _flow_reynolds(rows: pd.DataFrame) -> "pd.Series[float]":
         ustar0 = rows["ustar0_m_s"]
         layer = rows["u_e_m_s"] * SPEED_HEIGHT * rows["h_m"]
     else:
-        is_dem = rows["answered_method"] == "dem"
+        is_dem = rows["method"] == "dem"
         ustar0 = rows["ustar_m_s"].where(is_dem, rows["ustar_closed_form_m_s"])
     channel = open_water_reynolds(
         ustar0,
@@ -239,23 +239,23 @@ def _held_row(row: Mapping[Any, Any]) -> Iterator[str]:
 
     The closed form along the bed line packs no rows: it is of single exposed grains.
     """
-    if row.get("answered_method") == "local" or not row.get("row_hold", 0.0) > ROW_HOLD:
+    if row.get("method") == "local" or not row.get("row_hold", 0.0) > ROW_HOLD:
         return
     times = f"{row['row_hold']:.2g} times the u* of a single one"
     said = f"the row has no end: its neighbours hold the first grain up to {times}"
     if row.get("packing") in ("aligned", "disordered"):
-        said += '; protocol.method = "local" is of single exposed grains'
+        said += '; method.kind = "local" is of single exposed grains'
     yield said
 
 
 def _reasons_of_bed(row: Mapping[Any, Any]) -> Iterator[str]:
     """Reasons against how the grains of a pile lie, and against a balance that is kept."""
-    is_strip = (row.get("answered_width") or 0) > 0
+    is_strip = (row.get("width") or 0) > 0
     is_plane = row.get("packing") == "poured" and not is_strip
     if is_plane and pd.isna(row.get("sizes")):
         remedy = "give sizes = { sigma_g = 1.2 }"
         yield f"equal spheres in one plane settle into a crystal: {remedy}"
-    is_renewed = row.get("answered_method") == "peeling" or (row.get("update") or 0) > 0
+    is_renewed = row.get("method") == "peeling" or (row.get("update") or 0) > 0
     is_kept = row.get("sheltering") == "balanced" and not is_renewed
     if is_kept and row["fraction"] > KEPT_TO + 1e-9:
         beyond = f"beyond n/N = {KEPT_TO} grains that have gone still bear a part of it"
@@ -268,9 +268,9 @@ def _reached(row: Mapping[Any, Any]) -> str:
         return "the grain has not moved"
     highest = row.get("highest_fraction", 0.0)
     said = f"at most {highest:.0%} of {row['count']} grains moved"
-    last = row.get("answered_final_fraction")
+    last = row.get("final_fraction")
     if last is not None and highest >= last - 1e-9:
-        said += f", since the run ends at protocol.final_fraction = {last:g} (raise it)"
+        said += f", since the run ends at method.grains.final_fraction = {last:g} (raise it)"
     return said
 
 

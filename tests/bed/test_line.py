@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from orchestrator.bed.line import of_bed, triangle
-from orchestrator.study.parts import Obstacle, PileBed, UnfitError
+from orchestrator.study.declare import UnfitError
+from orchestrator.study.parts import Obstacle, PileBed
 from orchestrator.study.shapes import SHAPES
 
 H = 0.02

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from orchestrator.bed import packing
 from orchestrator.bed.line import between_flats, of_bed, triangle
 from orchestrator.bed.packing import Lattice, Packing, Places, cover, pile
+from orchestrator.study.declare import UnfitError
 from orchestrator.study.parts import Packing as Pattern
-from orchestrator.study.parts import UnfitError
 from orchestrator.types import BoolArray, FloatArray
 from tests.bed.test_line import BEDS, H, bed
 

@@ -19,15 +19,18 @@ from tests.conftest import Shared
 
 ROOT = Path(__file__).parents[2]
 NATIVE = ROOT / "examples" / "native"
-PROTOCOL = "[protocol]\nload_increment = 0.05\nwaiting_time = 6.0\ntime_step = 0.3\n"
+PROTOCOL = (
+    "[method.grains]\nload_increment = 0.05\nwaiting_time = 6.0\ntime_step = 0.3\n"
+)
 SMALL = f"""{PROTOCOL}
-[flow]
+stiffness = 1e3
+[method.flow]
 [grain]
 diameter = 1e-3
-stiffness = 1e3
 [[group]]
 name = "piles"
-bed = {{ kind = "pile", height = 0.01, slope_deg = 20.0, mobile_layers = 1 }}
+bed = {{ kind = "pile", height = 0.01, slope_deg = 20.0 }}
+method.grains.mobile_layers = 1
 [[group]]
 name = "grains"
 bed = {{ slope_deg = 10.0 }}
@@ -35,11 +38,11 @@ bed = {{ slope_deg = 10.0 }}
 """One small pile, one grain."""
 THEORY = f"""{PROTOCOL}
 final_fraction = 0.8
-[flow]
+stiffness = 1e3
+[method.flow]
 model = "waves"
 [grain]
 diameter = 5e-4
-stiffness = 1e3
 [forces]
 law = "%s"
 [[group]]
@@ -49,8 +52,9 @@ bed = {{ kind = "pile", height = 0.005, slope_deg = 20.0, roughness = "d/30", %s
 """A pile under the stress of a theory, which needs no OpenFOAM."""
 POURED = f"""
 fluid = {{ density = 1000.0, viscosity = 1e-6 }}
-grain = {{ diameter = 1e-3, density = 2650.0, sizes = {{ sigma_g = 1.3 }}, stiffness = 1e3 }}
-flow.model = "waves"
+grain = {{ diameter = 1e-3, density = 2650.0, sizes = {{ sigma_g = 1.3 }} }}
+method.grains.stiffness = 1e3
+method.flow.model = "waves"
 [bed]
 kind = "pile"
 shape = "gaussian"

@@ -413,6 +413,8 @@ kind = "pile"
 height = 8e-3
 packing = "{rows}"
 slope_deg = {slope}
+
+[method.grains]
 mobile_layers = {layers}
 """
     (scene,) = study.parse(text, name="a", where="a").scenes

@@ -207,14 +207,14 @@ def test_export_twice_and_without_liggghts(
     ("fields", "named"),
     [
         ('bed.packing = "poured"\nbed.width = 5.0', "bed.width"),
-        ("protocol.update = 0.1", "protocol.update"),
+        ("threshold.update = 0.1", "threshold.update"),
         ('forces.sheltering = "balanced"', "forces.sheltering"),
         ("", "the study is not finished"),
     ],
 )
 def test_what_cannot_be_exported(fields: str, named: str, tmp_path: Path) -> None:
     text = f'grain.diameter = 1e-3\nbed.kind = "pile"\nbed.slope_deg = 20.0\n{fields}\n'
-    text += 'protocol.method = "dem"\nflow.first_cell_height = 1e-3\n'
+    text += 'method.kind = "dem"\nmethod.flow.first_cell_height = 1e-3\n'
     with claimed(tmp_path, STUDY, "held"):
         Workspace(tmp_path).describe(STUDY, "held", [], study=text, tolerance=None)
     with pytest.raises(InputError, match=re.escape(named)):

@@ -65,7 +65,7 @@ def test_parameters_are_fields_of_a_scene_with_their_columns_and_defaults() -> N
                 "grain.diameter": 10.0,
                 "grain.density": 2.5e4,
             }
-            given |= {"fluid.density": 1e-6, "protocol.method": '"pivot"'}
+            given |= {"fluid.density": 1e-6, "method.kind": '"pivot"'}
             text = "\n".join(
                 f"{k} = {v}" for k, v in {**given, parameter.field: value}.items()
             )

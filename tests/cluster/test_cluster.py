@@ -23,19 +23,23 @@ from tests.faults.bench import (
 
 STUDY = """
 time_limit = 100
-[protocol]
+[method.grains]
 load_increment = 0.006
 waiting_time = 3.0
 [grain]
 diameter = 1e-3
+
+[method.grains]
 stiffness = 1e3
 [bed]
 kind = "pile"
 height = 0.01
 slope_deg = 15.0
-mobile_layers = 1
 packing = "disordered"
-[flow]
+
+[method.grains]
+mobile_layers = 1
+[method.flow]
 cells_per_face = 20
 [axes]
 "bed.seed" = [1, 2, 3]

@@ -15,7 +15,7 @@ from orchestrator.study.study import changed
 
 SMALL = """
 grain = { diameter = 1e-3, sizes = { sigma_g = 1.2 } }
-flow = { model = "solve" }
+method.flow.model = "solve"
 [bed]
 kind = "pile"
 slope_deg = 25.0
@@ -23,7 +23,7 @@ height = 0.007
 roughness = "d/30"
 packing = "poured"
 """
-LEVEL = {"bed.shape": "flat", "bed.slope_deg": 0.0, "flow.model": "flat"}
+LEVEL = {"bed.shape": "flat", "bed.slope_deg": 0.0, "method.flow.model": "flat"}
 
 
 @pytest.fixture(scope="module")

@@ -31,7 +31,10 @@ def test_the_classes_of_ap42_and_its_potential_by_hand() -> None:
 
 
 def test_a_flat_bed_loses_what_the_log_law_takes(tmp_path: Path) -> None:
-    text = 'flow.roughness = 0.005\nbed.kind = "flat"\ngrain.diameter = 1e-3\n' + WINDS
+    text = (
+        'method.flow.roughness = 0.005\nbed.kind = "flat"\ngrain.diameter = 1e-3\n'
+        + WINDS
+    )
     erosion.experiment(study.parse(text, name="", where=""), tmp_path).run(
         tmp_path, workers=1
     )
@@ -85,7 +88,7 @@ erosion = {{ fastest_mile = [20.0], threshold = 0.6 }}
 grain = {{ diameter = 1e-3, density = 1400.0 }}
 fluid.kind = "air"
 bed = {{ kind = "trapezoid", slope_deg = 37.0, height = 4.0, length = 4.0 }}
-flow = {{ roughness = 0.005, cells_per_face = 10, {flow} }}
+method.flow = {{ roughness = 0.005, cells_per_face = 10, {flow} }}
 [axes]
 {axes}
 """
@@ -107,7 +110,7 @@ def _change(sentence: str) -> str:
 
 def test_piles_are_compared_that_differ_in_the_obstacle_alone(tmp_path: Path) -> None:
     """Each turbulence model has its own pile without a fence, in whatever order they stand."""
-    models = '"flow.turbulence_model" = ["kOmegaSST", "kEpsilon"]'
+    models = '"method.flow.turbulence_model" = ["kOmegaSST", "kEpsilon"]'
     obstacles = f'"bed.obstacles" = [{FENCE}, {BARE}]'
     told, table = _run(_text(f"{models}\n{obstacles}"), tmp_path / "both")
     assert len(told) == 2
@@ -152,10 +155,10 @@ def test_obstacles_are_not_compared_with_one_another(tmp_path: Path) -> None:
         ('"bed.lee_slope_deg" = [20.0, 37.0]', ["lee slope = 20°", "lee slope = 37°"]),
         ('"bed.height" = [3.0, 4.0]', ["3 m high", "4 m high"]),
         ('"bed.roughness" = ["d/10", "d/30"]', ["z₀ = d/10", "z₀ = d/30"]),
-        ('"flow.roughness" = [0.005, 0.01]', ["z₀ 5 mm", "z₀ 10 mm"]),
+        ('"method.flow.roughness" = [0.005, 0.01]', ["z₀ 5 mm", "z₀ 10 mm"]),
         ('"grain.diameter" = [1e-3, 2e-3]', ["d = 1 mm", "d = 2 mm"]),
-        ('"protocol.fractions" = [[0.1], [0.2]]', [" (pile 2)"]),
-        ('"protocol.method" = ["pivot", "peeling"]', ["pivot", "peeling"]),
+        ('"threshold.fractions" = [[0.1], [0.2]]', [" (pile 2)"]),
+        ('"method.kind" = ["pivot", "peeling"]', ["pivot", "peeling"]),
     ],
 )
 def test_each_pile_has_a_name_that_tells_it_from_the_others(

@@ -50,9 +50,7 @@ def test_every_rung_is_run_and_each_pile_beside_its_reference() -> None:
             assert {LEVEL_REFERENCE, LEVEL_AGAIN} <= run
             assert {flow for flow, _ in run} == {FLAT.name}
         else:
-            assert (
-                (REFERENCE in run) == (AGAIN in run) == (scene.protocol.method == "dem")
-            )
+            assert (REFERENCE in run) == (AGAIN in run) == (scene.method.kind == "dem")
             assert FLOW_REFERENCE in run
     whole = {pair.name for _, pair in made}
     assert {f"{one.name} | {one.name}" for one in FIDELITIES} <= whole
@@ -62,7 +60,7 @@ def test_ten_scenes_of_the_preset_or_more_are_of_each_class() -> None:
     counts: Counter[tuple[str, str]] = Counter()
     for scene in piles(study.load("ladder")):
         counts["flow", scene_class("flow", scene)] += 1
-        if scene.protocol.method == "dem":
+        if scene.method.kind == "dem":
             counts["grains", scene_class("grains", scene)] += 1
     assert min(counts.values()) >= LEAST_SCENES
 
@@ -72,7 +70,7 @@ def test_what_has_not_run_has_no_point_and_what_needs_no_run_no_error(
 ) -> None:
     bed = 'kind = "pile", height = 0.01, slope_deg = 20.0, roughness = "d/30"'
     text = (
-        f'grain = {{ diameter = 1e-3 }}\nbed = {{ {bed} }}\nflow = {{ model = "flat" }}'
+        f'grain = {{ diameter = 1e-3 }}\nbed = {{ {bed} }}\nmethod.flow.model = "flat"'
     )
     pairs = ladder.decisions(study.parse(text, name="one", where="one"))
     points = ladder.points(pairs, Runs(plan.of(pairs), tmp_path, {}))
@@ -86,9 +84,9 @@ def test_the_cost_of_a_pile_does_not_depend_on_what_was_asked_before(
     """A packing that another pile had asked for once cost nothing."""
     bed = 'kind = "pile", height = 0.01, slope_deg = 20.0, roughness = "d/30"'
     text = (
-        f'grain = {{ diameter = 1e-3 }}\nbed = {{ {bed} }}\nflow = {{ model = "flat" }}'
+        f'grain = {{ diameter = 1e-3 }}\nbed = {{ {bed} }}\nmethod.flow.model = "flat"'
     )
-    text += '\nprotocol = { method = "pivot" }'
+    text += '\nmethod.kind = "pivot"'
     (pile,) = plan.make(study.parse(text, name="one", where="one")).piles.values()
     done: list[str] = []
 

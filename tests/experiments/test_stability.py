@@ -15,13 +15,13 @@ SMALL = """
 title = "Small"
 question = "?"
 judge = "pile"
-x = { label = "dt", fields = { "protocol.time_step" = 1.0 }, values = [0.2, 1.5] }
+x = { label = "dt", fields = { "method.grains.time_step" = 1.0 }, values = [0.2, 1.5] }
 y = { label = "h, d", fields = { "bed.height" = 1e-3 }, values = [10.0] }
-reference = { "protocol.method" = "peeling" }
+reference = { "method.kind" = "peeling" }
 bed = { kind = "pile", slope_deg = 20.0, roughness = "d/30" }
-grain = { diameter = 1e-3, stiffness = 1e3 }
-protocol = { load_increment = 0.05, waiting_time = 6.0, final_fraction = 0.75 }
-flow = { model = "waves" }
+grain = { diameter = 1e-3 }
+method.flow.model = "waves"
+method.grains = { stiffness = 1e3, load_increment = 0.05, waiting_time = 6.0, final_fraction = 0.75 }
 forces = { law = "high" }
 """
 

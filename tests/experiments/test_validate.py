@@ -119,18 +119,18 @@ UNTESTED: dict[str, Any] = {
     **{
         "bed.poured_depth": 8.0,
         "bed.width": 12.0,
-        "bed.mobile_layers": 6,
+        "method.grains.mobile_layers": 6,
         "bed.length": 0.2,
     },
     **{"bed.counted": (0.1, 0.3), "bed.packing": "aligned", "bed.shape": "step down"},
     **{
         "bed.slope_deg": 5.0,
         "flow.gusts": {"intensity": 0.2, "events": 50},
-        "flow.model": "x",
+        "method.flow.model": "x",
     },
     **{"forces.law": "profile", "forces.lift_coefficient": 1.0},
     **{"forces.loaded_grains": "all but crest", "forces.sheltering": "balanced"},
-    **{"protocol.method": "dem", "protocol.fractions": (0.3,)},
+    **{"method.kind": "dem", "threshold.fractions": (0.3,)},
 }
 """Other values of the fields of a strip for which none was tested."""
 
@@ -139,8 +139,8 @@ def test_an_interval_is_of_strips_that_differ_in_nothing_else_than_the_tested() 
     (strip, *_) = (scene for scene in study.load("validate").scenes if scene.is_poured)
 
     def rows(scene: Scene) -> float:
-        row = {**fields.asked(scene), **fields.answered(scene)}
-        row |= {"fraction": scene.protocol.fractions[0]}
+        row = fields.used(scene)
+        row |= {"fraction": scene.threshold.fractions[0]}
         return beside.interval(beside.kind_of(row), 30.0)[2]
 
     assert rows(strip) == 80
@@ -156,13 +156,13 @@ def test_an_interval_is_of_strips_that_differ_in_nothing_else_than_the_tested() 
     asked = {
         field.name
         for field in fields.FIELDS
-        if field.info.about == "question" and fields.APPLIES[field.info.scope](strip)
+        if not field.is_method and fields.APPLIES[field.info.scope](strip)
     }
     # forms of a train, profiles and obstacles are no level beds, depth and lee side are not set
     others = {
         f"bed.{name}" for name in ("kind", "forms", "spacing", "profile", "obstacles")
     }
-    others |= {"bed.lee_slope_deg", "flow.depth", "bed.disorder"}
+    others |= {"bed.lee_slope_deg", "flow.depth", "bed.disorder", fields.SEED}
     # strips with grains that stand out were tested by themselves
     others.add("forces.exposure")
     assert rows(changed(strip, {"forces.exposure": "protrusion"})) == 97

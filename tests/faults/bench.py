@@ -21,13 +21,14 @@ ORCHESTRATOR = (sys.executable, "-m", "orchestrator")
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
 HEAD = """
 time_limit = 300
-[protocol]
+[threshold]
+fractions = [0.3, 0.5]
+
+[method.grains]
 load_increment = 0.05
 waiting_time = 3.0
 time_step = 0.3
 final_fraction = 0.8
-fractions = [0.3, 0.5]
-[grain]
 stiffness = 1e3
 """
 CELLS = """
@@ -39,8 +40,9 @@ PILE = """
 [[group]]
 name = "pile"
 grain = { diameter = 2e-3 }
-bed = { kind = "pile", slope_deg = 20.0, roughness = "d/30", mobile_layers = 1 }
-flow = { cells_per_face = 10 }
+bed = { kind = "pile", slope_deg = 20.0, roughness = "d/30" }
+method.flow.cells_per_face = 10
+method.grains.mobile_layers = 1
 """
 Driver = subprocess.Popen[str]
 

@@ -144,13 +144,14 @@ def test_a_finished_study_is_answered_without_any_library(
 EDITED = """title = "first"
 tolerance = 0.3
 grain = { diameter = 1e-3 }
-protocol = { method = "pivot", fractions = [0.1] }
+threshold.fractions = [0.1]
+method.kind = "pivot"
 [fluid]
 kind = "water"
 [[group]]
 name = "profile"
 bed = { kind = "pile", profile = "scan.csv" }
-flow = { model = "waves" }
+method.flow.model = "waves"
 [group.axes]
 "grain.density" = [2650.0, 3000.0]
 [[group]]
@@ -259,7 +260,7 @@ def test_a_figure_that_failed_is_drawn_the_next_time(
 ) -> None:
     """The page without it once counted as finished."""
     file, out = tmp_path / "t.toml", tmp_path / "out"
-    file.write_text("grain.diameter = 1e-3\nprotocol.method = 'pivot'\n")
+    file.write_text("grain.diameter = 1e-3\nmethod.kind = 'pivot'\n")
 
     def fail(results: Results) -> Iterator[Figure]:
         raise MemoryError("for this test")
@@ -288,7 +289,7 @@ def test_the_command_and_python_answer_an_edited_study_alike(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file, out = tmp_path / "t.toml", tmp_path / "out"
-    whole = "grain.diameter = 1e-3\nprotocol.method = 'pivot'\n[forces]\nlaw = 'zeng'\n"
+    whole = "grain.diameter = 1e-3\nmethod.kind = 'pivot'\n[forces]\nlaw = 'zeng'\n"
     cut = whole.partition("[forces]")[0]
     answers: list[str] = []
     for text in (whole, cut):
@@ -308,7 +309,7 @@ def test_the_text_of_a_file_comes_from_one_place(tmp_path: Path) -> None:
     """The table of texts once won over the file, silently."""
     file, out = tmp_path / "t.toml", tmp_path / "out"
     body = "grain.diameter = 1e-3\nbed = { kind = 'pile', profile = 'scan.csv' }\n"
-    body += "flow.model = 'waves'\nprotocol.method = 'pivot'\n"
+    body += "method.flow.model = 'waves'\nmethod.kind = 'pivot'\n"
     file.write_text(f"{body}[profiles]\n'scan.csv' = '''{SCAN}'''\n")
     face.run(file, out=out)
     assert _is_finished(file, out)

@@ -41,13 +41,13 @@ def test_the_choice_is_within_the_tolerance_or_says_that_none_is(
 @pytest.mark.parametrize(
     ("fields", "word"),
     [
-        ({"protocol.waiting_time": 1.0}, "ramp"),
-        ({"protocol.method": "peeling"}, "peeling"),
-        ({"flow.model": "waves"}, "waves"),
-        ({"protocol.update": 0.1, "flow.first_cell_height": 5e-4}, "changes"),
+        ({"method.grains.waiting_time": 1.0}, "ramp"),
+        ({"method.kind": "peeling"}, "peeling"),
+        ({"method.flow.model": "waves"}, "waves"),
+        ({"threshold.update": 0.1, "method.flow.first_cell_height": 5e-4}, "changes"),
         ({"bed.packing": "poured", "bed.width": 6.0}, "no error is known"),
         ({"forces.averaging_length": 10.0}, "averaging_length = 10"),
-        ({"flow.first_cell_height": 0.005}, "first cells of 0.005 m"),
+        ({"method.flow.first_cell_height": 0.005}, "first cells of 0.005 m"),
         ({"forces.law": "low", "bed.slope_deg": 20.0}, "lift"),
         ({"flow.gusts": GUSTS}, "flow.gusts"),
     ],
@@ -65,12 +65,14 @@ def test_what_is_asked_for_or_not_known_is_answered_as_asked(
 def test_over_a_level_bed_the_flow_is_exact_and_the_grains_are_chosen(
     pile: MakePile,
 ) -> None:
-    asked = pile({"flow.model": "flat"}, packing="poured", shape="flat", slope_deg=0.0)
+    asked = pile(
+        {"method.flow.model": "flat"}, packing="poured", shape="flat", slope_deg=0.0
+    )
     assert scene_class(FLOW, asked) == LEVEL_BED
     for tolerance in (0.9, 0.7, 0.1):
         chosen = decide(asked, tolerance)
         assert chosen.fidelity
-        assert chosen.scene.flow.model == "flat"
+        assert chosen.scene.method.flow.model == "flat"
 
 
 @pytest.mark.parametrize(
@@ -85,15 +87,15 @@ def test_a_single_grain_needs_no_fidelity(
     """
     (scene,) = study.parse(text, name="one", where="test").scenes
     chosen = decide(scene, 0.05)
-    assert chosen.scene.protocol.method == method
+    assert chosen.scene.method.kind == method
     assert (chosen.fidelity, chosen.error_estimate) == (None, None)
 
 
-def _asked(bed: str = "", protocol: str = "", diameter: float = 1e-3) -> Scene:
+def _asked(bed: str = "", method: str = "", diameter: float = 1e-3) -> Scene:
     text = f"""
         grain = {{ diameter = {diameter} }}
         bed = {{ kind = "pile", slope_deg = 15.0{bed} }}
-        protocol = {{ {protocol} }}
+        {method}
     """
     (scene,) = study.parse(text, name="own", where="own").scenes
     return scene
@@ -105,12 +107,14 @@ def test_the_default_errs_less_than_the_model_is_worth(
     packing: str, diameter: float
 ) -> None:
     scene = _asked(
-        f', packing = "{packing}", height = 0.01', "fractions = [0.3]", diameter
+        f', packing = "{packing}", height = 0.01',
+        "threshold.fractions = [0.3]",
+        diameter,
     )
     chosen = decide(scene, None)
     assert chosen.is_chosen
-    assert chosen.scene.protocol.method != "dem"
-    assert chosen.scene.flow.model == "solve"
+    assert chosen.scene.method.kind != "dem"
+    assert chosen.scene.method.flow.model == "solve"
     assert chosen.known.total <= min(floors().values()) <= floors()[model_class(scene)]
 
 
@@ -125,40 +129,40 @@ def test_more_grains_are_answered_without_them_in_rows_along_the_bed_alone(
     if packing == "horizontal":
         assert many.fidelity is few.fidelity is not None
     else:
-        assert many.scene.protocol.method == "local"
+        assert many.scene.method.kind == "local"
 
 
 def test_the_closed_form_along_the_bed_is_refused_for_level_rows() -> None:
     with pytest.raises(InputError, match="local is of rows along the bed"):
-        _asked(', packing = "horizontal"', 'method = "local"')
+        _asked(', packing = "horizontal"', 'method.kind = "local"')
 
 
 @pytest.mark.parametrize(
-    ("bed", "protocol", "word"),
+    ("bed", "method", "word"),
     [
-        ("", 'method = "dem"', "the method dem"),
-        ("", 'method = "peeling"', "the method peeling"),
-        ("", "load_increment = 0.05", "protocol.load_increment"),
-        (", mobile_layers = 1", "", "bed.mobile_layers"),
+        ("", 'method.kind = "dem"', "the method dem"),
+        ("", 'method.kind = "peeling"', "the method peeling"),
+        ("", "method.grains.load_increment = 0.05", "method.grains.load_increment"),
+        ("", "method.grains.mobile_layers = 1", "method.grains.mobile_layers"),
         (', packing = "poured"', "", "poured"),
         (', shape = "dune"', "", "spread"),
     ],
 )
-def test_what_a_file_says_stays(bed: str, protocol: str, word: str) -> None:
-    scene = _asked(bed, protocol)
+def test_what_a_file_says_stays(bed: str, method: str, word: str) -> None:
+    scene = _asked(bed, method)
     chosen = decide(scene, None)
     assert not chosen.is_chosen
-    method = scene.protocol.method
-    kept = "dem" if method == "auto" else method
-    assert chosen.scene == changed(scene, {"protocol.method": kept})
+    kind = scene.method.kind
+    kept = "dem" if kind == "auto" else kind
+    assert chosen.scene == changed(scene, {"method.kind": kept})
     assert word in chosen.why
 
 
-@pytest.mark.parametrize("field", ["flow.speed", "flow.viscosity"])
+@pytest.mark.parametrize("field", ["method.flow.speed", "method.flow.viscosity"])
 def test_a_number_of_the_solve_that_fidelities_keep_asks_for_no_dem(
     field: str, pile: MakePile
 ) -> None:
-    value = {"flow.speed": 1.0, "flow.viscosity": 1e-6}[field]
+    value = {"method.flow.speed": 1.0, "method.flow.viscosity": 1e-6}[field]
     plain, other = decide(pile(), None), decide(pile({field: value}), None)
     assert plain.is_chosen
     assert other.fidelity is plain.fidelity
@@ -194,7 +198,11 @@ COHESION = "grain.cohesion = 1e-3"
         (LONG % "", COHESION, "local"),
         (LONG % "", GUSTY, "local"),
         # neither level rows nor grains that share the stress are those of the closed form
-        (LONG % ', packing = "horizontal", mobile_layers = 1', "", "peeling"),
+        (
+            LONG % ', packing = "horizontal"' + "\nmethod.grains.mobile_layers = 1",
+            "",
+            "peeling",
+        ),
         (LONG % ', packing = "horizontal"', COHESION, "peeling"),
         (LONG % "", BALANCED, "peeling"),
     ],
@@ -205,7 +213,7 @@ def test_what_dem_does_not_know_is_answered_by_a_method_that_does(
     text = f"grain.diameter = 1e-3\n{bed}\n{more}"
     (scene,) = study.parse(text, name="one", where="one").scenes
     answer = decide(scene, None)
-    assert answer.scene == changed(scene, {"protocol.method": method})
+    assert answer.scene == changed(scene, {"method.kind": method})
     assert not answer.is_chosen
     assert answer.is_along == (method == "local")
     if more:  # no error is known of any of these, or none of what answers
@@ -220,14 +228,14 @@ def test_one_pile_of_each_kind_is_checked_by_dem(pile: MakePile) -> None:
         pile(height=0.01),
         pile({"forces.stress": "eq10"}),
         pile(slope_deg=20.0),
-        pile({"protocol.method": "pivot"}),
+        pile({"method.kind": "pivot"}),
     ]
-    numbers = {"protocol.load_increment": 0.05, "grain.stiffness": 1e3}
+    numbers = {"method.grains.load_increment": 0.05, "method.grains.stiffness": 1e3}
     scenes = [changed(scene, numbers) for scene in scenes]
     answers = [decide(scene, 0.2) for scene in scenes]
     made = checks(answers)
     assert set(made) == {scenes[1].id, scenes[2].id, scenes[3].id}
     assert made == checks(answers[::-1])
     for number in (1, 2, 3):
-        by_dem = changed(scenes[number], {"protocol.method": "dem"})
+        by_dem = changed(scenes[number], {"method.kind": "dem"})
         assert made[scenes[number].id].scene == by_dem

@@ -30,7 +30,7 @@ def _named(name: str, bed: str = "", more: str = "") -> Scene:
     text = f"""
         grain.diameter = 1e-3
         bed = {{ kind = "pile", slope_deg = 15.0{bed} }}
-        protocol.fidelity = "{name}"
+        method.fidelity = "{name}"
         {more}
     """
     (scene,) = study.parse(text, name="one", where="one").scenes
@@ -50,7 +50,7 @@ def test_an_answer_has_its_fidelity_and_asks_the_same(
     assert found is one or (found.name, one.name) == ("static", "quick")
     assert (answer.fluid, answer.forces) == (scene.fluid, scene.forces)
     assert answer.bed.slope_deg == scene.bed.slope_deg
-    assert answer.protocol.fractions == scene.protocol.fractions
+    assert answer.threshold.fractions == scene.threshold.fractions
 
 
 @pytest.mark.parametrize("name", [one.name for one in FIDELITIES])
@@ -67,11 +67,13 @@ def test_a_study_file_names_a_fidelity(name: str, packing: str) -> None:
 
 def test_a_number_that_a_file_writes_stands_before_that_of_the_fidelity() -> None:
     scene = _named(
-        "quick", "", "flow.cells_per_face = 80\nprotocol.load_increment = 0.05"
+        "quick",
+        "",
+        "method.flow.cells_per_face = 80\nmethod.grains.load_increment = 0.05",
     )
-    assert scene.protocol.method == "pivot"
-    assert scene.flow.cells_per_face == 80
-    assert scene.protocol.load_increment == 0.05
+    assert scene.method.kind == "pivot"
+    assert scene.method.flow.cells_per_face == 80
+    assert scene.method.grains.load_increment == 0.05
     assert fidelity_of(scene) is OWN_NUMBERS
 
 
@@ -80,7 +82,7 @@ def test_fidelities_are_an_axis() -> None:
         grain.diameter = 1e-3
         bed = { kind = "pile", slope_deg = 15.0 }
         [axes]
-        "protocol.fidelity" = ["quick", "paper", "reference"]
+        "method.fidelity" = ["quick", "paper", "reference"]
     """
     scenes = study.parse(text, name="three", where="three").scenes
     assert [fidelity_of(scene).name for scene in scenes] == [
@@ -93,14 +95,14 @@ def test_fidelities_are_an_axis() -> None:
 def test_a_level_bed_and_a_single_grain_take_what_concerns_them() -> None:
     text = 'grain.diameter = 1e-3\nbed = { kind = "pile", shape = "flat" }\n'
     (level,) = study.parse(
-        text + 'protocol.fidelity = "paper"', name="one", where="one"
+        text + 'method.fidelity = "paper"', name="one", where="one"
     ).scenes
-    assert level.flow.model == "flat"
-    assert level.bed.mobile_layers == 1  # type: ignore[union-attr]
-    text = 'grain.diameter = 1e-3\nbed.kind = "grain"\nprotocol.fidelity = "reference"'
+    assert level.method.flow.model == "flat"
+    assert level.method.grains.mobile_layers == 1
+    text = 'grain.diameter = 1e-3\nbed.kind = "grain"\nmethod.fidelity = "reference"'
     (grain,) = study.parse(text, name="one", where="one").scenes
-    assert grain.protocol.method == "dem"
-    assert grain.protocol.load_increment == 0.004
+    assert grain.method.kind == "dem"
+    assert grain.method.grains.load_increment == 0.004
 
 
 def test_a_fidelity_that_does_not_exist_or_not_there_is_refused() -> None:
@@ -123,7 +125,7 @@ def test_the_numbers_of_a_file_that_names_none_are_those_of_standard(
         text = f"""
             grain.diameter = 1e-3
             bed = {{ kind = "pile", slope_deg = 15.0, packing = "{packing}" }}
-            protocol.method = "dem"
+            method.kind = "dem"
         """
         (scene,) = study.parse(text, name="one", where="one").scenes
         assert fidelity_of(scene) is named("standard")
@@ -135,20 +137,22 @@ def test_the_flow_over_fine_sand_has_a_roughness_of_its_own(pile: MakePile) -> N
         pile({**water, "grain.diameter": d}, roughness=d / 30) for d in (2e-4, 3e-3)
     )
     ustar = float(closed_form(fine).friction_velocity)
-    own = STATIC.answer(fine).flow.roughness
+    own = STATIC.answer(fine).method.flow.roughness
     assert own == pytest.approx(2e-4 / 30 + 1e-6 / (9 * ustar), rel=5e-3)
     # over a rough bed, and by Eqs. 2 and 4, it is the bed's
-    assert STATIC.answer(coarse).flow.roughness is None
-    assert STATIC.answer(changed(fine, {"forces.law": "low"})).flow.roughness is None
-    assert FLAT.changes(fine) == {"flow.model": "flat"}
+    assert STATIC.answer(coarse).method.flow.roughness is None
+    by_eq_2 = changed(fine, {"forces.law": "low"})
+    assert STATIC.answer(by_eq_2).method.flow.roughness is None
+    assert FLAT.changes(fine) == {"method.flow.model": "flat"}
 
 
 def test_a_long_bed_by_the_closed_form_is_recognised(pile: MakePile) -> None:
-    assert fidelity_of(pile({"protocol.method": "local"})) is LOCAL
+    assert fidelity_of(pile({"method.kind": "local"})) is LOCAL
 
 
 @pytest.mark.parametrize(
-    "field", ["flow.expansion_ration", "grain.stiffness", "nothing", "flow"]
+    "field",
+    ["method.flow.expansion_ration", "method.grains.stiffness", "nothing", "flow"],
 )
 def test_a_scene_is_changed_in_fields_that_exist(field: str, pile: MakePile) -> None:
     with pytest.raises(InputError, match=rf"changed: {re.escape(field)}"):

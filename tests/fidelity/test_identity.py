@@ -24,18 +24,18 @@ VALUES: dict[str, list[Any]] = {
     "bed.slope_deg": [15.0, 25.0, 30.0],
     "bed.packing": ["aligned", "horizontal", "disordered"],
     "bed.shape": ["triangle", "dune"],
-    "bed.mobile_layers": [1, 2],
-    "grain.stiffness": [1e3, 1e4],
-    "grain.damping": [0.1, 0.3],
+    "method.grains.mobile_layers": [1, 2],
+    "method.grains.stiffness": [1e3, 1e4],
+    "method.grains.damping": [0.1, 0.3],
     "grain.cohesion": [0.0, 1e-4],
-    "protocol.method": ["dem", "peeling", "pivot"],
-    "protocol.load_increment": [0.02, 0.05],
-    "protocol.waiting_time": [6.0, 10.0],
-    "protocol.final_fraction": [0.75, 0.9],
-    "flow.cells_per_face": [20, 40],
-    "flow.expansion_ratio": [1.1, 1.2],
-    "flow.speed": [1.0, 10.0],
-    "flow.model": ["solve", "waves"],
+    "method.kind": ["dem", "peeling", "pivot"],
+    "method.grains.load_increment": [0.02, 0.05],
+    "method.grains.waiting_time": [6.0, 10.0],
+    "method.grains.final_fraction": [0.75, 0.9],
+    "method.flow.cells_per_face": [20, 40],
+    "method.flow.expansion_ratio": [1.1, 1.2],
+    "method.flow.speed": [1.0, 10.0],
+    "method.flow.model": ["solve", "waves"],
     "forces.law": ["bridged", "zeng-torque"],
     "forces.stress": ["wall", "eq10"],
 }
@@ -145,7 +145,7 @@ def test_defaults_that_are_written_and_integers_change_nothing(
 
 
 def test_a_method_that_is_asked_for_answers_whatever_other_groups_leave_open() -> None:
-    by_dem, left_open = {"protocol.method": "dem"}, dict[str, Any]()
+    by_dem, left_open = {"method.kind": "dem"}, dict[str, Any]()
     (first, second), (third, fourth) = (
         answers(by_dem, left_open),
         answers(left_open, by_dem),
@@ -166,10 +166,10 @@ title = "Without a solver"
 fluid = { density = 1000.0, viscosity = 1e-6 }
 grain = { diameter = 1e-3, density = 2650.0 }
 bed = { kind = "pile", slope_deg = 15.0, height = 0.01 }
-flow.model = "waves"
+method.flow.model = "waves"
 """
-ONE = '[[group]]\nname = "one"\nprotocol.method = "pivot"\n'
-OTHER = '[[group]]\nname = "other"\nprotocol = { method = "peeling", load_increment = 0.02 }\n'
+ONE = '[[group]]\nname = "one"\nmethod.kind = "pivot"\n'
+OTHER = '[[group]]\nname = "other"\nmethod.kind = "peeling"\nmethod.grains.load_increment = 0.02\n'
 LONG = '[[group]]\nname = "long"\nbed.height = 2.0\n'
 
 

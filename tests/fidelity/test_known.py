@@ -108,13 +108,13 @@ def test_every_measured_class_has_its_reference_and_every_fidelity() -> None:
     [
         {"forces.averaging_length": 10.0},
         {"forces.loaded_grains": "all but crest"},
-        {"flow.first_cell_height": 0.005},
-        {"flow.speed": 0.5, "flow.viscosity": 1e-5},
-        {"flow.roughness": 1e-8},
-        {"flow.turbulence_model": "kOmegaSST"},
-        {"flow.convection_scheme": "upwind"},
-        {"flow.lid": 20.0},
-        {"protocol.displacement_criterion": 0.1},
+        {"method.flow.first_cell_height": 0.005},
+        {"method.flow.speed": 0.5, "method.flow.viscosity": 1e-5},
+        {"method.flow.roughness": 1e-8},
+        {"method.flow.turbulence_model": "kOmegaSST"},
+        {"method.flow.convection_scheme": "upwind"},
+        {"method.flow.lid": 20.0},
+        {"threshold.displacement": 0.1},
         {"flow.gusts": {"intensity": 0.4, "events": 100}},
         {"forces.stress": "eq10", **WATER},
         {"bed.packing": "poured", "bed.width": 6.0},
@@ -133,16 +133,20 @@ def test_a_known_error_holds_for_what_was_measured(
 def test_own_numbers_have_the_error_of_a_coarser_fidelity(pile: MakePile) -> None:
     """Poured beds by the default protocol were off by up to 40 %, with an interval of 2 %."""
     scene = written(pile())
-    finer = changed(scene, {"protocol.load_increment": 0.01})
+    finer = changed(scene, {"method.grains.load_increment": 0.01})
     assert fidelity_of(finer) is OWN_NUMBERS
     assert known(OWN_NUMBERS, finer) == known(named("standard"), scene)
     # softer grains and fewer layers are those of paper
-    softer = changed(scene, {"grain.stiffness": 1e3, "protocol.load_increment": 0.015})
-    coarser = changed(softer, {"protocol.time_step": 0.3, "bed.mobile_layers": 1})
+    softer = changed(
+        scene, {"method.grains.stiffness": 1e3, "method.grains.load_increment": 0.015}
+    )
+    coarser = changed(
+        softer, {"method.grains.time_step": 0.3, "method.grains.mobile_layers": 1}
+    )
     assert known(OWN_NUMBERS, coarser) == known(named("paper"), scene)
-    softest = changed(coarser, {"grain.stiffness": 100.0})
+    softest = changed(coarser, {"method.grains.stiffness": 100.0})
     assert known(OWN_NUMBERS, softest) == UNKNOWN
-    pivot = changed(scene, {"protocol.method": "pivot"})
+    pivot = changed(scene, {"method.kind": "pivot"})
     expected = np.hypot(
         measured()[FLOW, "standard", "wall"], measured()[GRAINS, "quick", "aligned"]
     )

@@ -12,8 +12,8 @@ from orchestrator.study.study import Study
 
 FENCE = {"bed.obstacles": [{"kind": "fence", "x": -0.1, "height": 0.01}]}
 POURED = {"bed.packing": "poured", "bed.slope_deg": 45.0, "bed.height": 0.015}
-SOLVED_LEVEL = {"bed.shape": "flat", "bed.slope_deg": 0.0, "flow.model": "solve"}
-LONG = {"bed.shape": "dune", "bed.slope_deg": 12.0, "protocol.method": "pivot"}
+SOLVED_LEVEL = {"bed.shape": "flat", "bed.slope_deg": 0.0, "method.flow.model": "solve"}
+LONG = {"bed.shape": "dune", "bed.slope_deg": 12.0, "method.kind": "pivot"}
 MOUND = "beyond what poured grains hold"
 GRAIN: dict[str, object] = {"bed.kind": "grain", "grain.friction_angle_deg": 35.0}
 REFUSED: list[tuple[dict[str, object], str, str]] = [
@@ -25,15 +25,15 @@ REFUSED: list[tuple[dict[str, object], str, str]] = [
     ),
     ({"bed.slope_deg": 31.0}, "bed.slope_deg", "90 deg - entrainment angle"),
     ({"bed.entrainment_angle_deg": 55.0}, "bed.entrainment_angle_deg", "wedged"),
-    ({"flow.first_cell_height": 3e-5}, "bed.roughness", "z_e"),
-    ({"flow.viscosity": 1e-2}, "flow.viscosity", "not turbulent"),
-    ({"protocol.time_step": 0.5}, "protocol.time_step", "above 0.4"),
+    ({"method.flow.first_cell_height": 3e-5}, "bed.roughness", "z_e"),
+    ({"method.flow.viscosity": 1e-2}, "method.flow.viscosity", "not turbulent"),
+    ({"method.grains.time_step": 0.5}, "method.grains.time_step", "above 0.4"),
     (
-        {"grain.damping": 0.3, "protocol.time_step": 0.3},
-        "protocol.time_step",
+        {"method.grains.damping": 0.3, "method.grains.time_step": 0.3},
+        "method.grains.time_step",
         "above 0.2",
     ),
-    ({"grain.damping": 0.01}, "grain.damping", "does not come to rest"),
+    ({"method.grains.damping": 0.01}, "method.grains.damping", "does not come to rest"),
     (
         {"bed.shape": "cosine", "bed.slope_deg": 31.0},
         "bed",
@@ -49,8 +49,12 @@ REFUSED: list[tuple[dict[str, object], str, str]] = [
         "bed",
         r"bed.spacing: forms 0.149\d* m long over",
     ),
-    (SOLVED_LEVEL, "flow.model", "nothing to solve"),
-    ({"flow.model": "waves", **FENCE}, "flow.model", "rises by 75 deg at x = -0.1"),
+    (SOLVED_LEVEL, "method.flow.model", "nothing to solve"),
+    (
+        {"method.flow.model": "waves", **FENCE},
+        "method.flow.model",
+        "rises by 75 deg at x = -0.1",
+    ),
     (
         {**LONG, "bed.height": 20.0},
         "bed",
@@ -68,12 +72,12 @@ WARNED: list[tuple[dict[str, object], str, str]] = [
         "bed.slope_deg",
         "half-way",
     ),
-    ({"protocol.waiting_time": 2.0}, "protocol.waiting_time", "ramp"),
-    ({"protocol.load_increment": 0.1}, "protocol.load_increment", "interval"),
+    ({"method.grains.waiting_time": 2.0}, "method.grains.waiting_time", "ramp"),
+    ({"method.grains.load_increment": 0.1}, "method.grains.load_increment", "interval"),
     ({"forces.loaded_grains": "all but crest"}, "forces.loaded_grains", "blocks"),
     (
-        {"flow.convection_scheme": "upwind"},
-        "flow.convection_scheme",
+        {"method.flow.convection_scheme": "upwind"},
+        "method.flow.convection_scheme",
         "does not converge",
     ),
 ]
@@ -81,8 +85,8 @@ ALLOWED: list[dict[str, object]] = [
     {**GRAIN, "bed.slope_deg": 25.0},
     {**LONG, "bed.slope_deg": 1.0, "bed.lee_slope_deg": 34.0, "bed.height": 0.01},
     {**LONG, "bed.height": 20.0, "bed.counted": [10.0, 12.0]},
-    {"flow.model": "waves", "flow.first_cell_height": 3e-5},
-    {"flow.model": "flat", "bed.shape": "flat", "bed.slope_deg": 0.0},
+    {"method.flow.model": "waves", "method.flow.first_cell_height": 3e-5},
+    {"method.flow.model": "flat", "bed.shape": "flat", "bed.slope_deg": 0.0},
     {**POURED, "bed.shape": "step up", "bed.slope_deg": 30.0},
 ]
 

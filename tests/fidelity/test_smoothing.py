@@ -15,7 +15,7 @@ NOISE = 0.015 * np.random.default_rng(4).standard_normal(len(X))
 STUDY = """
 grain = {{ diameter = 2.5e-4, density = 2650.0 }}
 fluid = {{ kind = "air" }}
-flow = {{ model = "{model}" }}
+method.flow.model = "{model}"
 bed = {{ kind = "pile", profile = "scan.csv", smoothing = {smoothing} }}
 [profiles]
 "scan.csv" = '''x_m,z_m

@@ -14,7 +14,7 @@ from orchestrator.study import study
 PILES = """
 tolerance = 0.2
 grain = {{ diameter = 1e-3 }}
-protocol = {{ load_increment = 0.03, waiting_time = 6.0, final_fraction = 0.75 }}
+method.grains = {{ load_increment = 0.03, waiting_time = 6.0, final_fraction = 0.75 }}
 forces = {{ law = "high" }}
 bed = {{ kind = "pile", height = 0.014, slope_deg = 20.0, roughness = "d/30", packing = "{}" }}
 [[group]]
@@ -27,7 +27,7 @@ BY_HAND = """
 [[group]]
 name = "asked for by the pivot"
 bed = { height = 0.015 }
-protocol = { method = "pivot" }
+method.kind = "pivot"
 """
 
 
@@ -41,9 +41,11 @@ def _run(packing: str, out: Path, more: str = "") -> dict[str, pd.DataFrame]:
 def test_cheap_answers_are_checked_by_one_pile_by_dem(tmp_path: Path) -> None:
     tables = _run("aligned", tmp_path)
     answers, check = tables["pile_threshold"], tables["check"]
-    assert set(answers["fidelity"]) <= {"quick", "static"}
-    assert (answers["error_estimate"] <= 0.2).all()
-    (why,) = set(tables["scenes"]["why"])
+    methods = tables["methods"]
+    assert set(methods["fidelity"]) <= {"quick", "static"}
+    assert (methods["error_estimate"] <= 0.2).all()
+    (why,) = set(methods["why"])
+    answers = answers.merge(methods[["scene_id", "error_estimate"]])
     assert why.endswith("the cheapest fidelity within the tolerance")
     # the smaller of the two piles stands for both
     assert check["scene_id"].nunique() == 1
@@ -68,14 +70,13 @@ def test_an_answer_that_its_check_contradicts_is_not_usable(
     monkeypatch.setattr(known, "measured", lambda: wrong)
     monkeypatch.setattr(known, "_of_classes", known._of_classes.__wrapped__)
     tables = _run("horizontal", tmp_path, BY_HAND)
-    answers = tables["pile_threshold"].merge(
-        tables["scenes"][["scene_id", "group", "why"]]
-    )
+    groups = tables["scenes"][["scene_id", "group"]]
+    answers = tables["pile_threshold"].merge(groups)
     check = tables["check"]
     small = answers[answers["group"] == "small"]
     # the smaller of the two piles is checked, and every pile keeps its answer
     assert set(check["scene_id"]) == set(small["scene_id"])
-    assert set(tables["scenes"]["answered_method"]) == {"pivot"}
+    assert set(tables["methods"]["method"]) == {"pivot"}
     beyond = check["shields_high"] < check["shields_dem_low"]
     assert beyond.any()
     assert (check["agree"] != beyond).all()
@@ -99,7 +100,7 @@ def test_a_run_on_chosen_levels_that_fails_names_the_next_step(tmp_path: Path) -
     """
     for method, is_advised in (("auto", True), ("dem", False)):
         asked = study.parse(
-            f'{text}protocol.method = "{method}"', name="slow", where="slow"
+            f'{text}method.kind = "{method}"', name="slow", where="slow"
         )
         finished = pipeline.run(asked, tmp_path / method, workers=1)
         (flow,) = (name for name in finished.failures if name.startswith("flow-"))
@@ -108,7 +109,7 @@ def test_a_run_on_chosen_levels_that_fails_names_the_next_step(tmp_path: Path) -
             True,
             True,
         )
-        assert ('protocol.method = "dem"' in said) == is_advised
+        assert ('method.kind = "dem"' in said) == is_advised
         assert len(list((tmp_path / method / "cases").glob("flow-*"))) == 1
 
 
@@ -119,8 +120,9 @@ def test_gusts_have_no_known_error(tmp_path: Path) -> None:
         [[group]]
         [[group]]
         bed = { kind = "pile", slope_deg = 15.0, height = 0.01 }
-        flow = { model = "waves", gusts = { intensity = 0.4, events = 100 } }
-        protocol.method = "pivot"
+        flow = { gusts = { intensity = 0.4, events = 100 } }
+        method.flow.model = "waves"
+        method.kind = "pivot"
     """
     asked = study.parse(text, name="gusts", where="gusts")
     pipeline.run(asked, tmp_path, workers=1)
@@ -149,8 +151,8 @@ def test_a_tolerance_of_the_command_line_is_kept_for_the_next_report(
     assert cli.main(command) == 0
     assert not list((out / "cases").glob("cells-*"))
     assert cli.main(["report", str(out)]) == 0
-    table = pd.read_csv(out / "tables" / "single_grain.csv")
-    assert set(table["answered_method"]) == {"pivot"}
+    table = pd.read_csv(out / "tables" / "methods.csv")
+    assert set(table["method"]) == {"pivot"}
 
 
 def test_a_tolerance_out_of_range_is_refused(
@@ -171,4 +173,4 @@ def test_a_tolerance_of_zero_is_refused_with_what_to_write(
         assert cli.main(command) == 2
         said = capsys.readouterr().err
         assert "tolerance: " in said
-        assert 'protocol.method = "dem"' in said
+        assert 'method.kind = "dem"' in said

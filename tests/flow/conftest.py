@@ -11,10 +11,11 @@ import pytest
 from orchestrator.flow.case import FlowCase
 from orchestrator.runs import case, process
 from orchestrator.runs.case import templates
+from orchestrator.study.method import FlowMethod
 from orchestrator.study.parts import Flow
 from tests.conftest import Shared
 
-SETTINGS = Flow(
+SETTINGS = FlowMethod(
     speed=10.0,
     roughness=1e-4 / 3.0,
     viscosity=1e-5,
@@ -29,7 +30,7 @@ def changed(flow: FlowCase, **settings: Any) -> FlowCase:
     return replace(flow, settings=flow.settings.model_copy(update=settings))
 
 
-OPEN = changed(PILE, top="open water", depth=6.0 * PILE.height_m)
+OPEN = replace(PILE, above=Flow(top="open water", depth=6.0 * PILE.height_m))
 
 Solve = Callable[[FlowCase], Path]
 

@@ -23,7 +23,7 @@ from tests.flow.conftest import PILE, changed, edit
 
 BED = """
 grain = { diameter = 1e-3 }
-protocol = { method = "pivot" }
+method.kind = "pivot"
 bed.kind = "pile"
 bed.slope_deg = 15.0
 """
@@ -136,10 +136,10 @@ def test_a_mesh_that_is_no_such_mesh(
         )
     ]
     + [
-        ("flow = { lid = 3.0 }", "flow.lid"),
+        ("method.flow.lid = 3.0", "method.flow.lid"),
         (
-            "flow = { cells_per_face = 10, expansion_ratio = 2.0 }",
-            "flow.expansion_ratio",
+            "method.flow = { cells_per_face = 10, expansion_ratio = 2.0 }",
+            "method.flow.expansion_ratio",
         ),
     ],
 )

@@ -16,11 +16,16 @@ from orchestrator.study import study
 TEXT = """
 grain = { diameter = 1e-3 }
 bed = { kind = "pile", slope_deg = 15.0, roughness = "d/30" }
-[flow]
+[method.flow]
 """
-WATER = (
-    'model = "flat"\ntop = "open water"\ndepth = 0.3\n[protocol]\nmethod = "pivot"\n'
-)
+WATER = """
+model = "flat"
+[flow]
+top = "open water"
+depth = 0.3
+[method]
+kind = "pivot"
+"""
 
 
 def piles(flow: str) -> list[Pile]:
@@ -32,7 +37,7 @@ def piles(flow: str) -> list[Pile]:
 def test_a_theory_needs_no_case(tmp_path: Path) -> None:
     # nor is it refused for a mesh that it has not
     flat, waves = piles(
-        'first_cell_height = 0.01\n[axes]\n"flow.model" = ["flat", "waves"]\n'
+        'first_cell_height = 0.01\n[axes]\n"method.flow.model" = ["flat", "waves"]\n'
     )
     assert flat.model.cases == waves.model.cases == ()
     np.testing.assert_allclose(flat.speed(tmp_path), 1)
@@ -79,14 +84,16 @@ def test_a_flat_beds_height_moves_nothing_behind_a_fence() -> None:
 
 def test_a_slow_solve_keeps_its_first_cells() -> None:
     """Its viscosity is lowered instead: the wall is rough, and the stress scales with the speed."""
-    for pile in piles('[axes]\n"flow.speed" = [0.5, 1.0, 10.0]\n'):
+    for pile in piles('[axes]\n"method.flow.speed" = [0.5, 1.0, 10.0]\n'):
         flow = pile.flow
         assert flow.first_cell_m == pytest.approx(0.02 / 40)
         assert flow.viscosity_m2_s <= 1e-5
         assert (
             0.41 * flow.ustar0_m_s * flow.first_cell_m / 2 / flow.viscosity_m2_s > 1.2
         )
-    for pile in piles('viscosity = 1e-4\n[axes]\n"flow.speed" = [0.5, 1.0, 10.0]\n'):
+    for pile in piles(
+        'viscosity = 1e-4\n[axes]\n"method.flow.speed" = [0.5, 1.0, 10.0]\n'
+    ):
         assert pile.flow.viscosity_m2_s == 1e-4
         assert pile.flow.first_cell_m > 0.02 / 40
 

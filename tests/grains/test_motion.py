@@ -56,16 +56,19 @@ def test_what_a_track_counts_as(
 
 LIFT_OFF = """
 fluid = { density = 1.0, viscosity = 1e-5 }
-grain = { diameter = 5e-4, density = 2500.0, stiffness = 1e3 }
-flow = { model = "waves" }
+grain = { diameter = 5e-4, density = 2500.0 }
+method.flow.model = "waves"
+method.grains = { stiffness = 1e3, mobile_layers = 1 }
 forces = { law = "low" }
-bed = { kind = "pile", height = 0.005, slope_deg = 20.0, mobile_layers = 1, roughness = "d/30" }
-[protocol]
+bed = { kind = "pile", height = 0.005, slope_deg = 20.0, roughness = "d/30" }
+[threshold]
+fractions = [0.1, 0.3]
+
+[method.grains]
 load_increment = 0.05
 waiting_time = 6.0
 time_step = 0.3
 final_fraction = 0.5
-fractions = [0.1, 0.3]
 """
 """A pile under Eq. 2 far above its range: lift bears the grains before drag can push them up."""
 
@@ -92,7 +95,7 @@ def test_a_pile_that_lifts_off_has_moved_and_says_so(tmp_path: Path) -> None:
     np.testing.assert_allclose(lift, scene.weight * np.cos(SLOPE), rtol=2e-8)
     assert np.isinf(loads.lifting(0.99 * lifting)).all()
     for method in ("pivot", "peeling"):
-        cheap = Pile(changed(scene, {"protocol.method": method})).thresholds(
+        cheap = Pile(changed(scene, {"method.kind": method})).thresholds(
             cases, (0.1, 0.3)
         )
         for at, dem in zip(cheap, pile.thresholds(cases, (0.1, 0.3)), strict=True):
@@ -169,7 +172,7 @@ def test_rest_and_lines_left_out_change_no_grain(
     ("time_step", "damping", "error", "what"),
     [
         (0.3, 0.1, None, ""),
-        (1.2, 0.1, Exploded, r"settling.csv: the bed burst .* protocol.time_step"),
+        (1.2, 0.1, Exploded, r"settling.csv: the bed burst .* method.grains.time_step"),
         (0.6, 0.1, Noisy, "the bed does not come to rest"),
         (0.4, 0.3, Noisy, "the bed does not come to rest"),
     ],

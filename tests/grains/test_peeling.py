@@ -18,7 +18,8 @@ from orchestrator.bed.packing import Places
 from orchestrator.grains import motion, peeling, threshold
 from orchestrator.grains.peeling import Force, ForceTable, Loading
 from orchestrator.runs.case import templates
-from orchestrator.study.parts import Grain, Gusts, Protocol
+from orchestrator.study.method import GrainMethod
+from orchestrator.study.parts import Grain, Gusts
 from orchestrator.types import BoolArray, FloatArray
 
 
@@ -183,7 +184,8 @@ def _moved_by_dem(
     copy: Path,
     grains: deck.GrainTable,
     force: FloatArray,
-    rules: Protocol,
+    waiting_time: float,
+    displacement: float,
     **given: Any,
 ) -> motion.Motion:
     """Motion of grains of 1 mm under forces (W) at the friction velocities of load steps."""
@@ -191,7 +193,10 @@ def _moved_by_dem(
     numbers = {
         **{"diameter": d, "smallest": 1.0, "density": 2500.0, "gravity": 9.81},
         **deck.protocol(
-            Grain(diameter=d, stiffness=3e4), rules, gusts=given.pop("asked", None)
+            Grain(diameter=d),
+            GrainMethod(stiffness=3e4, waiting_time=waiting_time),
+            displacement,
+            gusts=given.pop("asked", None),
         ),
         **{"slope": 0.0, "ceiling_x": 0.0, "ceiling_z": 5 * d, "behind": 30 * d},
     }
@@ -200,7 +205,7 @@ def _moved_by_dem(
         copy, grains, numbers, given.pop("rising"), force * weight, 3 * d, **given
     )
     subprocess.run(["./Allrun"], cwd=copy, check=True)
-    return motion.read(copy, grains, rules.displacement_criterion, falls_out=False)
+    return motion.read(copy, grains, displacement, falls_out=False)
 
 
 def _around(elevation_deg: float, turned_deg: float) -> FloatArray:
@@ -237,9 +242,7 @@ def test_dem_moves_a_grain_out_of_its_pocket_at_the_closed_form(tmp_path: Path) 
         0.95 * np.sqrt(_drag(0)), 1.02 * np.sqrt(_drag(60)), 0.002
     )
     force = _loading().at(rising)
-    moved = _moved_by_dem(
-        tmp_path / "b", grains, force, Protocol(waiting_time=8), rising=rising
-    )
+    moved = _moved_by_dem(tmp_path / "b", grains, force, 8.0, 0.3, rising=rising)
     ustar = threshold.of_grains(moved).value
     np.testing.assert_allclose(
         ustar, np.sqrt([_drag(turned) for turned in TURNED]), rtol=0.005
@@ -263,7 +266,7 @@ def _leaves(push: FloatArray, duration: float) -> BoolArray:
 
 @pytest.mark.parametrize("duration", [0.5, 1.0, 2.0, 20.0])
 def test_a_gust_moves_a_grain_by_its_impulse(tmp_path: Path, duration: float) -> None:
-    push, rules = np.linspace(0.98, 4.0, 303), Protocol(displacement_criterion=0.5)
+    push = np.linspace(0.98, 4.0, 303)
     x, z = np.tile([[-0.5, 0.5, 0.0], [0.0, 0.0, math.sqrt(0.75)]], len(push))
     places = np.column_stack([x, np.repeat(3.0 * np.arange(len(push)), 3), z])
     kind = np.tile([deck.FIXED, deck.FIXED, deck.COUNTED], len(push))
@@ -276,7 +279,7 @@ def test_a_gust_moves_a_grain_by_its_impulse(tmp_path: Path, duration: float) ->
     gust = Gusts(intensity=0.4, events=2, duration=duration / 2)
     gusts = {"asked": gust, "gusts": np.array([0.0, 1.0, 1.0, 0.0])}
     level = _moved_by_dem(
-        tmp_path / "b", grains, force, rules, rising=np.ones(2), **gusts
+        tmp_path / "b", grains, force, 10.0, 0.5, rising=np.ones(2), **gusts
     ).level
     exact = push[_leaves(push, duration)].min()
     assert push[level > 0].min() == pytest.approx(exact, rel=0.015)

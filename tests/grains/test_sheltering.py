@@ -27,9 +27,9 @@ LAW = LAWS["bridged-gravel"]
 PILE = """
 grain.diameter = 1e-3
 bed = { kind = "pile", slope_deg = 15.0 }
-flow = { model = "flat" }
+method.flow.model = "flat"
 forces = { sheltering = "balanced", lift_coefficient = 0.0 }
-protocol.method = "%s"
+method.kind = "%s"
 """
 
 

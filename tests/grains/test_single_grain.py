@@ -27,7 +27,7 @@ def _run(cells: SingleGrainCase, cases: Path, limit_s: float = 120.0) -> Motion:
 
 
 FIGURE = """
-protocol = { load_increment = 0.002 }
+method.grains.load_increment = 0.002
 [axes]
 "bed.entrainment_angle_deg" = [45.0, 50.0, 55.0, 60.0]
 "bed.slope_deg" = [0.0, 15.0, 30.0]
@@ -38,20 +38,21 @@ fluid = { viscosity = 1e-3 }
 grain = { diameter = 1e-3 }
 """
 FEW = """
-protocol = { load_increment = 0.005 }
+method.grains.load_increment = 0.005
 [axes]
 "grain.diameter" = [7e-4, 1e-3]
 """
 POCKETS = f"""
 grain = {{ diameter = 1e-3 }}
-protocol = {{ load_increment = 0.001 }}
+method.grains.load_increment = 0.001
 [axes]
 "bed.relative_size" = {np.linspace(0.5, 3.0, 10).tolist()}
 """
 """Each grain leaves at the angle of its own pocket."""
 SHORT = """
 grain = { diameter = 1e-3 }
-protocol = { load_increment = 0.02, displacement_criterion = 1e-3 }
+threshold.displacement = 1e-3
+method.grains.load_increment = 0.02
 """
 """A displacement criterion may be very small."""
 
@@ -75,7 +76,7 @@ def test_a_bed_has_no_scale(tmp_path: Path) -> None:
     # two diameters, one Reynolds number, one ratio of lift to drag: the same load step
     text = """
     forces = { law = "high" }
-    protocol = { load_increment = 0.002 }
+    method.grains.load_increment = 0.002
     [[group]]
     grain = { diameter = 1e-3 }
     [[group]]
@@ -156,7 +157,7 @@ def test_how_grains_move(tmp_path: Path) -> None:
     # 8 % above the threshold: without lift a grain rolls over its neighbour; with little else it
     # leaves its bed; at the limiting slope the low law's lift carries a large grain off backwards
     text = """
-    protocol = { load_increment = 0.2 }
+    method.grains.load_increment = 0.2
     [[group]]
     grain = { diameter = 1e-3 }
     forces = { law = "high", lift_coefficient = 0.0 }

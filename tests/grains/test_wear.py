@@ -19,20 +19,23 @@ from tests.bed.test_line import BEDS
 from tests.bed.test_line import bed as bed_of
 
 PILE = """
-grain = { diameter = 1e-3, stiffness = 1e3 }
-bed = { kind = "pile", slope_deg = 25.0, height = 0.01, roughness = "d/30", mobile_layers = 1 }
-flow = { expansion_ratio = 1.4 }
-[protocol]
+grain = { diameter = 1e-3 }
+method.flow.expansion_ratio = 1.4
+method.grains = { stiffness = 1e3, mobile_layers = 1 }
+bed = { kind = "pile", slope_deg = 25.0, height = 0.01, roughness = "d/30" }
+[threshold]
+fractions = [0.25, 0.5, 0.75]
+
+[method.grains]
 load_increment = 0.03
 waiting_time = 6.0
 time_step = 0.3
-fractions = [0.25, 0.5, 0.75]
 """
 METHODS = """
 [[group]]
 [group.axes]
-"protocol.method" = ["peeling", "dem"]
-"protocol.update" = [0.0, 0.25]
+"method.kind" = ["peeling", "dem"]
+"threshold.update" = [0.0, 0.25]
 """
 
 
@@ -44,11 +47,9 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
 
 def _pile(results: Results, method: str, *, frozen: bool = False) -> Pile:
     piles = [
-        pile
-        for pile in results.plan.piles.values()
-        if pile.scene.protocol.method == method
+        pile for pile in results.plan.piles.values() if pile.scene.method.kind == method
     ]
-    return next(pile for pile in piles if (pile.scene.protocol.update == 0) == frozen)
+    return next(pile for pile in piles if (pile.scene.threshold.update == 0) == frozen)
 
 
 X, Z = (0.0, 0.02, 0.06, 0.1, 0.14, 0.18), (0.0, 0.0, -0.01, 0.005, 0.0, 0.0)

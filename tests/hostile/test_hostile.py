@@ -15,7 +15,8 @@ from pydantic import BaseModel
 from orchestrator import cli
 from orchestrator.runs import case
 from orchestrator.study import study
-from orchestrator.study.parts import Flow, Fluid, Forces, Grain, PileBed, Protocol
+from orchestrator.study.method import FlowMethod, GrainMethod
+from orchestrator.study.parts import Flow, Fluid, Forces, Grain, PileBed, Threshold
 from tests.conftest import Command
 
 
@@ -68,7 +69,8 @@ def shell(
 
 PARTS: dict[str, type[BaseModel]] = {
     **{"fluid": Fluid, "grain": Grain, "bed": PileBed},
-    **{"flow": Flow, "forces": Forces, "protocol": Protocol},
+    **{"flow": Flow, "forces": Forces, "threshold": Threshold},
+    **{"method.flow": FlowMethod, "method.grains": GrainMethod},
 }
 HUGE = "1" + "0" * 400
 VALUES = (
@@ -103,7 +105,7 @@ def test_study_files_with_one_wrong_value(shell: Shell) -> None:
 
 
 GRAIN = "[grain]\ndiameter = 1e-3\n"
-PROTOCOL = "[protocol]\nload_increment = 0.2\nwaiting_time = 3.0\n"
+PROTOCOL = "[method.grains]\nload_increment = 0.2\nwaiting_time = 3.0\n"
 BAD_FILES = (
     *("", "a = " + "[" * 100_000, "[" + ".".join(["a"] * 5000) + "]", "title = '\x00'"),
     *(
@@ -119,7 +121,7 @@ BAD_FILES = (
         for axis in ("grain", ".", "../grain.diameter", "grain.d.x")
     ),
     *(f"[axes]\n'grain.diameter' = [{value}]\n" for value in ("{ a = 1 }", "[1]")),
-    f"{GRAIN}[axes]\n'bed.seed' = [{'1,' * 1000}]\n'flow.speed' = [{'1.0,' * 1000}]\n",
+    f"{GRAIN}[axes]\n'bed.seed' = [{'1,' * 1000}]\n'method.flow.speed' = [{'1.0,' * 1000}]\n",
     *(
         f"{GRAIN}diameter = 1e-3\n",
         "grain:\n  diameter: 1e-3\n",
@@ -354,7 +356,7 @@ def test_a_broken_library_is_one_line(
 ) -> None:
     (tmp_path / f"{name}.py").write_text(BROKEN[name])  # python -m looks here first
     (tmp_path / "small.toml").write_text(
-        "bed.kind = 'flat'\nprotocol.method = 'pivot'\n" + GRAIN
+        "bed.kind = 'flat'\nmethod.kind = 'pivot'\n" + GRAIN
     )
     ended = orchestrator(
         "study", "small.toml"

@@ -41,15 +41,12 @@ def judge(tables: Tables, **changed: pd.DataFrame) -> dict[str, Judged]:
 @pytest.fixture(scope="module")
 def exact() -> Tables:
     """Single grains of the preset of the paper, as if DEM gave the closed form."""
-    asked, grains = [], []
+    asked, methods, grains = [], [], []
     for scene in study.load("paper").scenes:
         if scene.bed.kind == "grain":
-            own = {
-                "scene_id": scene.id,
-                **fields.asked(scene),
-                **fields.answered(scene),
-            }
-            asked.append({**own, "law_holds": law_holds(scene)})
+            own = {"scene_id": scene.id, "law_holds": law_holds(scene)}
+            asked.append({**own, **fields.question(scene)})
+            methods.append({"scene_id": scene.id, **fields.method(scene)})
             found = closed_form(scene)
             shields, ustar = float(found.shields), float(found.friction_velocity)
             row = dict.fromkeys(
@@ -59,7 +56,11 @@ def exact() -> Tables:
             grains.append(
                 {"scene_id": scene.id, **row, "reynolds": float(found.reynolds)}
             )
-    return {"scenes": pd.DataFrame(asked), "single_grain": pd.DataFrame(grains)}
+    return {
+        "scenes": pd.DataFrame(asked),
+        "methods": pd.DataFrame(methods),
+        "single_grain": pd.DataFrame(grains),
+    }
 
 
 @pytest.mark.parametrize(
@@ -86,7 +87,7 @@ def test_pairs_agree_in_all_else() -> None:
     assert ratio[0] == 1.5
     assert len(ratio) == 2
     for column in (
-        *fields.others([*fields.COLUMNS, *fields.ANSWERS], "alpha_deg"),
+        *fields.others(fields.COLUMNS, "alpha_deg"),
         "fidelity",
     ):
         if column not in ("force_law", "d_m", "seed"):
@@ -112,27 +113,28 @@ def test_a_small_study_is_judged(results: Results) -> None:
 def test_a_reason_explains_its_verdict_or_is_none(
     results: Results, exact: Tables
 ) -> None:
-    for tables in (results.tables, exact, {"scenes": results.tables["scenes"]}):
+    asked = {name: results.tables[name] for name in ("scenes", "methods")}
+    for tables in (results.tables, exact, asked):
         for one in claims.judge(tables):
             assert (one.why == one.claim.why) == (one.verdict == one.claim.verdict)
 
 
 def test_ramps_alone_reproduce_nothing(results: Results) -> None:
     scenes, grains = results.tables["scenes"], results.tables["single_grain"]
+    methods = results.tables["methods"]
     raised = grains.assign(shields_dem_low=2 * grains["shields_closed_form"])
     one = judge(
-        results.tables, scenes=scenes.assign(waiting_time=1.0), single_grain=raised
+        results.tables, methods=methods.assign(waiting_time=1.0), single_grain=raised
     )
     assert one["numerical"].verdict == "no data"
     assert "held flows" in one["numerical"].why
-    is_ramp = scenes["alpha_deg"] > 0
-    both = scenes.assign(waiting_time=np.where(is_ramp, 1.0, 6.0))
-    factor = np.where(
-        grains["scene_id"].isin(scenes.loc[is_ramp, "scene_id"]), 2.0, 0.9
-    )
+    ramps = scenes.loc[scenes["alpha_deg"] > 0, "scene_id"]
+    is_ramp = methods["scene_id"].isin(ramps)
+    both = methods.assign(waiting_time=np.where(is_ramp, 1.0, 6.0))
+    factor = np.where(grains["scene_id"].isin(ramps), 2.0, 0.9)
     raised = grains.assign(shields_dem_low=factor * grains["shields_closed_form"])
     assert (
-        judge(results.tables, scenes=both, single_grain=raised)["numerical"].verdict
+        judge(results.tables, methods=both, single_grain=raised)["numerical"].verdict
         == "partly"
     )
 
@@ -162,7 +164,7 @@ def test_the_closed_form_is_judged(exact: Tables) -> None:
     change = next(line for line in lines if "closed form: change" in line.name)
     assert change.numbers.min() == pytest.approx(steepest, rel=1e-3)
     # soft contacts that matter are seen
-    soft = exact["scenes"].set_index("scene_id")["stiffness"] < 1e4
+    soft = exact["methods"].set_index("scene_id")["stiffness"] < 1e4
     grains = exact["single_grain"]
     factor = np.where(soft.loc[grains["scene_id"]], 1.2, 1.0)
     softer = grains.assign(ustar_m_s=grains["ustar_m_s"] * factor)
@@ -191,7 +193,9 @@ def test_a_study_of_the_paper_alone_gets_a_report_card(
         else "title = ''"
     )
     (tmp_path / "cases").mkdir()
-    grains = {name: results.tables[name] for name in ("scenes", "single_grain")}
+    grains = {
+        name: results.tables[name] for name in ("scenes", "methods", "single_grain")
+    }
     whole = replace(results, study=replace(results.study, text=text), tables=grains)
     cards = paper.cards(whole.study, whole.tables)
     report.write(whole, {}, Folder(tmp_path), cards)

@@ -20,11 +20,11 @@ EVENTS = st.integers(2, 10**9)
 SAND = """
 fluid = { density = 1000.0, viscosity = 1e-6 }
 grain = { diameter = 1e-3, density = 2650.0 }
-protocol = { method = "pivot" }
+method.kind = "pivot"
 """
 PILE = (
     SAND
-    + 'bed = { kind = "pile", slope_deg = 15.0, height = 0.01 }\nflow.model = "flat"\n'
+    + 'bed = { kind = "pile", slope_deg = 15.0, height = 0.01 }\nmethod.flow.model = "flat"\n'
 )
 
 

@@ -56,7 +56,13 @@ def copies(results: Results, *changes: dict[str, Any]) -> Results:
     """The study's pile once for each set of changed columns, as a scene of its own."""
     heap = only(results, "pile")
     tables = dict(heap.tables)
-    for name in ("scenes", "pile_threshold", "pile_curve", "pile_grain"):
+    for name in (
+        "scenes",
+        "methods",
+        "pile_threshold",
+        "pile_curve",
+        "pile_grain",
+    ):
         own = tables[name]
         parts = [
             own.assign(

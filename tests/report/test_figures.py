@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from orchestrator.report import bed, flows, piles, poured, shields, style
 from orchestrator.report.results import Results
 from orchestrator.report.style import Figure
+from orchestrator.study import study
 from tests.report.conftest import axes_of, changed, copies, only
 
 LINE, SOLID, HOLLOW = shields.RESULT
@@ -169,7 +170,8 @@ def test_friction_velocity_is_that_of_the_flow(results: Results) -> None:
 
 def test_closed_form_is_drawn_before_there_are_results(results: Results) -> None:
     none = {name: pd.DataFrame() for name in results.tables}
-    empty = replace(results, tables={**none, "scenes": results.tables["scenes"]})
+    asked = {name: results.tables[name] for name in ("scenes", "methods")}
+    empty = replace(results, tables={**none, **asked})
     names = {"closed-form-horizontal", "closed-form-slope-beta60"}
     assert {figure.name for figure in single_figures(empty)} == names
     assert (
@@ -222,8 +224,8 @@ def test_a_threshold_without_a_place_on_a_logarithmic_axis_costs_no_figure(
 def test_flows_by_two_models_have_a_panel_each(results: Results) -> None:
     two = copies(results, {}, {"turbulence_model": "RNGkEpsilon"})
     pile = two.plan.piles["copy 0"]
-    flow = pile.scene.flow.model_copy(update={"turbulence_model": "RNGkEpsilon"})
-    other = replace(pile, scene=pile.scene.model_copy(update={"flow": flow}))
+    model = {"method.flow.turbulence_model": "RNGkEpsilon"}
+    other = replace(pile, scene=study.changed(pile.scene, model))
     stress = two.tables["wall_stress"]
     theirs = stress.assign(flow_case=other.flow.name)
     both = changed(two, wall_stress=pd.concat([stress, theirs], ignore_index=True))

@@ -102,7 +102,11 @@ def several(results: Results, bed: pd.DataFrame) -> Results:
         grains.append(bed.assign(force_law=name, scene_id=ids, law_holds=True))
     scenes = pd.concat([*grains, results.beds("pile")], ignore_index=True)
     kept = {name: results.tables[name] for name in ("pile_threshold", "wall_stress")}
-    return replace(results, tables={**kept, "scenes": scenes})
+    named = results.tables["methods"].columns.difference(["scene_id"])
+    of_method = ["scene_id", *named]
+    asked = scenes.drop(columns=of_method[1:])
+    tables = {**kept, "scenes": asked, "methods": scenes[of_method]}
+    return replace(results, tables=tables)
 
 
 def test_many_laws_have_colours_of_their_own(several: Results) -> None:

@@ -148,7 +148,8 @@ def test_same_results_give_the_same_bytes(results: Results, tmp_path: Path) -> N
 
 def test_page_without_results(results: Results, tmp_path: Path) -> None:
     none = {name: pd.DataFrame() for name in results.tables}
-    empty = replace(results, tables={**none, "scenes": results.tables["scenes"]})
+    asked = {name: results.tables[name] for name in ("scenes", "methods")}
+    empty = replace(results, tables={**none, **asked})
     (tmp_path / "cases").mkdir()
     failures = dict.fromkeys(results.plan.cases, "no solver")
     parsed = Page(
@@ -233,7 +234,7 @@ def test_in_a_browser_the_slider_moves_grains_and_a_point_answers(
     assert top < 900
 
 
-GRAIN = "grain = { diameter = 1e-3 }\nprotocol = { method = 'pivot' }\n"
+GRAIN = "grain = { diameter = 1e-3 }\nmethod.kind = 'pivot'\n"
 
 
 @pytest.fixture

@@ -29,10 +29,10 @@ DUNE = f"""
 fluid = {{ density = 1.22, viscosity = 1.48e-5 }}
 grain = {{ diameter = 3e-4, density = 2650.0 }}
 bed = {{ kind = "pile", profile = "dune.csv", smoothing = 0.8, roughness = 1e-5 }}
-flow = {{ expansion_ratio = 1.2 }}
+method.flow.expansion_ratio = 1.2
 [[group]]
 [[group]]
-protocol = {{ method = "pivot" }}
+method.kind = "pivot"
 bed = {{ counted = [28.0, 29.0] }}
 [profiles]
 "dune.csv" = '''x_m,z_m
@@ -41,8 +41,8 @@ bed = {{ counted = [28.0, 29.0] }}
 TRAIN = """
 title = "Two ripples"
 grain = { diameter = 1e-3 }
-protocol = { method = "peeling" }
-flow = { cells_per_face = 10 }
+method.kind = "peeling"
+method.flow.cells_per_face = 10
 [bed]
 kind = "pile"
 shape = "dune"
@@ -54,11 +54,11 @@ obstacles = [{ kind = "fence", x = -0.03, height = 0.004 }]
 HILLS = """
 title = "A hill"
 grain = { diameter = 4.71e-3 }
-protocol = { method = "pivot" }
+method.kind = "pivot"
+method.flow.cells_per_face = 12
 bed = { kind = "pile", shape = "rushil", slope_deg = 26.175, height = 0.117, roughness = 1.57e-4 }
-flow = { cells_per_face = 12 }
 [axes]
-"flow.turbulence_model" = ["kEpsilon", "RNGkEpsilon"]
+"method.flow.turbulence_model" = ["kEpsilon", "RNGkEpsilon"]
 """
 Studies = pytest.TempPathFactory
 
@@ -87,8 +87,7 @@ def pile(results: Results) -> Pile:
 @pytest.fixture(scope="module")
 def peeled(pile: Pile) -> Pile:
     """The same pile, whose grains leave by peeling."""
-    rules = pile.scene.protocol.model_copy(update={"method": "peeling"})
-    return replace(pile, scene=pile.scene.model_copy(update={"protocol": rules}))
+    return replace(pile, scene=pile.scene.by("peeling"))
 
 
 @pytest.fixture(scope="module")
@@ -199,7 +198,7 @@ def test_motion_starts_on_a_natural_dune_where_stress_and_slope_say(
     """40 m of 0.3 mm sand without a grain, and with those of a metre of it, under one flow."""
     whole, part = dune.plan.piles.values()
     table, stress = dune.joined("pile_threshold"), dune.tables["wall_stress"]
-    row = table[table["answered_method"] == "local"].iloc[0]
+    row = table[table["method"] == "local"].iloc[0]
     assert [run.name for run in whole.runs] == [run.name for run in part.runs]
     x, ustar = row["first_x_m"], stress["ustar_over_ustar0_wall"]
     assert 28 < x == pytest.approx(stress["x_m"][int(ustar.argmax())], abs=0.3)

@@ -52,7 +52,7 @@ def test_what_is_asked_parts_panels_and_what_answers_has_markers(
     asked = table.assign(
         stiffness=1e3, packing=["aligned", "aligned", "horizontal", "aligned"]
     )
-    panels, rows = shields.parted(asked.assign(answered_method="dem"), *SHOWN)
+    panels, rows = shields.parted(asked.assign(method="dem"), *SHOWN)
     assert panels == ["packing"]
     assert rows[SHAPE].tolist() == ["o", "s", "o", "o"]
     names = [text.rpartition(", ")[2] for text in rows[LABEL]]
@@ -67,7 +67,7 @@ def test_page_lists_every_parameter(results: Results) -> None:
     rows = {row[2]: row[3:] for row in sheets.parameters(results).to_numpy().tolist()}
     used = [column for column in fields.COLUMNS if results.scenes[column].notna().any()]
     assert rows.keys() >= {fields.COLUMNS[column].name or column for column in used}
-    assert rows["flow.first_cell_height"][0] == "default"
+    assert rows["method.flow.first_cell_height"][0] == "default"
 
 
 def test_the_picture_is_of_the_scene_that_the_sentence_is_about(
@@ -78,13 +78,13 @@ def test_the_picture_is_of_the_scene_that_the_sentence_is_about(
         "rho_f_kg_m3": 1.2,
         "usable": False,
         "why_not": "smooth",
-        "answered_method": "dem",
+        "method": "dem",
     }
     water = {
         "rho_f_kg_m3": 1e3,
         "usable": True,
         "why_not": "",
-        "answered_method": "peeling",
+        "method": "peeling",
     }
     for both in ((air, water), (water, air)):
         study = copies(results, *both)
@@ -127,9 +127,7 @@ def test_a_study_of_single_grains_has_an_answer_too(results: Results) -> None:
     grains = only(results, "grain")
     first, *_ = words.answer(grains).sentences
     assert first.startswith("One grain of 0.05 mm on 0° starts to move at u*₀ = ")
-    without = grains.tables["single_grain"].assign(
-        answered_method="pivot", ustar_m_s=np.nan
-    )
+    without = grains.tables["single_grain"].assign(method="pivot", ustar_m_s=np.nan)
     exact = changed(grains, single_grain=without)
     sheet = sheets.short(exact)
     assert sheet is not None

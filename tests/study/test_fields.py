@@ -26,7 +26,7 @@ forces = { law = "high" }
 """
 UNCHANGEABLE = (
     "bed.kind",
-    "protocol.fractions",
+    "threshold.fractions",
     "bed.profile",
     "bed.smoothing",
     "bed.obstacles",
@@ -41,8 +41,8 @@ NEEDED: dict[str, dict[str, Any]] = {
     "bed.width": {"bed.packing": "poured", "bed.width": 5.0},
     "flow.top": {"flow.top": "open water", "flow.depth": 1.0},
     "flow.depth": {"flow.top": "open water", "flow.depth": 1.0},
-    "flow.gusts": {"protocol.method": "pivot"},
-    "grain.cohesion": {"protocol.method": "pivot"},
+    "flow.gusts": {"method.kind": "pivot"},
+    "grain.cohesion": {"method.kind": "pivot"},
 }
 """Other fields that a scene must have for a field to have an effect."""
 
@@ -54,7 +54,7 @@ def scene() -> Scene:
 
 
 def declaration(quantity: Quantity) -> FieldInfo:
-    part, _, name = quantity.name.partition(".")
+    part, _, name = quantity.name.rpartition(".")
     return fields.PARTS[part].model_fields[name]
 
 
@@ -74,8 +74,11 @@ def other_value(quantity: Quantity, scene: Scene) -> Any:
 
 def in_tables(scenes: tuple[Scene, ...], *but: str) -> list[list[Any]]:
     """The columns of scenes in the tables but for those that follow from others."""
-    rows = [{**fields.asked(each), **fields.answered(each)} for each in scenes]
-    return [[row[column] for column in fields.others(row, *but)] for row in rows]
+    rows = []
+    for each in scenes:
+        row = {**fields.used(each), "asked": fields.written(each)}
+        rows.append([row[column] for column in [*fields.others(row, *but), "asked"]])
+    return rows
 
 
 @pytest.mark.parametrize("quantity", fields.FIELDS, ids=lambda quantity: quantity.name)
@@ -89,7 +92,7 @@ def test_each_field_has_its_words_and_its_range(quantity: Quantity) -> None:
         return
     low, high = REFERENCE["bounds"](declared)
     assert (low[0] in "[(", high[-1] in "])") == (True, True)
-    part, _, name = quantity.name.partition(".")
+    part, _, name = quantity.name.rpartition(".")
     base: dict[str, dict[str, Any]] = {
         "grain": {"diameter": 1e-3},
         "bed": {"kind": "pile"},
@@ -127,23 +130,23 @@ def test_beds_alike_but_for_the_size_of_their_grains_are_equal(scene: Scene) -> 
 
 
 def test_rungs_change_fields_of_the_answer_alone(scene: Scene) -> None:
-    about = {field.name: field.info.about for field in fields.FIELDS}
+    of_method = {field.name for field in fields.FIELDS if field.is_method}
     for rungs in RUNGS.values():
         for rung in rungs:
-            assert {about[name] for name in rung.fields(scene)} == {"answer"}
+            assert rung.fields(scene).keys() <= of_method
 
 
 def test_a_field_without_effect_is_empty_and_one_left_open_is_worked_out(
     scene: Scene,
 ) -> None:
     row = fields.asked(
-        changed(scene, {"flow.model": "flat", "protocol.method": "pivot"})
+        changed(scene, {"method.flow.model": "flat", "method.kind": "pivot"})
     )
     for column in ("turbulence_model", "cells_per_face", "stiffness", "waiting_time"):
         assert row[column] is None
     assert (row["h_m"], row["flow_model"]) == (0.02, "flat")
     assert fields.asked(scene)["first_cell_m"] is None
-    assert fields.answered(scene)["answered_first_cell_m"] == scene.first_cell_height
+    assert fields.method(scene)["first_cell_m"] == scene.first_cell_height
     assert fields.plain(((5e-4, 0.15), (1e-3, 0.85))) == "0.5 mm 15 %; 1 mm 85 %"
 
 
@@ -151,14 +154,13 @@ def test_a_row_has_the_scene_that_was_asked_and_the_one_that_answered_it() -> No
     asked = study.parse("tolerance = 0.2\n" + PILE, name="test", where="test")
     planned = plan.make(asked)
     (row,), (scene,) = rows.scenes(asked, planned), asked.scenes
-    answer = fields.answered(planned.decisions[scene.id].scene)
-    assert {
-        "scene_id": scene.id,
-        **fields.asked(scene),
-        **answer,
-    }.items() <= row.items()
-    assert (row["method"], row["answered_method"]) == ("auto", "pivot")
-    assert {*fields.COLUMNS, *fields.ANSWERS} <= set(COLUMNS)
+    assert {"scene_id": scene.id, **fields.question(scene)}.items() <= row.items()
+    (how,) = rows.methods(planned)
+    answer = fields.method(planned.decisions[scene.id].scene)
+    assert {"scene_id": scene.id, **answer}.items() <= how.items()
+    assert (how["asked"], how["method"], how["fidelity"]) == ("auto", "pivot", "quick")
+    assert not {*row} & {*how} - {"scene_id"}
+    assert {*row, *how} <= set(COLUMNS)
 
 
 def test_the_reference_of_study_files_is_written_from_the_registry() -> None:
@@ -174,4 +176,4 @@ def test_columns_are_distinct_and_explained() -> None:
     assert without == 1
     quantities = (*fields.FIELDS, *fields.DERIVED)
     assert len(fields.COLUMNS) == len(quantities) - without
-    assert {*fields.COLUMNS, *fields.ANSWERS} <= set(COLUMNS)
+    assert {*fields.COLUMNS} <= set(COLUMNS)

@@ -19,7 +19,7 @@ GOOD = "x_m,z_m\n0,0\n0.05,0.01\n\n0.1,0.02\n0.14,0\n\n"
 STUDY = """
 grain = { diameter = 1e-3 }
 bed = { kind = "pile", profile = "scan.csv" }
-flow = { model = "flat" }
+method.flow.model = "flat"
 """
 
 

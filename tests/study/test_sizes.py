@@ -93,10 +93,10 @@ def test_bad_mixtures_are_refused_in_one_line(text: str) -> None:
 
 
 def test_springs_that_throw_poured_grains_apart_are_refused_in_dem() -> None:
-    text = f"grain = {{ diameter = 1e-3, stiffness = 2e5 }}\n{BED % 'd/30'}\n"
+    text = f"grain = {{ diameter = 1e-3 }}\nmethod.grains.stiffness = 2e5\n{BED % 'd/30'}\n"
     with pytest.raises(InputError, match=r"such springs throw poured grains"):
         _parse(text)
-    _parse(f'{text}protocol = {{ method = "pivot" }}')
+    _parse(f'{text}method.kind = "pivot"')
 
 
 FILES = {

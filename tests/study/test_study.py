@@ -14,7 +14,8 @@ from orchestrator.fidelity import limits
 from orchestrator.grains.loads import Geometry
 from orchestrator.physics.laws import LAWS
 from orchestrator.runs.files import canonical_json
-from orchestrator.study import closed_form, parts, study
+from orchestrator.study import closed_form, fields, parts, study
+from orchestrator.study.keys import MOVED
 from orchestrator.study.parts import Forces, Grain, GrainBed
 from orchestrator.study.scene import Scene
 
@@ -81,7 +82,7 @@ def test_the_id_follows_the_content_alone() -> None:
     air = "fluid = { density = 1.225, viscosity = 1.4607e-5 }\n"
     assert named.scenes[1].id == _parse(air + GRAIN).scenes[0].id
     level = PILE.replace("15.0", "0.0")
-    asked = f"{level}shape = 'flat'\n[flow]\nmodel = 'flat'\n"
+    asked = f"{level}shape = 'flat'\n[method.flow]\nmodel = 'flat'\n"
     assert (
         _parse(level.replace("pile", "flat")).scenes[0].id == _parse(asked).scenes[0].id
     )
@@ -97,16 +98,16 @@ AXES = (
 )
 TURNING = [name for name, law in LAWS.items() if law.turns]
 TURNED = "forces.law = '%s'\n"
-D, BY_DEM = "grain.diameter = 1e-3\n", "protocol.method = 'dem'\n"
+D, BY_DEM = "grain.diameter = 1e-3\n", "method.kind = 'dem'\n"
 BED = "bed = { kind = 'pile', slope_deg = 15.0 }\n"
 POURED = "bed = { kind = 'pile', slope_deg = 15.0, packing = 'poured' }\n"
 GUSTS = "flow.gusts = { intensity = 0.4, events = 9 }\n"
 COHESION = "grain.cohesion = 1e-3\n"
 TURNS_NOT = [
     (BY_DEM + D, "forces.law"),
-    ("protocol.method = 'peeling'\n" + D + BED, "forces.law"),
+    ("method.kind = 'peeling'\n" + D + BED, "forces.law"),
     (D + POURED, "forces.law"),
-    (D + BED + "protocol.update = 0.1\n", "protocol.update"),
+    (D + BED + "threshold.update = 0.1\n", "threshold.update"),
 ]
 """Beginnings of files in which no law may turn the grain, and the field that is refused."""
 DEM_KNOWS_NOT = [
@@ -140,7 +141,16 @@ BAD = [
         for law in TURNING
         for text, where in TURNS_NOT
     ),
-    ("[protocol]\ngravity = 3.7\n", "protocol.gravity", "did you mean fluid.gravity?"),
+    (
+        "[threshold]\ngravity = 3.7\n",
+        "threshold.gravity",
+        "did you mean fluid.gravity?",
+    ),
+    (
+        "[protocol]\ngravity = 3.7\n",
+        "protocol",
+        "what counts as motion is in [threshold]",
+    ),
     (f"name = 'one'\n{GRAIN}", "name", "known keys"),
     ("gravity = 3.7\n", "gravity", "did you mean fluid.gravity?"),
     (
@@ -149,9 +159,13 @@ BAD = [
         "tolerance, above the first table",
     ),
     ("[grain]\nviscosity = 1e-6\n", "grain.viscosity", "did you mean fluid.viscosity?"),
-    (f"{PILE}[flow]\nnodes = true\n", "flow.nodes", "flow.roughness"),
+    (f"{PILE}[flow]\nnodes = true\n", "flow.nodes", "method.flow.roughness"),
     (f"{PILE}[flow]\nnodes = false\n", "flow.nodes", "leave it out"),
-    (f'{PILE}[axes]\n"flow.model" = ["hill"]\n', "flow.model", 'write "waves"'),
+    (
+        f'{PILE}[axes]\n"method.flow.model" = ["hill"]\n',
+        "method.flow.model",
+        'write "waves"',
+    ),
     (PILE + "height = 2e-3\n", "bed.height", "at least 0.005 m"),
     (
         PILE + FENCE % 0.1 + "[flow]\ntop = 'open water'\ndepth = 0.2\n",
@@ -160,7 +174,7 @@ BAD = [
     ),
     (
         PILE + FENCE % 1.0,
-        "flow.lid",
+        "method.flow.lid",
         "2 m is less than 3 heights of the forms or obstacles",
     ),
     (GRAIN + "[flow]\ngusts = { intensity = 0.4 }\n", "flow.gusts.events", "missing"),
@@ -169,10 +183,7 @@ BAD = [
         "flow.gusts.intensity",
         "1",
     ),
-    *(
-        (BY_DEM + text, where, 'protocol.method = "auto"')
-        for text, where in DEM_KNOWS_NOT
-    ),
+    *((BY_DEM + text, where, 'method.kind = "auto"') for text, where in DEM_KNOWS_NOT),
     (
         GRAIN + "[forces]\nsheltering = 'balanced'\n",
         "forces.sheltering",
@@ -207,9 +218,9 @@ def test_bad_files_are_refused_with_place_and_reason(
 @pytest.mark.parametrize(("text", "where"), DEM_KNOWS_NOT)
 def test_what_dem_does_not_know_needs_no_method(text: str, where: str) -> None:
     """The remedy of the refusal works, and so does a file that leaves the method open."""
-    for more in ("", "protocol.method = 'auto'\n"):
+    for more in ("", "method.kind = 'auto'\n"):
         (decision,) = plan.make(_parse(text + more)).decisions.values()
-        assert decision.scene.protocol.method in ("pivot", "peeling")
+        assert decision.scene.method.kind in ("pivot", "peeling")
 
 
 def test_a_law_that_turns_the_grain_is_answered_on_a_long_bed() -> None:
@@ -217,7 +228,7 @@ def test_a_law_that_turns_the_grain_is_answered_on_a_long_bed() -> None:
     text = "grain.diameter = 3e-4\nbed = { kind = 'dune', slope_deg = 5.0, height = 2.0 }\n"
     for law in TURNING:
         (decision,) = plan.make(_parse(text + TURNED % law)).decisions.values()
-        assert decision.scene.protocol.method == "local"
+        assert decision.scene.method.kind == "local"
 
 
 @pytest.mark.parametrize(
@@ -317,3 +328,36 @@ def test_presets_are_studies_and_are_read_without_what_solves_them() -> None:
     root = Path(__file__).parents[2]
     ended = subprocess.run(command, cwd=root, capture_output=True, check=True)
     assert ended.stdout.split() == []
+
+
+def test_a_key_that_moved_is_refused_with_the_new_one() -> None:
+    """At the top, in a group and on an axis, each of all keys."""
+    for old, new in MOVED.items():
+        table, _, key = old.partition(".")
+        for text, where in (
+            (f"{PILE}[{table}]\n", ""),
+            (f"{GRAIN}[[group]]\n[group.{table}]\n", "group 1: "),
+        ):
+            if f"[{table}]" in text.replace(f"[{table}]\n", "", 1):
+                text = f"[{table}]\n"
+            with pytest.raises(InputError, match=f"it is now {new}") as caught:
+                _parse(f"{text}{key} = 1\n")
+            assert caught.value.where == f"test.toml: {where}{old}"
+        with pytest.raises(InputError, match=f"it is now {new}") as caught:
+            _parse(f"{PILE}[axes]\n'{old}' = [1]\n")
+        assert caught.value.where == f"test.toml: axes.{old}"
+        # and the new one is one of a study file
+        moved_to, _, name = new.rpartition(".")
+        assert new == fields.FIDELITY or name in fields.PARTS[moved_to].model_fields
+
+
+def test_the_question_does_not_depend_on_the_method() -> None:
+    (one,) = _parse(PILE).scenes
+    (other,) = _parse(
+        f"{PILE}[method]\nkind = 'pivot'\nflow.cells_per_face = 20\n"
+    ).scenes
+    assert one.question == other.question
+    assert one.method != other.method
+    assert one.id != other.id
+    assert one.by("pivot").method.flow.cells_per_face == 40
+    assert _parse(PILE).name == "test"

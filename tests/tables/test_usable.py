@@ -46,7 +46,7 @@ SCENE = {
     },
     **{"rho_sol_kg_m3": 2500.0, "g_m_s2": 9.81, "z0_m": 3e-5},
 }
-STOPPED = {"answered_final_fraction": 0.8}
+STOPPED = {"final_fraction": 0.8}
 UNREACHED = {"reynolds": NAN, "shields": NAN, "share_carried_off": NAN}
 
 
@@ -63,7 +63,7 @@ UNREACHED = {"reynolds": NAN, "shields": NAN, "share_carried_off": NAN}
         (None, {"reynolds": 1.0}, []),  # a hydraulically smooth bed
         (None, {"count": 3}, ["0.3 of 3 grains is less than one"]),
         (None, {"row_hold": 2.3}, ["hold the first grain up to 2.3 times"]),
-        (None, {"row_hold": 2.3, "answered_method": "local"}, []),
+        (None, {"row_hold": 2.3, "method": "local"}, []),
         (
             None,
             {"share_carried_off": 0.76},
@@ -75,7 +75,7 @@ UNREACHED = {"reynolds": NAN, "shields": NAN, "share_carried_off": NAN}
         (
             None,
             {**UNREACHED, **STOPPED},
-            ["moved, since the run ends at protocol.final_fraction"],
+            ["moved, since the run ends at method.grains.final_fraction"],
         ),
         (
             None,
@@ -108,13 +108,14 @@ def test_reasons_against_a_sound_threshold_with_some_changes(
 
 PILE = 'bed = { kind = "pile", slope_deg = 15.0, height = 0.02, roughness = "d/3" }\n'
 WATER = "fluid = { density = 1000.0, viscosity = 1e-6 }\n"
-FLAT, CHANNEL = 'model = "flat"', 'model = "flat", top = "open water", depth = 0.1'
+FLAT = 'method.flow.model = "flat"'
+CHANNEL = f'{FLAT}\nflow = {{ top = "open water", depth = 0.1 }}'
 STEEP = 'roughness = "d/30", slope_deg = 20.0'
 
 
 def pile(viscosity: float, flow: str) -> str:
     fluid = f"fluid = {{ density = 1000.0, viscosity = {viscosity} }}\n"
-    return f"{PILE}flow = {{ {flow} }}\n{fluid}grain.diameter = 1e-3\n"
+    return f"{PILE}{flow}\n{fluid}grain.diameter = 1e-3\n"
 
 
 def grain(bed: str, forces: str = "") -> str:
@@ -138,7 +139,7 @@ def grain(bed: str, forces: str = "") -> str:
 def test_thresholds_beyond_the_model(
     tmp_path: Path, text: str, reason: str, applies: bool
 ) -> None:
-    text += 'grain.density = 2650.0\nprotocol.method = "pivot"\n'
+    text += 'grain.density = 2650.0\nmethod.kind = "pivot"\n'
     asked = study.parse(text, name="t", where="t")
     made = tables.make(asked, plan.make(asked), tmp_path, ())
     why_not = made["pile_threshold" if text.startswith(PILE) else "single_grain"][
@@ -209,6 +210,7 @@ def scattered(
             "horizontal",
         ],
         "seed": [0.0, 1.0, 2.0, NAN, NAN, NAN, 1.0],
+        "asked": "auto",
         **changes,
     }
     table = with_scatter(pd.DataFrame(columns).iloc[chosen], pd.DataFrame(scenes))
@@ -261,9 +263,10 @@ def test_the_scatter_of_poured_beds_is_of_beds_that_are_poured_alike() -> None:
         {
             "scene_id": names,
             "packing": [*["poured"] * 5, "aligned", "horizontal"],
-            "answered_width": [6.0, 6.0, 0.0, 0.0, 0.0, None, None],
+            "width": [6.0, 6.0, 0.0, 0.0, 0.0, None, None],
             "sizes": [*["log-normal, sigma_g 1.3"] * 4, "10 mm 100 %", None, None],
             "seed": [0.0, 1.0, 0.0, 1.0, 0.0, NAN, NAN],
+            "asked": "auto",
         }
     )
     scatter = with_scatter(thresholds, scenes)["scatter"]
