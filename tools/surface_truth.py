@@ -129,7 +129,7 @@ class RidgeFlow(SurfaceFlowCase):
 
 def ridge(cases: Path) -> Iterator[Row]:
     """A ridge in three dimensions against its section, by the mean of its windward face."""
-    for slope in (15.0, 25.0):
+    for slope in (15.0,):
         z0, first = RIDGE / 600, RIDGE / 40
         level = Level("ridge", 40, 1, 1.1, 1.2, 10**6)
         surface = cone(RIDGE, slope)
@@ -237,7 +237,6 @@ def interval(cases: Path) -> Iterator[Row]:
         "first cell h/20": pile_flow(surface, first_cell=PILE / 20),
         "first cell h/80": pile_flow(surface, first_cell=PILE / 80),
         "RNGkEpsilon": pile_flow(surface, model="RNGkEpsilon"),
-        "kOmegaSST": pile_flow(surface, model="kOmegaSST"),
     }
     for name, one in others.items():
         found = measures(stress_of(one, cases), PILE)
@@ -264,25 +263,25 @@ def reference_speed(one: SurfaceFlowCase, directory: Path) -> float:
 
 def piles(cases: Path) -> Iterator[Row]:
     """Areas of AP-42's classes on the shapes that the tunnel had."""
-    shapes = {"cone": (cone(PILE, PILE_SLOPE), 0.0)}
+    round_one = cone(PILE, PILE_SLOPE)
+    long_one = oval(PILE, OVAL_SLOPE, OVAL_LENGTH, OVAL_WIDTH)
+    flows = [("cone", pile_flow(round_one))]
+    flows.append(("cone", pile_flow(round_one, roughness=3 * ROUGHNESS)))
     for angle in (0.0, 20.0, 40.0):
-        shape = oval(PILE, OVAL_SLOPE, OVAL_LENGTH, OVAL_WIDTH)
-        shapes[f"oval, {angle:g} deg"] = (shape, angle)
-    for name, (surface, angle) in shapes.items():
-        for roughness in (ROUGHNESS, 3 * ROUGHNESS):
-            one = pile_flow(surface, 270.0 - angle, roughness)
-            directory = solve(one, cases)
-            ratio = speed_over_bed(one, directory, ABOVE_PILE)
-            ratio /= reference_speed(one, directory)
-            stress, _ = one.stress(directory)
-            form = on_form(stress, PILE)
-            area = stress.area_m2[form]
-            counts, _ = np.histogram(ratio[form], BANDS, weights=area)
-            for band, count in enumerate(counts):
-                quantity = f"us/ur from {BANDS[band]:g}, % of the area"
-                share = 100 * float(count / area.sum())
-                label = f"{name}, z0 {1e3 * roughness:g} mm"
-                yield row("piles", label, quantity, share, AREAS[name][band])
+        flows.append((f"oval, {angle:g} deg", pile_flow(long_one, 270.0 - angle)))
+    for name, one in flows:
+        directory = solve(one, cases)
+        ratio = speed_over_bed(one, directory, ABOVE_PILE)
+        ratio /= reference_speed(one, directory)
+        stress, _ = one.stress(directory)
+        form = on_form(stress, PILE)
+        area = stress.area_m2[form]
+        counts, _ = np.histogram(ratio[form], BANDS, weights=area)
+        for band, count in enumerate(counts):
+            quantity = f"us/ur from {BANDS[band]:g}, % of the area"
+            share = 100 * float(count / area.sum())
+            label = f"{name}, z0 {1e3 * one.roughness_m:g} mm"
+            yield row("piles", label, quantity, share, AREAS[name][band])
 
 
 def askervein_hill() -> Surface:

@@ -279,7 +279,7 @@ class SurfaceFlowCase(Case):
         try:
             iterations = openfoam.check_log(directory)
         except Stalled as error:
-            remedy = "smooth the surface (bed.smoothing), or take the coarse level"
+            remedy = "raise bed.smoothing_cells, which smooths the surface"
             what = f"{error.what}: the flow cycles"
             raise Stalled(what, error.where, remedy) from None
         stress, ustar0 = self.stress(directory)

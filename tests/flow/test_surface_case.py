@@ -196,7 +196,7 @@ def test_a_flow_that_cycles_is_said_with_the_remedy(
     log.write_text(re.sub(r"SIMPLE solution converged.*\n", "", log.read_text()))
     with pytest.raises(Stalled, match="the flow cycles") as raised:
         one.collect(copy)
-    assert "smooth the surface" in raised.value.remedy
+    assert "bed.smoothing_cells" in raised.value.remedy
 
 
 def test_a_table_of_another_mesh_is_refused(shared: Shared, tmp_path: Path) -> None:
