@@ -23,7 +23,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from orchestrator.bed.line import BedLine, triangle
 from orchestrator.bed.surface import SPREAD_OF_RASTER, Surface, cone, oval, surface_of
 from orchestrator.errors import Stalled
 from orchestrator.flow import mesh3
@@ -42,8 +41,8 @@ HERE = Path(__file__).resolve().parents[1] / "docs/measured"
 LIMIT_S = 7200.0
 AIR = 1.5e-5
 """Kinematic viscosity, m2/s."""
-RIDGE = 10.0
-"""Height of the ridge, m; its z0 is h/600, a coarse sand's on a dune of 2 m."""
+RIDGE, RIDGE_DEG_UP = 10.0, 15.0
+"""Height of the ridge, m, and slope of its two sides; its z0 is h/600."""
 PILE, BASE = 11.4, 14.6
 """Height and radius of the cone, m."""
 PILE_SLOPE = float(np.degrees(np.arctan(PILE / BASE)))
@@ -102,23 +101,29 @@ def stress_of(one: SurfaceFlowCase, cases: Path) -> SurfaceStress:
 class RidgeFlow(SurfaceFlowCase):
     """The flow over a ridge that goes on beyond the sides of the mesh."""
 
-    slope_deg: float = 15.0
+    section: FlowCase | None = None
+    has_its_lines: bool = True
+    """Whether its grid lines along the wind are those of the section, or even."""
 
-    @cached_property
-    def line(self) -> BedLine:
-        """The section of the ridge."""
-        return triangle(self.slope_deg, self.height_m)
+    @property
+    def parameters(self) -> dict[str, object]:
+        """All that the flow depends on."""
+        return {**super().parameters, "lines": self.has_its_lines}
 
     @cached_property
     def mesh(self) -> Columns:
         """A few columns of cells across the wind."""
+        assert self.section is not None
         h = self.height_m
-        foot, end = self.line.x[1], self.line.x[-2]
+        line = self.section.bed_line
+        foot, end = line.x[1], line.x[-2]
         cell = (end - foot) / 2 / self.level.per_radius
         x, _ = mesh3.grid_lines(Sizes(foot, end, -h, h), h, cell, self.level)
+        if self.has_its_lines:
+            x = lines_of(self.section)
         count = mesh3.rows(h, self.first_cell, self.level)
         return Columns.over(
-            lambda x, y: self.line.height(x),
+            lambda x, y: line.height(x),
             x,
             np.linspace(-h, h, 7),
             height=h,
@@ -127,42 +132,61 @@ class RidgeFlow(SurfaceFlowCase):
         )
 
 
+def lines_of(section: FlowCase) -> FloatArray:
+    """Grid lines along a section, m."""
+    grid = section.grid
+    lines = [np.array(grid.line.x[:1])]
+    ends = zip(grid.line.x[:-1], grid.line.x[1:], strict=True)
+    for (start, end), count, ratio in zip(ends, grid.cells, grid.ratio, strict=True):
+        lengths = np.cumsum(ratio ** np.arange(count))
+        lines.append(start + (end - start) * lengths / lengths[-1])
+    return np.concatenate(lines)
+
+
 def ridge(cases: Path) -> Iterator[Row]:
-    """A ridge in three dimensions against its section, by the mean of its windward face."""
-    for slope in (15.0,):
-        z0, first = RIDGE / 600, RIDGE / 40
-        level = Level("ridge", 40, 1, 1.1, 1.2, 10**6)
-        surface = cone(RIDGE, slope)
+    """A ridge in three dimensions against its section, by the means of its two sides."""
+    first = RIDGE / 40
+    settings = Flow(
+        roughness=RIDGE / 600,
+        viscosity=1e-5,
+        first_cell_height=first,
+        cells_per_face=40,
+        lid=mesh3.LID,
+        upstream=mesh3.UPSTREAM,
+        downstream=mesh3.DOWNSTREAM,
+    )
+    section = FlowCase(RIDGE, RIDGE_DEG_UP, settings)
+    plane = WallStress.from_csv(solve(section, cases) / WALL_STRESS)
+    face = RIDGE / np.tan(np.radians(RIDGE_DEG_UP))
+    level = Level("ridge", 40, 1, 1.1, 1.2, 10**6)
+    surface = cone(RIDGE, RIDGE_DEG_UP)
+    for name in ("grid lines of the section", "even cells"):
         wide = RidgeFlow(
-            surface, 270.0, 10.0, z0, 1e-5, level, slope_deg=slope, first_cell_m=first
+            surface,
+            270.0,
+            10.0,
+            RIDGE / 600,
+            1e-5,
+            level,
+            first_cell_m=first,
+            section=section,
+            has_its_lines=name != "even cells",
         )
         try:
             directory = solve(wide, cases)
         except Stalled:
-            # the velocity across is nothing but round-off, whose residual never falls
+            # the velocity across is nothing but round-off, whose residual need not fall
             directory = cases / wide.name
         stress, _ = wide.stress(directory)
-        settings = Flow(
-            roughness=z0,
-            viscosity=1e-5,
-            first_cell_height=first,
-            cells_per_face=40,
-            lid=mesh3.LID,
-            upstream=mesh3.UPSTREAM,
-            downstream=mesh3.DOWNSTREAM,
-        )
-        section = FlowCase(RIDGE, slope, settings)
-        plane = WallStress.from_csv(solve(section, cases) / WALL_STRESS)
-        face = RIDGE / np.tan(np.radians(slope))
-        for name, ends in (("windward", (0.0, face)), ("lee", (face, 2 * face))):
+        for side, ends in (("windward", (0.0, face)), ("lee", (face, 2 * face))):
             of_wide = (stress.along_m > ends[0]) & (stress.along_m < ends[1])
             of_plane = (plane.x_m > ends[0]) & (plane.x_m < ends[1])
             ours = signed_ustar(stress.tau_along)[of_wide]
             theirs = plane.ustar_over_ustar0_wall[of_plane]
             value = float(np.average(ours, weights=stress.area_m2[of_wide]))
             beside = float(np.average(theirs, weights=plane.length_m[of_plane]))
-            quantity = f"mean u*/u*_0, {name} side"
-            yield row("ridge", f"{slope:g} deg", quantity, value, beside)
+            quantity = f"mean u*/u*_0, {side} side"
+            yield row("ridge", name, quantity, value, beside)
 
 
 def signed_ustar(tau: FloatArray) -> FloatArray:
