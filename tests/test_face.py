@@ -84,7 +84,8 @@ def test_a_study_from_its_file_to_a_figure(tmp_path: Path) -> None:
         "shields_closed_form",
     ]
     assert all(
-        "One grain of 0.7 mm" in said for said in (opened.answer, opened._repr_html_())
+        "Grains of 0.7 mm to 1 mm" in said
+        for said in (opened.answer, opened._repr_html_())
     )
     assert repr(opened).splitlines()[1:2] == ["2 scenes; 2 of 2 thresholds are usable"]
     (name,) = set(rows["case"])

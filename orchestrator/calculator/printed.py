@@ -4,6 +4,7 @@ import csv
 import json
 import math
 import sys
+import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,15 @@ from orchestrator.physics.fluids import PAPER
 if TYPE_CHECKING:  # this loads numpy
     from orchestrator.types import Row
 
+SHOWN = (
+    "wind_10m_m_s",
+    "mean_velocity_m_s",
+    "ustar_m_s",
+    "stress_pa",
+    "shields",
+    "reynolds",
+)
+"""Columns of the table of laws, where some row has them."""
 TOO_MANY = ("drag_n", "lift_n")
 """Quantities that a table for people leaves out."""
 
@@ -104,7 +114,7 @@ def as_text(
     if varied:
         yield from _of_many(rows, asked, varied)
     else:
-        yield from _of_one(rows, asked)
+        yield from _of_one(rows)
     fluids = {(row["rho_f_kg_m3"], row["nu_m2_s"]) for row in rows}
     if fluid or fluids == {PAPER}:
         ((density, viscosity),) = fluids
@@ -115,41 +125,43 @@ def as_text(
         yield "for the mean velocity of the liquid give its depth, --depth in m"
 
 
-def _of_one(rows: Sequence["Row"], asked: str) -> Iterator[str]:
-    """The answer for one point, what was measured beside it, and a table of laws."""
-    from orchestrator.physics.beside import sentences
+def _of_one(rows: Sequence["Row"]) -> Iterator[str]:
+    """The answer card of one point, a table of laws, and the terms of its heads."""
+    from orchestrator.calculator.answer import card, nearest
     from orchestrator.physics.threshold import LAWS_OF
+    from orchestrator.report.card import lines
+    from orchestrator.report.subjects import TERMS
 
-    quantities = _quantities(rows)
     chosen = [row for row in rows if row["answer"]]
-    grain = f"a grain of {rows[0]['d_m'] * 1000:.4g} mm"
-    goes_on = "decides" in chosen[0]
-    starts = "starts to move"
-    if goes_on:
-        starts = "leaves its pocket and goes on"
-    yield f"{_subject(rows, asked)} {grain} {starts} at"
-    width = max(map(len, quantities.values()))
-    listed = quantities
-    if len(chosen) > 1:
-        listed = {"law": "", **quantities}
-    for column, label in listed.items():
-        cells = [label.ljust(width)]
-        for row in chosen:
-            cells.append(f"{_cell(row[column]):10}")
-        yield f"  {'  '.join(cells)}".rstrip()
-    if goes_on:
+    yield from lines(card(rows))
+    if "decides" in chosen[0]:
+        yield ""
         yield from _criteria(chosen)
     yield ""
-    for row in chosen:
-        of_law = f"{row['law']}: " if len(chosen) > 1 else ""
-        for sentence in sentences(row):
-            yield of_law + sentence
+    quantities = _quantities(rows)
+    heads = {"law": "force law"}
+    for column in SHOWN:
+        if column in quantities:
+            heads[column] = quantities[column]
+    ordered = sorted(rows, key=_place)
+    near = nearest(rows)
+    for row, line in zip([None, *ordered], _as_table(ordered, heads), strict=True):
+        marks = []
+        if row is not None and row["answer"]:
+            marks.append("the answer")
+        if row is not None and row["law"] == near:
+            marks.append("nearest to measured")
+        yield f"{line}  <- {', '.join(marks)}" if marks else line
     yield ""
-    quantities.pop("wind_1m_m_s", None)
-    ordered = sorted(rows, key=lambda row: not row["answer"])
-    yield from _as_table(ordered, {"law": "force law", **quantities})
+    for term in TERMS.values():
+        yield from textwrap.wrap(f"{term[:1].upper()}{term[1:]}.", 79)
     laws = " and ".join(LAWS_OF[rows[0]["regime"]])
-    yield f"\nlaws of the paper's rule: {laws}"
+    yield f"laws of the paper's rule: {laws}"
+
+
+def _place(row: "Row") -> tuple[bool, bool, float]:
+    """Place of a law in the table: the answer, those that hold, the strongest."""
+    return not row["answer"], not row["valid"], -row["ustar_m_s"]
 
 
 def _criteria(chosen: Sequence["Row"]) -> Iterator[str]:
@@ -172,19 +184,6 @@ def _criteria(chosen: Sequence["Row"]) -> Iterator[str]:
         )
         highest = _cell(row["shields_goes_on_high"])
         yield f"{of_law}with the weakest rebounds of sand it is {highest}"
-
-
-def _subject(rows: Sequence["Row"], asked: str) -> str:
-    """The law that answers one point, and whether it holds: how its sentence begins."""
-    if asked == "paper":  # which gives both of its laws where neither holds
-        return "The paper's rule:"
-    chosen = next(row for row in rows if row["answer"])
-    if chosen["valid"]:
-        return f"Force law {chosen['law']}:"
-    holding = ", ".join(f"--law {row['law']}" for row in rows if row["valid"])
-    reason = f"Force law {chosen['law']} does not hold here: {chosen['why_not']}"
-    choice = f" (choose {holding})" if holding else ""
-    return f"{reason}{choice}. By it"
 
 
 def _of_many(rows: Sequence["Row"], asked: str, varied: Sequence[str]) -> Iterator[str]:

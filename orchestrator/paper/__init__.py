@@ -40,4 +40,4 @@ def cards(study: "Study", tables: "Tables") -> "list[Guest]":
     judged = claims.judge(tables)
     if all(one.verdict == "no data" for one in judged):
         return []
-    return [claims.card(judged, bool(study.tolerance), CLAIMS)]
+    return [claims.guest(judged, tables, CLAIMS)]

@@ -13,16 +13,21 @@ from markupsafe import Markup
 from orchestrator.paper import measures
 from orchestrator.paper.evidence import RULE, Comparison, Evidence, Verdict, combined
 from orchestrator.report import page
+from orchestrator.report.card import Card, Mark, Number, Worth
 from orchestrator.report.page import Guest
+from orchestrator.report.sheets import Sheet
 from orchestrator.tables import Tables
 
 FILE = Path(__file__).with_name("claims.toml")
 WORDS: dict[Verdict, str] = {
     "reproduced": "reproduced",
-    "partly": "partly",
+    "partly": "in part",
     "not": "not reproduced",
+    "no data": "not judged",
 }
 """Verdicts, and what the page calls them."""
+MARKS: dict[Verdict, Mark] = {"reproduced": "good", "partly": "care", "not": "bad"}
+"""Verdicts, and their marks; one that was not judged has none."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +58,13 @@ class Judged:
     def verdict(self) -> Verdict:
         """By the comparisons that count."""
         return combined(one.verdict for one in self.comparisons if one.is_decisive)
+
+    @property
+    def held(self) -> tuple[int, int]:
+        """In how many of the comparisons that count the claim is true, and of how many."""
+        decisive = [one for one in self.comparisons if one.is_decisive]
+        true = sum(int(one.true.sum()) for one in decisive)
+        return true, sum(len(one.numbers) for one in decisive)
 
     @property
     def why(self) -> str:
@@ -87,53 +99,132 @@ def judge(tables: Tables) -> list[Judged]:
     return [Judged(claim, tuple(claim.measure(evidence))) for claim in CLAIMS]
 
 
-def card(judged: Sequence[Judged], has_tolerance: bool, file: str) -> Guest:
-    """Make the report card.
+def guest(judged: Sequence[Judged], tables: Tables, file: str) -> Guest:
+    """Make what the page of a study of the paper has beside that of any study.
 
     Parameters
     ----------
     judged
         The claims.
-    has_tolerance
-        Whether the study was answered within a tolerance.
+    tables
+        The tables of the study.
     file
         Name of the CSV file of the claims.
 
     Returns
     -------
     Guest
-        How many claims hold, a section of the page, and the file.
+        A card on how many claims hold, a section with each, and the file.
     """
-    counts = Counter(one.verdict for one in judged)
-    told = ", ".join(f"{counts[verdict]} {word}" for verdict, word in WORDS.items())
-    said = f"{len(judged)} claims of the paper: {told}."
-    lacking = counts["no data"]
-    if lacking:
-        why = "the study has no scenes for them"
-        if has_tolerance:
-            why = "a tolerance leaves scenes without DEM; without one all are judged"
-        said += f" {lacking} could not be judged: {why}."
 
     def section(figures: Sequence[str]) -> Markup:
-        """The section of the page, with the numbers of the figures that show claims."""
+        """The section of the page, with the titles of the figures that show claims."""
         entries = []
         for one in judged:
-            numbers = []
-            for number, name in enumerate(figures, 1):
-                if name.startswith(one.claim.figures):
-                    numbers.append(number)
-            entries.append((one, numbers))
+            shown = [name for name in figures if name.startswith(one.claim.figures)]
+            entries.append((one, shown))
         text = page.fill(
             "card.html.j2",
             FILE.parent,
             entries=entries,
-            said=said,
             rule=RULE,
             words=WORDS,
+            marks=MARKS,
+            file=file,
+            links={},
         )
         return Markup(text)
 
-    return Guest("claims", said, section, {file: frame(judged).to_csv(index=False)})
+    files = {file: frame(judged).to_csv(index=False)}
+    return Guest("claims", section, files, card(judged, tables), sheet(judged, file))
+
+
+def card(judged: Sequence[Judged], tables: Tables) -> Card:
+    """Make the answer card: how many claims hold.
+
+    Parameters
+    ----------
+    judged
+        The claims.
+    tables
+        The tables of the study.
+
+    Returns
+    -------
+    Card
+        The counts of the verdicts, and how many thresholds are usable.
+    """
+    counts = Counter(one.verdict for one in judged)
+    of = len(judged)
+    refuted = [n for n, one in enumerate(judged, 1) if one.verdict == "not"]
+    numbers = [str(number) for number in refuted]
+    which = f"claim {', '.join(numbers)}" if numbers else "no claim is refuted"
+    lacking = counts["no data"]
+    if lacking:
+        which += f"; {lacking} could not be judged: the study has no scenes for them"
+    told: tuple[tuple[Verdict, str, str], ...] = (
+        ("reproduced", "claims reproduced", "in at least 95 % of the comparisons"),
+        ("partly", "claims that hold in part", "the reason stands under each claim"),
+        ("not", "claims not reproduced", which),
+    )
+    figures = []
+    for verdict, meaning, note in told:
+        mark = MARKS[verdict]
+        count = counts[verdict]
+        figures.append(Number(count, f"of {of}", meaning, note, decimals=0, mark=mark))
+    return Card(
+        "Do the paper’s claims hold when its method is run anew?",
+        f"Bravo, Ortiz and Pérez-Aparicio on sediment transport by the discrete element "
+        f"method: {of} claims, {_tested(tables)}.",
+        tuple(figures),
+        "The claims are compared with this study’s own numbers; claim 4 is about the "
+        "published curves for water. “What qualifies this answer” has what was measured "
+        "in air.",
+        _worth(tables, lacking),
+    )
+
+
+def _tested(tables: Tables) -> str:
+    """On how many piles and grains the claims were tested."""
+    piles = tables.get("pile_threshold", pd.DataFrame({"scene_id": []}))
+    grains = tables.get("single_grain", pd.DataFrame({"scene_id": []}))
+    beds = piles["scene_id"].nunique()
+    return f"tested on {beds} piles and {len(grains)} single grains"
+
+
+def _worth(tables: Tables, lacking: int) -> Worth:
+    """What the thresholds are worth that the claims were judged on."""
+    parts = [tables[name] for name in ("pile_threshold",) if name in tables]
+    of = sum(len(part) for part in parts)
+    usable = sum(int(part["usable"].sum()) for part in parts)
+    if usable == of and not lacking:
+        return Worth("good", "usable", "All thresholds of piles are usable.")
+    advice = f"{usable} of {of} thresholds of piles; the others are marked, with the "
+    return Worth("care", "usable, with gaps", f"{advice}reason.")
+
+
+def sheet(judged: Sequence[Judged], file: str) -> Sheet:
+    """List the claims for a terminal.
+
+    Parameters
+    ----------
+    judged
+        The claims.
+    file
+        Name of the CSV file of the claims.
+
+    Returns
+    -------
+    Sheet
+        A row for each.
+    """
+    rows = []
+    for number, one in enumerate(judged, 1):
+        true, of = one.held
+        held = f"{true} of {of}" if of else "—"
+        rows.append((str(number), one.claim.says, held, WORDS[one.verdict]))
+    columns = ["no", "claim of the paper", "holds in", "verdict"]
+    return Sheet("The claims", pd.DataFrame(rows, columns=columns), file=file)
 
 
 def frame(judged: Sequence[Judged]) -> pd.DataFrame:

@@ -179,6 +179,23 @@ class Evidence:
         return table[table["method"] == "dem"]
 
     @cached_property
+    def _exact(self) -> pd.DataFrame:
+        """Single grains by the closed form, in the columns of DEM.
+
+        They stand in where a tolerance leaves no grain to DEM.
+        """
+        table = self._tables.get("single_grain", pd.DataFrame())
+        if table.empty:
+            return self.joined("single_grain")
+        columns = self.scenes.columns.difference(table.columns, sort=False)
+        scenes = self.scenes[["scene_id", *columns]]
+        table = table.merge(scenes, on="scene_id", validate="many_to_one")
+        return table.assign(
+            shields_dem=table["shields_closed_form"],
+            reynolds=table["reynolds_closed_form"],
+        )
+
+    @cached_property
     def grains(self) -> pd.DataFrame:
         """Single grains by DEM whose force law holds, under held flows and ramps."""
         table = self.joined("single_grain")
@@ -190,9 +207,18 @@ class Evidence:
         return commonest(self.grains)
 
     @cached_property
+    def exact(self) -> pd.DataFrame:
+        """Those held ones; where DEM was run of none, the same by the closed form."""
+        if len(self.held):
+            return self.held
+        table = self._exact
+        return commonest(table[table["force_law"] == table["regime"]])
+
+    @cached_property
     def bridged(self) -> pd.DataFrame:
         """The same by the bridged law, in all regimes and in the transition."""
         table = self.joined("single_grain")
+        table = table if len(table) else self._exact
         return commonest(table[table["force_law"] == BRIDGED])
 
     def piles(

@@ -83,7 +83,7 @@ def along(
 ) -> Comparisons:
     """Whether thresholds of single grains or of piles rise, or fall, along a column."""
     is_held = table == "held"
-    rows = evidence.held if is_held else evidence.piles("pile_threshold")
+    rows = evidence.exact if is_held else evidence.piles("pile_threshold")
     neighbours = pairs(rows, along, "shields_dem" if is_held else "shields")
     ratio = neighbours["ratio"] if rises else 1 / neighbours["ratio"]
     yield from by_regime(neighbours.assign(ratio=ratio), "ratio", name, 1.0)
@@ -91,7 +91,7 @@ def along(
 
 def constant(evidence: Evidence) -> Comparisons:
     """Thresholds of single grains at small Re*, where lift over drag grows with Re*."""
-    grains = evidence.held.dropna(subset=["shields_dem"])
+    grains = evidence.exact.dropna(subset=["shields_dem"])
     flat = grains[(grains["force_law"] == "low") & (grains["alpha_deg"] == 0)]
     law = LAWS["low"]
     lifts = []
@@ -112,7 +112,9 @@ def constant(evidence: Evidence) -> Comparisons:
     yield Comparison("the same beside a tenth of that range", reach, SMALL_RE)
     name = "closed form: change of τ from Re* → 0 to 3"
     yield Comparison(name, 1 / (1 + lift * end) - 1, form="+.0%")
-    yield Comparison("DEM: change of τ over the Re* of the study", changes, form="+.0%")
+    by = "DEM" if len(evidence.held) else "closed form"
+    name = f"{by}: change of τ over the Re* of the study"
+    yield Comparison(name, changes, form="+.0%")
 
 
 def numerical(evidence: Evidence) -> Comparisons:
@@ -136,7 +138,9 @@ def numerical(evidence: Evidence) -> Comparisons:
 
 def best_fit(evidence: Evidence) -> Comparisons:
     """Single grains on a flat bed against the curves for water, and for air."""
-    grains = pd.concat([evidence.held, evidence.bridged]).dropna(subset=["shields_dem"])
+    grains = pd.concat([evidence.exact, evidence.bridged]).dropna(
+        subset=["shields_dem"]
+    )
     flat = grains[grains["alpha_deg"] == 0]
     water = [curve.points(2000) for curve in curves.WATER]
     for law in (*REGIMES, BRIDGED):

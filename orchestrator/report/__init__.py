@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from orchestrator.runs import terminal
 
@@ -52,14 +52,39 @@ def write(
         for name, text in guest.files.items():
             folder.put(name, text)
     names = [figure.name for figure in figures]
-    parts = words.contents(results, failures)
+    parts = words.contents(results, failures, guests)
     parts["faults"] = faults
     parts["figures"] = figures
     parts["guests"] = guests
+    parts |= _heads(results, guests, faults)
     parts["sections"] = [guest.section(names) for guest in guests]
     terminal.check()
     folder.put(PAGE, page.fill("page.html.j2", **parts))
     return faults
+
+
+def _heads(
+    results: "Results", guests: Sequence["Guest"], faults: list[str]
+) -> "dict[str, Any]":
+    """The picture below the card, and what stands under a picture of grains."""
+    from orchestrator.report import head, style
+
+    shown: dict[str, Any] = {"head": None, "under": None}
+    if guests:
+        return shown
+    for name, choose in {"head": head.of, "under": head.below}.items():
+        try:
+            with style.settings():
+                chosen = choose(results)
+                if chosen is not None:
+                    shown[name] = (chosen, head.written(chosen))
+        except Exception as error:
+            fault = f"{head.__name__}: {type(error).__name__}: {error}"
+            faults.append(fault)
+            print(f"a figure could not be drawn: {fault}", file=sys.stderr)
+        if shown["head"]:
+            break
+    return shown
 
 
 def _drawn(
@@ -132,7 +157,7 @@ def said(results: "Results", guests: Sequence["Guest"] = ()) -> str:
     results
         The study with its tables.
     guests
-        Others that say a sentence before.
+        Others, of which one may have a card.
 
     Returns
     -------

@@ -17,7 +17,7 @@ from orchestrator.bed.line import BedLine
 from orchestrator.grains import motion
 from orchestrator.grains import pile as piles
 from orchestrator.grains.pile import Pile
-from orchestrator.report import flows, labels
+from orchestrator.report import flows, labels, single
 from orchestrator.report.page import caption, fill
 from orchestrator.report.results import FRACTION, Results, split
 from orchestrator.report.style import Figure
@@ -145,14 +145,18 @@ def draw(results: Results) -> Iterator[Figure]:
         share = steps.totals[shown] / pile.packing.count
         told = ", ".join(labels.told(row, ["alpha_deg", "d_m", *telling]))
         image = _svg(steps, shown, results.cases).encode()
+        told_by = single.quantity(row)
+        flows = [single.in_unit(row, flow, told_by) for flow in steps.flow.tolist()]
         yield Figure(
             name=f"bed-alpha{pile.bed.slope_deg:g}",
-            title=f"The bed when {share:.0%} of its grains have moved, {told}",
+            title=f"The bed when {share:.0%} of its grains have moved, {told}".replace(
+                "%", " %"
+            ),
             caption=words(results, pile),
             cases=tuple(run.name for run in reversed(pile.runs)),
             drawing=None,
             image=image,
-            data=data(steps, shown),
+            data=data(steps, shown, np.array(flows), told_by.unit),
             fold=number > 0,
             leads=number == 0,
         )
@@ -181,8 +185,11 @@ def words(results: Results, pile: Pile) -> str:
     )
 
 
-def data(steps: Steps, shown: int) -> dict[str, Any]:
-    """Data for the slider: at each stop number, x and -z of the grains that have moved since."""
+def data(steps: Steps, shown: int, told: FloatArray, unit: str) -> dict[str, Any]:
+    """Data for the slider: at each stop number, x and -z of the grains that have moved since.
+
+    `told` (K + 1,) are the flows of the stops in a unit that can be measured.
+    """
     mobile = steps.pile.packing.mobile[steps.grains]
     last = steps.places[0, mobile].copy()
     frames = []
@@ -200,11 +207,17 @@ def data(steps: Steps, shown: int) -> dict[str, Any]:
                 frame += [grain, round(x, 2), round(-z, 2)]
         frames.append(frame)
         last[is_new] = now[is_new]
+    flow = [float(f"{value:.3g}") for value in told.tolist()]
+    moved = int(steps.totals[shown])
+    count = steps.pile.packing.count
     found = {
         "step": "load step" if steps.pile.by_dem else "flow",
         "shown": shown,
-        "count": steps.pile.packing.count,
-        "flow": [float(f"{flow:.4g}") for flow in steps.flow],
+        "said": f"at {flow[shown]:g} {unit} {moved} of {count} grains have moved "
+        f"({moved / count:.0%})".replace("%", " %"),
+        "count": count,
+        "flow": flow,
+        "unit": unit,
         "moved": steps.totals.tolist(),
         "level": steps.level[mobile].tolist(),
         "start": np.round(steps.places[0, mobile] * [1, -1], 2).tolist(),

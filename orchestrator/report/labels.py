@@ -16,7 +16,7 @@ TAU_AXIS = r"threshold Shields number $τ_c$"
 WIDTH = 52
 """Letters of a line over a panel."""
 OTHERS = {
-    "fraction": Info("n/N", "n/N", "%"),
+    "fraction": Info("part that has moved", "n/N", "%"),
     "by": Info("by"),
     "asked": Info("method asked for"),
 }

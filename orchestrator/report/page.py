@@ -19,6 +19,8 @@ from orchestrator import __version__
 from orchestrator.runs.files import Folder
 
 if TYPE_CHECKING:
+    from orchestrator.report.card import Card
+    from orchestrator.report.sheets import Sheet
     from orchestrator.report.style import Figure
 
 HERE = Path(__file__).parent
@@ -150,14 +152,36 @@ def address(image: bytes) -> str:
 
 
 def _inline(figure: "Figure") -> Markup:
-    """The SVG of a figure for a page: without prolog and metadata, with a title."""
+    """The SVG of a figure for a page: without prolog and metadata, with titles.
+
+    A point whose group has texts in the figure's data has them as its title, which a
+    browser shows beside a pointer.
+    """
     text = figure.image.decode("utf-8")
     svg = text[text.index("<svg") :]
     svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
     if 'role="img"' not in svg[:400]:
         label = f'<svg role="img" aria-label="{escape(figure.title)}"'
         svg = svg.replace("<svg", label, 1)
+    if "frames" not in (figure.data or {"frames": ()}):
+        for group, points in figure.data.items():
+            svg = _with_titles(svg, group, points)
     return Markup(svg)
+
+
+def _with_titles(svg: str, group: str, points: Sequence[Sequence[str]]) -> str:
+    """An SVG whose points of a group have titles, in their order."""
+    start = svg.index(f'id="{group}"')
+    before, after = svg[:start], svg[start:]
+    said = iter(points)
+
+    def titled(found: re.Match[str]) -> str:
+        scene, threshold, why, case = next(said)
+        worth = f"not usable: {why}" if why else "usable"
+        lines = "\n".join(filter(None, (scene, threshold, worth, case)))
+        return f"<use {found[1]}><title>{escape(lines)}</title></use>"
+
+    return before + re.sub(r"<use ([^>]*)/>", titled, after, count=len(points))
 
 
 def _cell(value: Any) -> str:
@@ -177,18 +201,21 @@ class Guest:
     ----------
     name
         The anchor of its section.
-    said
-        A sentence at the head of the page.
     section
         Makes the section from the names of the page's figures in their order.
     files
         Texts of files beside the page, by name.
+    card
+        The answer card, in place of the study's own.
+    sheet
+        The table below it.
     """
 
     name: str
-    said: str
     section: Callable[[Sequence[str]], Markup]
     files: Mapping[str, str]
+    card: "Card | None" = None
+    sheet: "Sheet | None" = None
 
 
 @dataclass(frozen=True)
@@ -242,6 +269,7 @@ def write(
     folder: Folder,
     name: str,
     solvers: Mapping[str, str],
+    card: "Card | None" = None,
 ) -> None:
     """Write the page of an experiment, with its figures as PNG and SVG beside it.
 
@@ -257,6 +285,8 @@ def write(
         File name of the page.
     solvers
         Versions of the solvers, by name.
+    card
+        Its answer card.
     """
     from orchestrator.report import style  # it imports matplotlib
 
@@ -267,6 +297,7 @@ def write(
     text = fill(
         "document.html.j2",
         title=title,
+        card=card,
         sections=drawn,
         programs=versions(solvers),
         links={},

@@ -1,6 +1,7 @@
 """The tables of a page: thresholds, force laws, parameters and fidelities."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,9 @@ import pandas as pd
 from orchestrator.fidelity.fidelities import FIDELITIES, LOCAL, OWN_NUMBERS
 from orchestrator.grains.threshold import STEP
 from orchestrator.physics.laws import LAWS
-from orchestrator.report import labels
+from orchestrator.report import labels, single
 from orchestrator.report.results import Results, split
+from orchestrator.report.subjects import MEAN, STRESS, TERMS, WIND, Quantity, is_gas
 from orchestrator.study import fields
 
 SPEEDS = {
@@ -19,6 +21,15 @@ SPEEDS = {
     "mean_velocity_m_s": "mean velocity",
 }
 """Speeds of a flow that are measured in the field, by their columns."""
+HEADS = {WIND: "wind at 10 m", MEAN: "mean velocity", STRESS: "stress on the bed"}
+"""Quantities of flows in the heads of columns."""
+TITLES = {
+    WIND: "How strong a wind moves {}",
+    MEAN: "How fast a flow moves {}",
+    STRESS: "How much stress moves {}",
+}
+"""Titles of tables of thresholds."""
+PART = "part that has moved"
 MIXED = 2.0
 """Least ratio of sizes that are told apart."""
 MOST_LISTED = 12
@@ -27,10 +38,54 @@ EACH = ("alpha_deg", "d_m", "force_law")
 """Columns that each row of a table of single piles tells."""
 RANGES = ("alpha_deg", "force_law")
 """Columns that each row of a table of ranges tells."""
-TAU = "τ_c"
 
 
-def short(results: Results) -> pd.DataFrame | None:
+@dataclass(frozen=True)
+class Sheet:
+    """A table of a page and of a terminal.
+
+    Attributes
+    ----------
+    title
+        Its title.
+    frame
+        Texts by the heads of their columns; a unit stands behind the last comma.
+    shared
+        What all rows agree in.
+    terms
+        Terms of the heads in plain words.
+    file
+        The file that has these rows with more columns.
+    """
+
+    title: str
+    frame: pd.DataFrame
+    shared: tuple[str, ...] = ()
+    terms: tuple[str, ...] = ()
+    file: str = ""
+
+
+def quantity(rows: pd.DataFrame) -> Quantity:
+    """Choose what the flows of some rows are told by.
+
+    Parameters
+    ----------
+    rows
+        Thresholds with the columns of their scenes.
+
+    Returns
+    -------
+    Quantity
+        In gases the wind, in liquids with a depth the mean velocity, else the stress.
+    """
+    if rows["rho_f_kg_m3"].map(is_gas).all():
+        return WIND
+    if MEAN.column() in rows and rows[MEAN.column()].notna().all():
+        return MEAN
+    return STRESS
+
+
+def short(results: Results) -> Sheet | None:
     """List the thresholds in at most a screen: of few scenes each, of many their range.
 
     Parameters
@@ -40,23 +95,52 @@ def short(results: Results) -> pd.DataFrame | None:
 
     Returns
     -------
-    DataFrame or None
+    Sheet or None
         Of piles thresholds at every fraction if these are few, else at one; of single
         grains those of the grains. None without thresholds.
     """
     every = results.joined("pile_threshold")
     if len(every):
-        here = results.at_fraction
-        head = f"{TAU} at n/N = {here['fraction'].iloc[0]:.0%}"
-        keys = [*EACH, *labels.varying(here, *EACH)]
-        if _fits(every, [*keys, "fraction"]):
-            return _thresholds(every, [*keys, "fraction"], TAU)
-        return _thresholds(here, keys if _fits(here, keys) else RANGES, head)
+        return _of_piles(results, every)
     grains = single_grains(results)
     if grains.empty:
         return None
     keys = [*EACH, *labels.varying(grains, *EACH), "by"]
-    return _thresholds(grains, keys if _fits(grains, keys) else [*RANGES, "by"], TAU)
+    is_listed = _fits(grains, keys)
+    return _sheet(grains, keys if is_listed else [*RANGES, "by"], "single_grain")
+
+
+def _of_piles(results: Results, every: pd.DataFrame) -> Sheet:
+    """The thresholds of piles at every fraction, or at one."""
+    here = results.at_fraction
+    keys = [*EACH, *labels.varying(here, *EACH)]
+    if not _fits(every, [*keys, "fraction"]):
+        return _sheet(here, keys if _fits(here, keys) else RANGES, "pile_threshold")
+    sheet = _sheet(every, [*keys, "fraction"], "pile_threshold")
+    if every["scene_id"].nunique() > 1:
+        return sheet
+    first = _first_grain(every.iloc[0], sheet.frame)
+    return replace(sheet, frame=first)
+
+
+def _first_grain(row: pd.Series, frame: pd.DataFrame) -> pd.DataFrame:
+    """The table of one bed, with a row for its first grain above the others."""
+    ustar = float(row["first_ustar0_m_s"])
+    if not ustar > 0:
+        return frame
+    told = single.quantity(row)
+    beside = single.measured_ustar(row, ustar)
+    values = dict.fromkeys(frame.columns, "—")
+    values[PART] = "first grain"
+    heads = _heads(told)
+    values[heads[0]] = f"{single.in_unit(row, ustar, told):#.3g}"
+    if heads[2] in values:
+        values[heads[2]] = f"{single.in_unit(row, beside, told):#.3g}"
+    if USTAR_HEAD in values:
+        values[USTAR_HEAD] = f"{ustar:#.3g}"
+    if "usable" in values:
+        values["usable"] = ""
+    return pd.concat([pd.DataFrame([values]), frame], ignore_index=True)
 
 
 def _fits(rows: pd.DataFrame, keys: Sequence[str]) -> bool:
@@ -85,7 +169,7 @@ def piles(results: Results) -> pd.DataFrame | None:
     if rows["seed"].nunique() > 1:
         keys.append("seed")
     keys.append("fraction")
-    return _thresholds(rows, keys, TAU, more=("case", "count"))
+    return _thresholds(rows, keys, more=("case", "count"))
 
 
 def single_grains(results: Results) -> pd.DataFrame:
@@ -116,13 +200,53 @@ def single_grains(results: Results) -> pd.DataFrame:
     return pd.concat([rows.assign(reynolds=re), pd.DataFrame(values)], axis=1)
 
 
+def _sheet(rows: pd.DataFrame, keys: Sequence[str], name: str) -> Sheet:
+    """A table of thresholds, without the columns in which all rows agree."""
+    frame = _thresholds(rows, keys)
+    told_by = quantity(rows)
+    shared = []
+    is_single = len(frame) == 1
+    for column in keys:
+        head = labels.words(column).label
+        if column in ("fraction", "by") and not is_single:
+            continue
+        if head in frame and frame[head].nunique() == 1:
+            told = labels.told(rows.iloc[0], [column])
+            shared += told
+            frame = frame.drop(columns=head)
+    is_uniform = "usable" in frame and frame["usable"].nunique() == 1
+    if is_uniform and len(frame) > 1 and " of " not in frame["usable"].iloc[0]:
+        shared.append(f"usable: {frame['usable'].iloc[0]}")
+        frame = frame.drop(columns="usable")
+    terms = (TERMS["u*"], TERMS["shields"])
+    if "fraction" in rows and PART not in frame:
+        percent = f"{rows['fraction'].iloc[0]:.0%}".replace("%", " %")
+        shared.append(f"{PART}: {percent}")
+    title = TITLES[told_by].format("the bed" if "fraction" in rows else "a grain")
+    return Sheet(title, frame, tuple(shared), terms, f"tables/{name}.csv")
+
+
+def _heads(told: Quantity) -> tuple[str, str, str]:
+    """The heads of a quantity, of its interval and of what was measured."""
+    name = HEADS[told]
+    return (
+        f"{name}, {told.unit}",
+        f"interval, {told.unit}",
+        f"with the measured threshold, {told.unit}",
+    )
+
+
+USTAR_HEAD = "friction velocity u*₀, m/s"
+TAU_HEAD = "Shields number τ_c"
+TAU_INTERVAL = "interval of τ_c"
+
+
 def _thresholds(
-    rows: pd.DataFrame, keys: Sequence[str], head: str, more: Sequence[str] = ()
+    rows: pd.DataFrame, keys: Sequence[str], more: Sequence[str] = ()
 ) -> pd.DataFrame:
     """A row for thresholds that agree in some columns, with the range of the usable.
 
-    `head` is that of the Shields number, and `more` are columns that come first, in
-    place of speeds and of what was measured.
+    `more` are columns that come first.
     """
     is_range = "d_m" not in keys
     if is_range:
@@ -133,7 +257,9 @@ def _thresholds(
         keys = [*differ, *keys]
     order = list(keys) if is_range else ["alpha_deg", "d_m"]
     rows = rows.sort_values(order, kind="stable")
+    told = quantity(rows)
     rows = _open_ended(rows, "shields_low", "shields_high")
+    rows = _open_ended(rows, told.column("_low"), told.column("_high"))
     number = rows.groupby(list(keys), dropna=False, sort=False).ngroup()
     usable = rows["usable"].groupby(number)
     is_told = rows["usable"] | ~usable.transform("any")
@@ -147,19 +273,18 @@ def _thresholds(
         low[~usable.any()] = np.nan
         d_mm = 1e3 * rows["d_m"].groupby(number).agg(["min", "max"])
         table["diameter, mm"] = _ranges(d_mm["min"], d_mm["max"], "g")
-    known = set() if more else set(rows.columns[rows.notna().any()])
-    spans = {"u*₀, m/s": ["ustar0_m_s"]}
-    for name, text in SPEEDS.items():
-        if name in known:
-            spans[f"{text}, m/s"] = [name]
-    spans[head] = ["shields"]
-    spans["interval"] = ["shields_low", "shields_high"]
-    if "shields_model_low" in known and not is_range:
-        share = ", ".join(first["model_share"].dropna().unique())
-        model = f"model's interval, most by {share}"
-        spans[model] = ["shields_model_low", "shields_model_high"]
-    if "measured_low" in known:
-        spans["measured"] = ["measured_low", "measured_high"]
+    known = set(rows.columns[rows.notna().any()])
+    value, interval, measured = _heads(told)
+    spans = {value: [told.column()]}
+    if not is_range:
+        spans[interval] = [told.column("_low"), told.column("_high")]
+    if f"measured_{told.column()}" in known:
+        spans[measured] = [f"measured_{told.column()}"]
+    spans[USTAR_HEAD] = ["ustar0_m_s"]
+    spans[TAU_HEAD] = ["shields"]
+    spans[TAU_INTERVAL] = ["shields_low", "shields_high"]
+    if more and "shields_model_low" in known:
+        spans["interval of other models"] = ["shields_model_low", "shields_model_high"]
     table |= _spans(low, high, spans)
     reasons = zip(usable.sum(), usable.size(), first["why_not"], strict=True)
     table["usable"] = [_usable(*reason, is_range) for reason in reasons]
@@ -175,7 +300,7 @@ def _usable(count: int, of: int, why_not: str, is_range: bool) -> str:
     return "yes" if count else f"no: {why_not}"
 
 
-def sizes(results: Results) -> pd.DataFrame | None:
+def sizes(results: Results) -> Sheet | None:
     """List the thresholds of the sizes of mixtures at one fraction.
 
     Parameters
@@ -185,7 +310,7 @@ def sizes(results: Results) -> pd.DataFrame | None:
 
     Returns
     -------
-    DataFrame or None
+    Sheet or None
         A row for each size, all seeds together. None where sizes hardly differ.
     """
     rows = results.joined("size_class")
@@ -197,19 +322,26 @@ def sizes(results: Results) -> pd.DataFrame | None:
     size = rows["size_over_d"]
     number = np.rint(np.log(size) / np.log(STEP))
     stress = rows[["hiding", "hiding_wilcock_crowe"]].mul(size, axis=0)
-    rows = rows.assign(size=1e3 * size * rows["d_m"], **stress)
+    weight = (rows["rho_sol_kg_m3"] - rows["rho_f_kg_m3"]) * rows["g_m_s2"]
+    weight = weight * rows["d_m"] * size
+    in_pa = {
+        f"pa{end}": weight * rows[f"shields_own{end}"] for end in ("", "_low", "_high")
+    }
+    rows = rows.assign(size=1e3 * size * rows["d_m"], **stress, **in_pa)
     rows = _open_ended(rows, "shields_own_low", "shields_own_high")
+    rows = _open_ended(rows, "pa_low", "pa_high")
     by = [*(rows[key] for key in keys), number]
     groups = rows.groupby(by, dropna=False, sort=False)
     low = groups.min(numeric_only=True)
     high = groups.max(numeric_only=True)
     told = pd.DataFrame(labels.cells(groups.first()[[]].reset_index(), keys))
     spans = {
-        f"u*₀ at n/N = {fraction:.0%}, m/s": ["ustar0_m_s"],
+        "stress on the bed, Pa": ["pa"],
+        "interval, Pa": ["pa_low", "pa_high"],
         "stress over that of d50": ["hiding"],
         "measured (Wilcock & Crowe 2003)": ["hiding_wilcock_crowe"],
-        "θ of its own size": ["shields_own"],
-        "interval of θ": ["shields_own_low", "shields_own_high"],
+        USTAR_HEAD: ["ustar0_m_s"],
+        "Shields number of its own size": ["shields_own"],
     }
     moved = []
     for least, most in zip(
@@ -222,7 +354,7 @@ def sizes(results: Results) -> pd.DataFrame | None:
         grains.append(f"{count}: under ten" if is_few else count)
     # a bed is named once
     is_repeated = told.eq(told.shift()).all(axis=1)
-    return pd.DataFrame(
+    frame = pd.DataFrame(
         {
             **told.mask(is_repeated, ""),
             "size, mm": [f"{size:.3g}" for size in groups["size"].mean()],
@@ -231,6 +363,10 @@ def sizes(results: Results) -> pd.DataFrame | None:
             "exposed grains of a bed": grains,
         }
     )
+    percent = f"{fraction:.0%}".replace("%", " %")
+    shared = (f"part of each size that has moved: {percent}",)
+    terms = (TERMS["u*"], TERMS["shields"])
+    return Sheet("By size", frame, shared, terms, "tables/size_class.csv")
 
 
 def _open_ended(rows: pd.DataFrame, low: str, high: str) -> pd.DataFrame:

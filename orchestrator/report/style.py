@@ -93,7 +93,9 @@ class Figure:
 
     `image` (SVG or PNG) is what a page shows; until it is made there is a `drawing`, or a function
     that draws it. `data` are for the page's script, a pointer or a slider; None if there are none.
-    A figure with `fold` is drawn on demand alone, and one that `leads` is at the page's head.
+    A figure with `fold` is drawn on demand alone, and one that `leads` is at the page's head. One
+    that is `wide` has the whole width of the page. `number` is one that others gave it, such as
+    that of the paper.
     """
 
     name: str
@@ -105,6 +107,8 @@ class Figure:
     data: Any = None
     fold: bool = False
     leads: bool = False
+    wide: bool = False
+    number: str = ""
 
     @cached_property
     def canvas(self) -> Canvas | None:
@@ -288,9 +292,9 @@ def saved(figure: Figure, folder: Folder, *, png: bool = False) -> Figure:
         raster = _png(drawn)
         folder.put(f"{FIGURES}/{figure.name}.png", raster)
         drawn.set_layout_engine("none")  # it is laid out now
-    svg = _svg(drawn)
-    folder.put(f"{FIGURES}/{figure.name}.svg", svg)
-    return replace(figure, drawing=None, image=raster if png else svg)
+    vector = svg(drawn)
+    folder.put(f"{FIGURES}/{figure.name}.svg", vector)
+    return replace(figure, drawing=None, image=raster if png else vector)
 
 
 def _png(drawn: Canvas) -> bytes:
@@ -300,7 +304,8 @@ def _png(drawn: Canvas) -> bytes:
     return out.getvalue()
 
 
-def _svg(drawn: Canvas) -> bytes:
+def svg(drawn: Canvas) -> bytes:
+    """A drawing as SVG, the same bytes each time."""
     out = BytesIO()
     canvas: Any = FigureCanvasSVG(drawn)
     canvas.print_svg(out, metadata={"Date": None})

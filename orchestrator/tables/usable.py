@@ -18,6 +18,7 @@ from orchestrator.physics.velocity import (
 )
 from orchestrator.study import fields
 from orchestrator.tables.check import Contradictions
+from orchestrator.tables.quoted import quoted
 
 EXPOSED_FROM = 0.25
 """Part of a grain over the tops of its neighbours from which it is exposed."""
@@ -137,7 +138,14 @@ def with_usable(
             reasons.append(against[key])
         texts.append("; ".join(reasons))
     rows["shields"] = rows.get("shields", rows.get("shields_closed_form"))
-    made = {"usable": [not text for text in texts], "why_not": texts, **beside(rows)}
+    of_measured = beside(rows)
+    rows = rows.assign(**of_measured)
+    made = {
+        "usable": [not text for text in texts],
+        "why_not": texts,
+        **of_measured,
+        **quoted(rows),
+    }
     return pd.concat([table, pd.DataFrame(made, index=table.index)], axis=1)
 
 

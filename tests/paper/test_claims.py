@@ -202,7 +202,9 @@ def test_a_study_of_the_paper_alone_gets_a_report_card(
     page = (tmp_path / report.PAGE).read_text(encoding="utf-8")
     assert ('id="claims"' in page) == (tmp_path / paper.CLAIMS).exists() == is_paper
     if is_paper:
-        assert cards[0].said.startswith("17 claims of the paper: ")
+        assert cards[0].card is not None
+        assert {number.unit for number in cards[0].card.numbers} == {"of 17"}
+        assert "Do the paper’s claims hold" in page
         table = pd.read_csv(tmp_path / paper.CLAIMS)
         assert len(table) == len(CLAIMS)
         assert set(table["verdict"]) > {"no data"}

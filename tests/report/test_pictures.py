@@ -10,7 +10,7 @@ import pytest
 from orchestrator.bed import packing
 from orchestrator.grains.pile import Pile
 from orchestrator.physics.threshold import thresholds_of
-from orchestrator.report import along, bed, flows, words
+from orchestrator.report import along, answers, bed, flows
 from orchestrator.report.bed import Steps
 from orchestrator.report.results import FRACTION, Results
 from orchestrator.study.closed_form import single_grain
@@ -186,7 +186,7 @@ def test_a_bed_without_dem_has_a_picture_of_few_stops(
     at, share = few.first(FRACTION), peeled.packing.count * FRACTION
     assert few.totals[at] == every.totals[every.first(FRACTION)] >= share
     assert ((few.level > 0) & (few.level <= at)).sum() == few.totals[at]
-    found = bed.data(few, at)
+    found = bed.data(few, at, few.flow, "m/s")
     assert not any(found["frames"])
     assert found["step"] == "flow"
     assert "load step" not in bed.words(results, peeled)
@@ -223,7 +223,9 @@ def test_motion_starts_on_a_natural_dune_where_stress_and_slope_say(
     assert np.ptp(part.packing.centres[:, 0]) < 3500
     # noise that rises in the wake is not windward
     assert (local["ustar_over_ustar0"] > 0).all()
-    assert f"motion starts at x = {x:.4g} m (top of" in words.text(dune)
+    place = answers.card(dune).numbers[0]
+    assert (place.value, place.unit) == (x, "m")
+    assert "here motion starts" in place.meaning
 
 
 def test_each_form_of_a_train_has_its_thresholds(train: Results) -> None:

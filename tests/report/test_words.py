@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.report import bed, labels, sheets, shields, words
+from orchestrator.report import answers, bed, labels, remarks, sheets, shields
 from orchestrator.report.results import Results
 from orchestrator.report.shields import LABEL, SHAPE
 from orchestrator.study import fields
@@ -92,7 +92,8 @@ def test_the_picture_is_of_the_scene_that_the_sentence_is_about(
         assert row["rho_f_kg_m3"] == 1e3
         (figure,) = bed.draw(study)
         assert "1000 kg/m³" in figure.title
-        assert "1000 kg/m³" in words.answer(study).sentences[0]
+        first = answers.card(study).numbers[0]
+        assert (first.unit, "ρ_f = 1000 kg/m³" in first.meaning) == ("Pa", True)
 
 
 def test_each_fluid_has_a_row_and_a_sentence(results: Results) -> None:
@@ -102,11 +103,12 @@ def test_each_fluid_has_a_row_and_a_sentence(results: Results) -> None:
         for n in range(sheets.MOST_LISTED)
     ]
     study = copies(results, *fluids)
-    sheet, said = sheets.short(study), " ".join(words.answer(study).sentences)
+    sheet = sheets.short(study)
     assert sheet is not None
-    assert len(sheet) == 2
-    assert "1.2 kg/m³" in said
-    assert "1000 kg/m³" in said
+    assert len(sheet.frame) == 2
+    card = answers.card(study)
+    assert "a gas of 1.2 kg/m³" in card.scene
+    assert "a liquid of 1000 kg/m³" in card.scene
 
 
 def test_seeds_are_one_row_with_their_range(results: Results) -> None:
@@ -117,22 +119,31 @@ def test_seeds_are_one_row_with_their_range(results: Results) -> None:
     study = copies(results, *seeds)
     sheet = sheets.short(study)
     assert sheet is not None
-    assert set(sheet["usable"]) == {"3 of 3 seeds"}
-    assert set(sheet["τ_c"]) == {"0.0400 … 0.0900"}
-    (first,) = words.answer(study).sentences
-    assert "the mean of 3 seeds: τ_c = 0.0600 (0.0400 … 0.0900)" in first
+    assert set(sheet.frame["usable"]) == {"3 of 3 seeds"}
+    assert set(sheet.frame[sheets.TAU_HEAD]) == {"0.0400 … 0.0900"}
+    share = answers.card(study).numbers[-1]
+    assert share.interval_of == "3 beds that differ in chance alone"
+    # a wind goes nearly with the root of the Shields number
+    ends = (share.low / share.value, share.high / share.value)
+    assert ends == pytest.approx(np.sqrt([0.04 / 0.06, 0.09 / 0.06]), rel=0.02)
 
 
 def test_a_study_of_single_grains_has_an_answer_too(results: Results) -> None:
     grains = only(results, "grain")
-    first, *_ = words.answer(grains).sentences
-    assert first.startswith("One grain of 0.05 mm on 0° starts to move at u*₀ = ")
+    card = answers.card(grains)
+    assert card.question.startswith("At which wind does one grain start to move")
+    least, most, usable = card.numbers
+    assert least.value < most.value
+    rows = sheets.single_grains(grains)
+    assert (usable.value, usable.unit) == (rows["usable"].sum(), f"of {len(rows)}")
     without = grains.tables["single_grain"].assign(method="pivot", ustar_m_s=np.nan)
     exact = changed(grains, single_grain=without)
     sheet = sheets.short(exact)
     assert sheet is not None
-    assert set(sheet["by"]) == {"closed form"}
-    assert "One grain" in words.answer(exact).sentences[0]
+    assert set(sheet.frame["by"]) == {"closed form"}
+    # nobody followed the grains: where the law holds the answer is the exact one
+    told = answers.card(exact).numbers[0]
+    assert told.value == pytest.approx(least.value, rel=0.01)
 
 
 def test_a_threshold_that_is_not_usable_says_so(results: Results) -> None:
@@ -140,11 +151,13 @@ def test_a_threshold_that_is_not_usable_says_so(results: Results) -> None:
         usable=False, why_not="Re* 2 is below 30"
     )
     study = changed(results, pile_threshold=bad)
-    assert "(not usable: Re* 2 is below 30)." in words.answer(study).sentences[0]
-    assert words.doubts(study)[0] == "Usable: 0 of 4 thresholds."
+    worth = answers.card(study).worth
+    assert (worth.mark, worth.word) == ("bad", "not usable: Re* 2 is below 30")
+    heads = [remark.head for remark in remarks.remarks(study)]
+    assert "Usable: 0 of 4 thresholds." in heads
     sheet = sheets.short(study)
     assert sheet is not None
-    assert set(sheet["usable"]) == {"no: Re* 2 is below 30"}
+    assert "usable: no: Re* 2 is below 30" in sheet.shared
 
 
 def test_an_interval_without_an_end_is_written_so(results: Results) -> None:
@@ -153,7 +166,7 @@ def test_an_interval_without_an_end_is_written_so(results: Results) -> None:
     sheet = sheets.short(study)
     assert sheet is not None
     lows = [f"above {low:#.3g}" for low in thresholds["shields_low"]]
-    assert sheet["interval"].tolist() == lows
+    assert sheet.frame[sheets.TAU_INTERVAL].tolist() == ["—", *lows]
     (figure,) = shields.draw(study)
     said = " ".join(text[1] for group in figure.data.values() for text in group)
     assert all(f"(above {low:.4g})" in said for low in thresholds["shields_low"])
@@ -165,15 +178,13 @@ def test_an_interval_without_an_end_is_written_so(results: Results) -> None:
         copies(changed(results, pile_threshold=half), *({"seed": n} for n in (0, 1)))
     )
     assert ranges is not None
-    assert [text.startswith("above") for text in ranges["interval"]] == [
-        False,
-        True,
-    ] * 2
+    is_open = [text.startswith("above") for text in ranges.frame[sheets.TAU_INTERVAL]]
+    assert is_open == [False, True] * 2
     # where no error is known neither end is
     none = thresholds.assign(shields_low=np.nan, shields_high=np.nan)
     sheet = sheets.short(changed(results, pile_threshold=none))
     assert sheet is not None
-    assert set(sheet["interval"]) == {"—"}
+    assert set(sheet.frame[sheets.TAU_INTERVAL]) == {"—"}
 
 
 def test_sizes_of_a_mixture_say_what_so_few_grains_leave_open() -> None:

@@ -38,6 +38,7 @@ SOUND = {
 }
 SCENE = {
     **{"scene_id": "a", "rho_f_kg_m3": 1.0, "alpha_s": 1.0, "h_m": 0.02},
+    **{"cohesion_n_m": 0.0, "bed_shape": "triangle", "profile": NAN},
     **{
         "flow_top": "boundary layer",
         "depth_m": None,

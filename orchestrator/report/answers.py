@@ -1,0 +1,575 @@
+"""The answer card of a study: its question, its numbers and what they are worth."""
+
+import math
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from typing import Any
+
+import pandas as pd
+
+from orchestrator.grains.pile import Pile
+from orchestrator.physics.laws import LAWS
+from orchestrator.physics.measured import MEASURED_SOURCE, wilcock_crowe_hiding
+from orchestrator.physics.threshold import thresholds_of
+from orchestrator.report import labels, sheets, single, theory
+from orchestrator.report.card import Card, Mark, Number, Worth
+from orchestrator.report.results import (
+    Results,
+    measured_hills,
+    valid,
+)
+from orchestrator.report.subjects import (
+    STRESS,
+    TERMS,
+    Quantity,
+    fluid,
+    kind_of_grain,
+    length,
+    solid,
+)
+from orchestrator.tables.quoted import LEVEL_GRAIN
+
+NONE = Card(
+    "When do these grains start to move?",
+    "",
+    (),
+    "",
+    Worth("bad", "no answer yet", "No case has given a result."),
+)
+"""The card of a study without results."""
+SHAPES = {
+    "triangle": "pile",
+    "dune": "dune",
+    "cosine": "hill",
+    "gaussian": "hill",
+    "rushil": "hill",
+    "trapezoid": "pile with a level top",
+    "step up": "step",
+    "step down": "step",
+    "flat": "level bed",
+}
+"""Shapes of beds in questions."""
+
+
+@lru_cache(maxsize=1)
+def card(results: Results) -> Card:
+    """Make the answer card of a study.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Returns
+    -------
+    Card
+        Of many force laws which is nearest to measurements, of hills that others
+        measured where reversed flow ends, of several beds or grains the least and the
+        largest flow, of one its own numbers.
+    """
+    best = theory.best(theory.ranked(results))
+    if len(best) > theory.MANY:
+        return _of_laws(results, best)
+    thresholds = results.joined("pile_threshold")
+    hills = list(measured_hills(results))
+    if hills and not thresholds["usable"].any():
+        return _of_hills(hills)
+    if len(thresholds):
+        return _of_beds(results)
+    grains = sheets.single_grains(results)
+    return _of_grains(grains) if len(grains) else NONE
+
+
+# one bed, and several
+
+
+def _of_beds(results: Results) -> Card:
+    """The card of one bed, or of several."""
+    rows = results.exemplars
+    if rows.empty:
+        rows = results.at_fraction.assign(seeds=1, of_seeds=1)
+    keys = labels.varying(rows, "fraction")
+    if len(rows[keys].drop_duplicates()) > 1 and len(rows) > 1:
+        return _of_several(rows, results)
+    row = rows.iloc[0]
+    if sheets.sizes(results) is not None:
+        return _of_mixture(row, results)
+    return _of_bed(row, results)
+
+
+def _of_bed(row: pd.Series, results: Results) -> Card:
+    """The card of one bed: where motion starts, the first grains, a share of them."""
+    pile = results.plan.piles[str(row["scene_id"])]
+    told = single.quantity(row)
+    return Card(
+        _question(row, pile, told),
+        _scene(row, pile),
+        tuple(_numbers_of_bed(row, pile, results, told)),
+        single.source(row, told, single.known(row["first_ustar0_m_s"])),
+        single.worth(row),
+    )
+
+
+def _question(row: pd.Series, pile: Pile, told: Quantity) -> str:
+    """The question of one bed."""
+    bed = pile.bed
+    name = kind_of_grain(float(row["d_m"]))
+    if bed.profile:
+        return f"When does the {name} of {bed.profile.name} start to move, and where?"
+    grains = f"{name} of {length(float(row['d_m']))}"
+    shape = SHAPES[bed.shape]
+    if bed.forms > 1:
+        shape = f"train of {bed.forms} {shape}s"
+    return f"At which {told.flow} does a {shape} of {grains} start to move?"
+
+
+def _scene(row: pd.Series, pile: Pile) -> str:
+    """One line on shape, size, grains and fluid."""
+    bed = pile.bed
+    line = pile.model.line
+    first = float(line.x[1])
+    last = float(line.x[-2])
+    grains = f"{solid(float(row['rho_sol_kg_m3']))} of {length(float(row['d_m']))}"
+    size = f"{length(last - first)} long"
+    if single.is_level(row):
+        shape = f"level bed, {size}"
+    elif bed.profile:
+        shape = f"{bed.profile.name}, {size}, {length(float(line.h))} high"
+    else:
+        slope = f"{bed.slope_deg:g}° windward"
+        shape = f"{length(bed.height)} high, {slope}"
+    count = f"{row['count']:.0f} counted grains"
+    if row["method"] == "local":
+        count = "too many grains to follow each"
+    if len(bed.obstacles):
+        shape += f", behind {', '.join(map(str, bed.obstacles))}"
+    within = fluid(float(row["rho_f_kg_m3"]), float(row["nu_m2_s"]))
+    return f"{shape[:1].upper()}{shape[1:]}; {grains}; {count}; in {within}."
+
+
+def _numbers_of_bed(
+    row: pd.Series, pile: Pile, results: Results, told: Quantity
+) -> Iterator[Number]:
+    """Where motion starts, the flow of the first grains, and that of a share."""
+    first = single.known(row["first_ustar0_m_s"])
+    has_place = first > 0 and not single.is_level(row)
+    if has_place:
+        yield _place(row, pile, results)
+    if first > 0:
+        yield Number(
+            single.in_unit(row, first, told),
+            told.unit,
+            f"{told.name} that moves the first grains",
+            single.place_of(told, row),
+            measured=single.in_unit(row, single.measured_ustar(row, first), told),
+        )
+    yield share(row, told)
+    if not has_place:
+        yield ustar_number(row)
+
+
+def _place(row: pd.Series, pile: Pile, results: Results) -> Number:
+    """Where motion starts, and where else it may within the known error."""
+    line = pile.model.line
+    crest = float(line.crest[0])
+    x = float(row["first_x_m"])
+    low, high = _places(row, results)
+    unit, scale = ("m", 1.0) if abs(line.x[-2]) >= 1 else ("mm", 1e3)
+    from_where = "the first point of the profile" if pile.bed.profile else "the foot"
+    top = f"the top is at {scale * crest:.3g} {unit}"
+    return Number(
+        scale * x,
+        unit,
+        "along the bed: here motion starts",
+        f"from {from_where}; {top}",
+        low=scale * low,
+        high=scale * high,
+        interval_of="places whose threshold is within the known error of the lowest",
+    )
+
+
+def _places(row: pd.Series, results: Results) -> tuple[float, float]:
+    """Ends of the places at which motion may start within the known error, m."""
+    grains = results.tables.get("pile_grain", pd.DataFrame())
+    error = single.known(row["error_estimate"])
+    if grains.empty or math.isnan(error):
+        return math.nan, math.nan
+    here = grains[grains["scene_id"] == row["scene_id"]]
+    most = single.known(row["first_ustar0_m_s"]) * math.sqrt(1 + error) * (1 + 1e-9)
+    near = here[here["ustar0_m_s"] <= most]["x_m"]
+    return (float(near.min()), float(near.max())) if len(near) else (math.nan, math.nan)
+
+
+def share(row: pd.Series, told: Quantity) -> Number:
+    """Make the number of the flow at which a share of a bed has moved.
+
+    Parameters
+    ----------
+    row
+        A threshold with the columns of its scene, seeds as one.
+    told
+        What its flow is told by.
+
+    Returns
+    -------
+    Number
+        With its interval, or the range of the seeds.
+    """
+    ustar = float(row["ustar0_m_s"])
+    theta = float(row["shields"])
+    ends = (single.known(row["shields_low"]), single.known(row["shields_high"]))
+    of_what = "load steps, count and the known error of the method"
+    if row["of_seeds"] > 1:
+        ends = (row["least"], row["largest"])
+        of_what = f"{row['seeds']} beds that differ in chance alone"
+    low, high = (ustar * math.sqrt(float(end) / theta) for end in ends)
+    part = f"{row['fraction']:.0%}".replace("%", " %")
+    what = "of the bed" if row["method"] == "local" else "of the grains"
+    return Number(
+        single.in_unit(row, ustar, told),
+        told.unit,
+        f"{told.name} that moves {part} {what}",
+        single.place_of(told, row),
+        low=single.in_unit(row, low, told),
+        high=single.in_unit(row, high, told),
+        interval_of=of_what,
+        measured=single.in_unit(row, single.measured_ustar(row, ustar), told),
+    )
+
+
+def ustar_number(row: pd.Series) -> Number:
+    """Make the number of the friction velocity of a threshold.
+
+    Parameters
+    ----------
+    row
+        A threshold with the columns of its scene.
+
+    Returns
+    -------
+    Number
+        With its interval.
+    """
+    ustar = float(row["ustar0_m_s"])
+    return Number(
+        ustar,
+        "m/s",
+        "friction velocity",
+        "the pull of the flow on the ground, written as a speed",
+        low=single.known(row.get("ustar0_low_m_s")),
+        high=single.known(row.get("ustar0_high_m_s")),
+        measured=single.measured_ustar(row, ustar),
+    )
+
+
+def _of_several(rows: pd.DataFrame, results: Results) -> Card:
+    """The card of several beds: the least and the largest flow, and what is usable."""
+    told = sheets.quantity(rows)
+    usable = rows[valid(rows)]
+    shown = usable if len(usable) else rows
+    column = told.column()
+    values = [
+        single.in_unit(row, float(row["ustar0_m_s"]), told)
+        for _, row in rows.iterrows()
+    ]
+    rows = rows.assign(**{column: values})
+    shown = rows.loc[shown.index].sort_values(column, kind="stable")
+    telling = labels.varying(rows, "fraction")
+    numbers = [
+        _end_of_range(shown.iloc[0], told, telling, "least"),
+        _end_of_range(shown.iloc[-1], told, telling, "most"),
+    ]
+    every = results.joined("pile_threshold")
+    scenes = every["scene_id"].nunique()
+    count = int(every["usable"].sum())
+    shape = _common_shape(rows)
+    return Card(
+        f"At which {told.flow} do {scenes} {shape} start to move?",
+        _span_of(rows),
+        (*numbers, _usable_number(count, len(every))),
+        single.source(shown.iloc[0], told),
+        _worth_of_many(shown, count, len(every)),
+    )
+
+
+def _common_shape(rows: pd.DataFrame) -> str:
+    """What several beds are, in the plural."""
+    shapes = set(rows["bed_shape"])
+    if rows["profile"].notna().any() or len(shapes) > 1:
+        return "beds"
+    word = SHAPES[str(shapes.pop())]
+    return "piles with a level top" if " with " in word else f"{word}s"
+
+
+def _span_of(rows: pd.DataFrame) -> str:
+    """One line on the grains, the slopes and the fluids of several beds or grains."""
+    least = float(rows["d_m"].min())
+    most = float(rows["d_m"].max())
+    sizes = " to ".join(dict.fromkeys([length(least), length(most)]))
+    parts = [f"grains of {sizes}"]
+    slopes = sorted(set(rows["alpha_deg"]))
+    if slopes != [0.0]:
+        parts.append(f"slopes of {' to '.join(_ends(slopes))}°")
+    fluids = dict.fromkeys(
+        fluid(float(rho), float(nu))
+        for rho, nu in zip(rows["rho_f_kg_m3"], rows["nu_m2_s"], strict=True)
+    )
+    named = list(fluids)
+    if len(named) > 3:
+        named = [f"{len(named)} fluids"]
+    parts.append(f"in {', '.join(named)}")
+    text = ", ".join(parts)
+    return f"{text[:1].upper()}{text[1:]}."
+
+
+def _ends(values: Sequence[float]) -> list[str]:
+    """The first and the last of some values as texts, one where they are alike."""
+    return list(dict.fromkeys([f"{values[0]:g}", f"{values[-1]:g}"]))
+
+
+def _end_of_range(
+    row: pd.Series, told: Quantity, telling: Sequence[str], which: str
+) -> Number:
+    """The least or the largest flow of several beds or grains."""
+    ustar = float(row["ustar0_m_s"])
+    what = ", ".join(labels.told(row, list(telling)[:3]))
+    moves = "moves a grain"
+    if "fraction" in row:
+        moves = f"moves {row['fraction']:.0%}".replace("%", " %")
+    low = single.known(row.get(told.column("_low")))
+    high = single.known(row.get(told.column("_high")))
+    return Number(
+        single.in_unit(row, ustar, told),
+        told.unit,
+        f"{which} {told.name} that {moves}: {what}",
+        single.place_of(told, row),
+        low=low,
+        high=high,
+        measured=single.in_unit(row, single.measured_ustar(row, ustar), told),
+    )
+
+
+def _usable_number(count: int, of: int) -> Number:
+    """How many thresholds are usable."""
+    return Number(
+        count,
+        f"of {of}",
+        "thresholds are usable",
+        "the tables give the reason for each other one",
+        decimals=0,
+        mark=_mark_of(count, of),
+    )
+
+
+def _mark_of(count: int, of: int) -> Mark:
+    """What a count of usable thresholds is worth."""
+    if count == of:
+        return "good"
+    return "care" if count else "bad"
+
+
+# mixtures
+
+
+def _of_mixture(row: pd.Series, results: Results) -> Card:
+    """The card of a mixture: all sizes, the finest to the coarsest, the flow."""
+    classes = results.joined("size_class")
+    here = classes[classes["fraction"] == row["fraction"]]
+    here = here[here["scene_id"] == row["scene_id"]].sort_values("size_over_d")
+    density = float(row["rho_f_kg_m3"])
+    stress = (density * here["ustar0_m_s"] ** 2).tolist()
+    beside = [measured_of_size(row, float(size)) for size in here["size_over_d"]]
+    sizes = [1e3 * float(row["d_m"]) * float(size) for size in here["size_over_d"]]
+    all_sizes = share(row, STRESS)
+    spread = Number(
+        float(stress[0]),
+        "Pa",
+        "from the finest sizes to the coarsest",
+        f"{sizes[0]:.3g} mm to {sizes[-1]:.3g} mm; measured: Wilcock and Crowe 2003, "
+        "at the measured stress of d50",
+        last=float(stress[-1]),
+        measured=beside[0],
+        measured_last=beside[-1],
+    )
+    told = single.quantity(row)
+    flow = ustar_number(row) if told is STRESS else share(row, told)
+    pile = results.plan.piles[str(row["scene_id"])]
+    name = kind_of_grain(float(row["d_m"]))
+    return Card(
+        f"Which flow starts to move this {name}, and which sizes go first?",
+        _scene(row, pile),
+        (all_sizes, spread, flow),
+        single.source(row, told),
+        single.worth(row, few=bool(here["few"].any())),
+    )
+
+
+def measured_of_size(row: pd.Series, size: float) -> float:
+    """Compute the stress that moves a size by Wilcock and Crowe, d50 as measured.
+
+    Parameters
+    ----------
+    row
+        The threshold of the mixture.
+    size
+        The size over d50.
+
+    Returns
+    -------
+    float
+        Stress on the bed, Pa.
+    """
+    ustar = float(row["measured_level_ustar_m_s"])
+    return float(row["rho_f_kg_m3"]) * ustar**2 * float(wilcock_crowe_hiding(size))
+
+
+# single grains
+
+
+def _of_grains(grains: pd.DataFrame) -> Card:
+    """The card of one grain, or of several."""
+    questions = [*LEVEL_GRAIN, "force_law", "depth_m"]
+    if len(grains[questions].drop_duplicates()) == 1:
+        return _of_grain(grains.iloc[0])
+    told = sheets.quantity(grains)
+    usable = grains[valid(grains)]
+    shown = usable if len(usable) else grains
+    shown = shown.sort_values("ustar0_m_s", kind="stable")
+    telling = labels.varying(grains, "bed")
+    return Card(
+        f"At which {told.flow} does one grain start to move, by its size and bed?",
+        _span_of(grains),
+        (
+            _end_of_range(shown.iloc[0], told, telling, "least"),
+            _end_of_range(shown.iloc[-1], told, telling, "most"),
+            _usable_number(len(usable), len(grains)),
+        ),
+        single.source(shown.iloc[0], told),
+        _worth_of_many(shown, len(usable), len(grains)),
+    )
+
+
+def _of_grain(row: pd.Series) -> Card:
+    """The card of one grain: speed, friction velocity and stress."""
+    return single.card(row, laws_that_hold(row))
+
+
+def laws_that_hold(row: pd.Series) -> dict[str, float]:
+    """Find the friction velocities by the force laws that hold for a single grain.
+
+    Parameters
+    ----------
+    row
+        Columns `LEVEL_GRAIN` of a grain.
+
+    Returns
+    -------
+    dict of str to float
+        Friction velocity at the threshold, m/s, by the name of the law.
+    """
+    asked: Any = tuple(float(row[name]) for name in LEVEL_GRAIN)
+    found = {}
+    for name in LAWS:
+        (at,) = thresholds_of(name, [asked])
+        if bool(at.valid):
+            found[name] = float(at.friction_velocity)
+    return found
+
+
+# many laws, and hills
+
+
+def _of_laws(results: Results, best: Sequence[theory.Line]) -> Card:
+    """The card of a study of many force laws: which is nearest to measurements."""
+    first = best[0]
+    factor = first.median_factor
+    numbers = [
+        Number(
+            first.decades,
+            f"of {theory.DECADES:.1f}",
+            "decades of Re* within what was measured",
+            f"{TERMS['re']}; by {first.name}",
+            decimals=1,
+        ),
+        Number(
+            factor,
+            "times",
+            "off the measured medians, in the median",
+            f"from Re* = {theory.FACTORS_FROM:g} on; "
+            f"at worst {first.worst[0]:.2f} times",
+            decimals=2,
+        ),
+    ]
+    grains = sheets.single_grains(results)
+    piles = results.joined("pile_threshold")
+    count = int(grains["usable"].sum()) if len(grains) else 0
+    of = len(grains)
+    if len(piles):
+        count += int(piles["usable"].sum())
+        of += len(piles)
+    law = labels.value("force_law", first.law)
+    said = " ".join(theory.nearest(results)[1:])
+    word = "usable" if count == of else f"usable, with gaps: {count} of {of} thresholds"
+    mark: Mark = "good" if count == of else "care"
+    return Card(
+        "Which force law comes nearest to measured thresholds?",
+        f"{law} of {len(best)} laws. {_span_of(results.scenes)}",
+        (*numbers, _usable_number(count, of)),
+        f"{MEASURED_SOURCE}. {said}".strip(),
+        Worth(mark, word, f"In water take {law}; in air see what qualifies it."),
+    )
+
+
+def _of_hills(hills: Sequence[tuple[float, pd.DataFrame]]) -> Card:
+    """The card of hills that others measured: where reversed flow ends behind each."""
+    numbers = []
+    for aspect, rows in hills[:3]:
+        row = rows.iloc[0]
+        model = labels.value("turbulence_model", row["turbulence_model"])
+        ends = rows["reattachment_over_h"]
+        end = float(row["reattachment_over_h"])
+        numbers.append(
+            Number(
+                0.0 if math.isnan(end) else end,
+                "heights",
+                f"reversed flow behind the hill of half length {aspect:g} h",
+                f"by {model}, from the top; 0: none",
+                low=float(ends.fillna(0.0).min()),
+                high=float(ends.fillna(0.0).max()),
+                interval_of=f"the {len(rows)} turbulence models",
+                measured=float(row["measured_reattachment_over_h"] or 0.0)
+                if pd.notna(row["measured_reattachment_over_h"])
+                else 0.0,
+                decimals=1,
+            )
+        )
+    verified = all(rows["measured_verified"].all() for _, rows in hills)
+    source_ = str(hills[0][1]["measured_source"].iloc[0])
+    if not verified:
+        source_ += " (not every number was read in its source)"
+    return Card(
+        "Does the computed flow over hills end where it did in the wind tunnel?",
+        f"{len(hills)} hills of the wind-tunnel experiment RUSHIL; no grains move.",
+        tuple(numbers),
+        source_,
+        Worth("care", "usable, for flows", "Compare the models; no threshold is meant"),
+    )
+
+
+def _worth_of_many(shown: pd.DataFrame, count: int, of: int) -> Worth:
+    """What the answers of several beds or grains are worth together."""
+    if not count:
+        return single.worth(shown.iloc[0])
+    if count < of:
+        word = f"usable, with gaps: {count} of {of} thresholds"
+        return Worth("care", word, "The others are marked, each with its reason.")
+    is_near = [single.is_measured(row) for _, row in shown.iterrows()]
+    if all(is_near):
+        return Worth("good", "usable", "All are within what was measured.")
+    outside = len(is_near) - sum(is_near)
+    advice = f"{outside} of {len(is_near)} are outside what was measured on level beds."
+    return Worth("care", "usable, with a correction", advice)
+
+
+TERM_LINES = (TERMS["u*"], TERMS["shields"])
+"""Terms that tables of thresholds have in their heads."""

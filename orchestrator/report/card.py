@@ -1,0 +1,284 @@
+"""The answer card: a question, at most three numbers with units, and their worth.
+
+Pages and the terminal are both made from it. It imports nothing that is slow: the
+command `threshold` prints one.
+"""
+
+import math
+import textwrap
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+Mark = Literal["good", "care", "bad"]
+"""What an answer is worth: usable, usable with something, not usable."""
+DISCS: dict[Mark, str] = {"good": "●", "care": "◐", "bad": "○"}
+"""A full disc, a half disc and a ring, as the page draws them."""
+WIDTH = 79
+"""Letters of a line in a terminal."""
+MOST_NUMBERS = 3
+"""Largest number of large figures of a card."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A large figure of a card.
+
+    Attributes
+    ----------
+    value
+        The number in its unit.
+    unit
+        The unit, such as ``m/s``; a count has words such as ``of 17``.
+    meaning
+        What the number is, in a few words.
+    note
+        A term of its meaning in plain words, or where it counts from.
+    low, high
+        Ends of its tested interval in that unit; NaN where one is not known.
+    interval_of
+        What the interval is, such as ``the six force laws that hold``.
+    measured
+        The measured value in that unit; NaN without one.
+    last
+        The other end of a range of numbers, NaN of one number.
+    measured_last
+        The measured value beside that end.
+    decimals
+        Digits behind the point; None for as many as the number needs.
+    mark
+        Of a number that is a verdict, which.
+    """
+
+    value: float
+    unit: str
+    meaning: str
+    note: str = ""
+    low: float = math.nan
+    high: float = math.nan
+    interval_of: str = ""
+    measured: float = math.nan
+    last: float = math.nan
+    measured_last: float = math.nan
+    decimals: int | None = None
+    mark: Mark | None = None
+
+    @property
+    def figure(self) -> str:
+        """The number as it is written."""
+        return self._written(self.value, self.last, "–")
+
+    @property
+    def interval(self) -> str:
+        """The interval as it is written, without its unit; empty without one."""
+        has_low = math.isfinite(self.low)
+        has_high = math.isfinite(self.high)
+        if has_low and has_high:
+            return self._written(self.low, self.high, " … ")
+        if has_low:
+            return f"above {self._one(self.low)}"
+        return f"below {self._one(self.high)}" if has_high else ""
+
+    @property
+    def beside(self) -> str:
+        """The measured value as it is written, without its unit; empty without one."""
+        if math.isnan(self.measured):
+            return ""
+        return self._written(self.measured, self.measured_last, "–")
+
+    def _written(self, first: float, last: float, between: str) -> str:
+        """One number, or two where they differ."""
+        if math.isnan(last):
+            return self._one(first)
+        return between.join(dict.fromkeys([self._one(first), self._one(last)]))
+
+    def _one(self, value: float) -> str:
+        """A number with the digits of this figure."""
+        if math.isnan(value):
+            return "–"
+        return f"{value:.{self._digits}f}"
+
+    @property
+    def _digits(self) -> int:
+        """Digits behind the point: two that matter below 10, three from there on."""
+        if self.decimals is not None:
+            return self.decimals
+        return decimals(self.value)
+
+
+def decimals(value: float) -> int:
+    """Count the digits behind the point with which a number is told.
+
+    Parameters
+    ----------
+    value
+        The number.
+
+    Returns
+    -------
+    int
+        As many as leave two digits that matter below 10, and three from there on.
+
+    Examples
+    --------
+    >>> [decimals(value) for value in (0.0412, 8.61, 13.2, 149.0)]
+    [3, 1, 1, 0]
+    """
+    if value == 0 or not math.isfinite(value):
+        return 1
+    size = math.floor(math.log10(abs(value)))
+    return max(0, (1 if size < 1 else 2) - size)
+
+
+@dataclass(frozen=True)
+class Worth:
+    """What an answer is worth.
+
+    Attributes
+    ----------
+    mark
+        The kind of worth.
+    word
+        In a few words: usable, usable with something, not usable and why.
+    advice
+        A sentence that says what to do.
+    """
+
+    mark: Mark
+    word: str
+    advice: str = ""
+
+
+@dataclass(frozen=True)
+class Card:
+    """An answer that a report can quote.
+
+    Attributes
+    ----------
+    question
+        The question in words.
+    scene
+        One line: shape, size, grains, fluid.
+    numbers
+        At most three large figures.
+    source
+        What measurement says: where the measured values are from.
+    worth
+        What the answer is worth, and what to do.
+    """
+
+    question: str
+    scene: str
+    numbers: tuple[Number, ...]
+    source: str
+    worth: Worth
+
+    def __post_init__(self) -> None:
+        if len(self.numbers) > MOST_NUMBERS:
+            raise ValueError(f"a card has at most {MOST_NUMBERS} numbers")
+
+
+def lines(card: Card) -> Iterator[str]:
+    """Write a card for a terminal.
+
+    Parameters
+    ----------
+    card
+        The card.
+
+    Yields
+    ------
+    str
+        Its lines.
+    """
+    yield from _wrapped(card.question)
+    if card.scene:
+        yield from _wrapped(card.scene)
+    yield ""
+    yield from _numbers(card.numbers)
+    yield ""
+    word = card.worth.word
+    said = f"{DISCS[card.worth.mark]} {word[:1].upper()}{word[1:]}"
+    said += ":" if card.worth.advice else "."
+    advice = card.worth.advice
+    text = f"{said} {advice[:1].lower()}{advice[1:]}" if advice else said
+    yield from _wrapped(text, "  ", "    ")
+    if card.source:
+        yield ""
+        yield from _wrapped(f"measured: {card.source}", "  ", "    ")
+
+
+def _numbers(numbers: Sequence[Number]) -> Iterator[str]:
+    """The figures below each other, with their intervals, and what each is."""
+    has_interval = any(number.interval for number in numbers)
+    has_measured = any(number.beside for number in numbers)
+    heads = ["answer"]
+    heads += ["interval"] if has_interval else []
+    heads += ["measured"] if has_measured else []
+    rows = []
+    for number in numbers:
+        cells = [f"{number.figure} {number.unit}".strip()]
+        cells += [number.interval or "-"] if has_interval else []
+        cells += [number.beside or "-"] if has_measured else []
+        rows.append(cells)
+    widths = [max(map(len, column)) for column in zip(heads, *rows, strict=True)]
+    if len(heads) > 1:
+        yield "  " + "  ".join(map(str.ljust, heads, widths)).rstrip()
+    indent = 2 + sum(width + 2 for width in widths)
+    for cells, number in zip(rows, numbers, strict=True):
+        start = "  " + "  ".join(map(str.ljust, cells, widths)) + "  "
+        told = [number.meaning]
+        if number.note:
+            told.append(number.note)
+        if number.interval and number.interval_of:
+            told.append(f"interval: {number.interval_of}")
+        yield from _wrapped("; ".join(told), start, " " * indent)
+
+
+def _wrapped(text: str, first: str = "", later: str = "") -> list[str]:
+    """A text in lines of a terminal, with what stands before each."""
+    return textwrap.wrap(
+        text,
+        WIDTH,
+        initial_indent=first,
+        subsequent_indent=later,
+        break_long_words=False,
+        break_on_hyphens=False,
+        drop_whitespace=True,
+    ) or [first.rstrip()]
+
+
+@dataclass(frozen=True)
+class Remark:
+    """What qualifies an answer.
+
+    Attributes
+    ----------
+    head
+        A short sentence.
+    text
+        Its numbers.
+    """
+
+    head: str
+    text: str
+
+
+def remark_lines(remarks: Iterable[Remark]) -> Iterator[str]:
+    """Write what qualifies an answer for a terminal.
+
+    Parameters
+    ----------
+    remarks
+        The remarks.
+
+    Yields
+    ------
+    str
+        A heading and the lines of each; nothing without remarks.
+    """
+    listed = list(remarks)
+    if listed:
+        yield "Before you use it"
+    for remark in listed:
+        yield from _wrapped(f"{remark.head} {remark.text}".strip(), "  - ", "    ")

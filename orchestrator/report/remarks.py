@@ -1,0 +1,245 @@
+"""What qualifies the answer of a study: four to six remarks with their numbers."""
+
+from collections.abc import Iterator
+from functools import lru_cache
+
+import numpy as np
+import pandas as pd
+
+from orchestrator.fidelity import spread
+from orchestrator.fidelity.limits import FROZEN_BED
+from orchestrator.physics.fluids import PAPER
+from orchestrator.report import labels, sheets, single, theory
+from orchestrator.report.card import Remark
+from orchestrator.report.page import caption
+from orchestrator.report.results import Results
+from orchestrator.report.subjects import is_gas, length
+from orchestrator.study.parts import PileBed
+from orchestrator.tables.usable import ROW_HOLD
+
+MOST = 6
+"""Remarks up to which those are added that are true of every study of a kind."""
+PAPER_FLUID = Remark(
+    "The gas is not quite air.",
+    "It is the paper’s, 1 kg/m³ and 1e-5 m²/s. For real air write "
+    '`fluid.kind = "air"`.',
+)
+BARE_GROUND = Remark(
+    "The wind is that over bare, level ground.",
+    "Ripples, stones and plants slow it near the ground: over them a stronger wind at "
+    "10 m is needed.",
+)
+DRY_GRAINS = Remark(
+    "Dry, round grains without cohesion.",
+    "Moisture, crusts and fine dust between the grains make them harder to move.",
+)
+FIRST_MOTION = Remark(
+    "First motion, not transport.",
+    "Grains leave their places; how many are carried on, and how far, is not asked.",
+)
+
+
+@lru_cache(maxsize=1)
+def remarks(results: Results) -> list[Remark]:
+    """List what qualifies the answer of a study.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Returns
+    -------
+    list of Remark
+        First what changes the answer; then, up to six, what is true of every such
+        study.
+    """
+    piles = results.joined("pile_threshold")
+    table = piles if len(piles) else sheets.single_grains(results)
+    if table.empty:
+        return [*_questions(results)]
+    said = [*_of_laws(results), *_correction(results, table), *_questions(results)]
+    said += _usable(table)
+    if len(piles):
+        said += _of_piles(results, piles)
+    scenes = results.scenes
+    if PAPER in zip(scenes["rho_f_kg_m3"], scenes["nu_m2_s"], strict=True):
+        said.append(PAPER_FLUID)
+    usual = [FIRST_MOTION]
+    if table["rho_f_kg_m3"].map(is_gas).any():
+        usual = [BARE_GROUND, DRY_GRAINS, FIRST_MOTION]
+    return said + usual[: max(0, MOST - len(said))]
+
+
+def _of_laws(results: Results) -> Iterator[Remark]:
+    """Which law is nearest to measurements in water and in air, of a study of many."""
+    best = theory.best(theory.ranked(results))
+    if len(best) <= theory.MANY:
+        return
+    for sentence in theory.nearest(results):
+        head, _, rest = sentence.partition(" is ")
+        if rest:
+            yield Remark(f"{head}:", rest)
+        else:
+            yield Remark("Where no law is as measured.", sentence)
+
+
+def _correction(results: Results, table: pd.DataFrame) -> Iterator[Remark]:
+    """By how much the computed threshold of one grain is off the measured one."""
+    rows = results.exemplars if len(results.exemplars) else table
+    row = rows.iloc[0]
+    computed = float(row["level_ustar_m_s"])
+    measured = float(row["measured_level_ustar_m_s"])
+    if np.isnan(computed / measured) or single.is_measured(row):
+        return
+    ratio = computed / measured
+    flow = "wind" if is_gas(float(row["rho_f_kg_m3"])) else "flow"
+    size = length(float(row["d_m"]))
+    law = labels.value("force_law", row["force_law"])
+    off = f"too strong by {ratio:.2g} times" if ratio > 1 else ""
+    off = off or f"too weak: {ratio:.2g} of the measured one"
+    head = f"The computed {flow} is {off}."
+    who = "wind tunnels" if flow == "wind" else "flumes"
+    text = (
+        f"On a level bed of grains of {size} the force law {law} asks for a friction "
+        f"velocity of {computed:#.3g} m/s; {who} found {measured:#.3g} m/s. The table "
+        "has both."
+    )
+    yield Remark(head, text)
+
+
+def _questions(results: Results) -> Iterator[Remark]:
+    """What is asked about numbers of the study file that seem to be wrong."""
+    for question in results.study.questions:
+        ending = "" if question.endswith("?") else "."
+        yield Remark("Is the study file right?", f"{question}{ending}")
+
+
+def _usable(table: pd.DataFrame) -> Iterator[Remark]:
+    """How many thresholds are usable, and what is most often against the others."""
+    count = len(table)
+    usable = int(table["usable"].sum())
+    if usable == count:
+        return
+    reasons = table.loc[~table["usable"].astype(bool), "why_not"]
+    most = str(reasons.mode().iloc[0])
+    head = f"Usable: {usable} of {count} thresholds."
+    yield Remark(head, f"Most often against the others: {most}.")
+
+
+def _of_piles(results: Results, piles: pd.DataFrame) -> Iterator[Remark]:
+    """What qualifies the thresholds of beds."""
+    for _, row in results.exemplars.head(1).iterrows():
+        pile = results.plan.piles[str(row["scene_id"])]
+        yield from _smoothing(row, pile.bed)
+        yield from _counted(row, pile.bed)
+        yield from _closed_form(row)
+        yield from _model(row, results)
+    beyond = piles[piles["frozen_bed"] > FROZEN_BED]
+    if len(beyond):
+        text = caption("frozen", beyond=beyond, count=len(piles), limit=FROZEN_BED)
+        yield Remark("The flow does not follow the bed.", text)
+    yield from _fidelity(results)
+    if "check" in results.tables:
+        text = caption("checked", checks=results.tables["check"])
+        yield Remark("Some beds were checked.", text)
+    yield from _tolerance(results, piles)
+
+
+def _smoothing(row: pd.Series, bed: PileBed) -> Iterator[Remark]:
+    """How smoothing of a noisy profile moves the answer."""
+    if bed.profile and row.get("smoothing_needed_m", np.nan) > 0:
+        text = caption("smoothing", row=row, name=bed.profile.name)
+        yield Remark("Smoothing moves the answer.", text)
+
+
+def _counted(row: pd.Series, bed: PileBed) -> Iterator[Remark]:
+    """Which part of a bed is counted, where that is not plain from its shape."""
+    if not (bed.profile or bed.counted):
+        return
+    counts = bed.counts
+    rest = 'another part: `bed.counted = "all"`'
+    if not isinstance(counts, str):
+        start, end = counts
+        where = f"The bed between x = {start:g} and {end:g} m is counted."
+        rest = "shares are of the grains between them"
+    elif counts == "windward":
+        where = "The sides that rise in the wind are counted."
+    else:
+        where = "All of the bed is counted."
+        rest = 'the windward sides alone: `bed.counted = "windward"`'
+    yield Remark(where, f"{rest[0].upper()}{rest[1:]}.")
+
+
+def _closed_form(row: pd.Series) -> Iterator[Remark]:
+    """That a bed was answered along its line, and what checks that."""
+    if row["method"] != "local":
+        return
+    text = (
+        "The bed has too many grains to follow each: the local stress is compared with "
+        "the threshold of a single exposed grain on the local slope."
+    )
+    if pd.notna(row["pivot_x_m"]):
+        place = length(float(row["pivot_x_m"]))
+        text += (
+            f" The grains around the answer, turned one by one, start at {place} and a "
+            f"friction velocity of {row['pivot_first_m_s']:#.3g} m/s."
+        )
+    if row["row_hold"] > ROW_HOLD:
+        text += (
+            " Touching grains of a row would hold the first up to "
+            f"{row['row_hold']:.2g} times that."
+        )
+    yield Remark("Closed form, checked at one place.", text)
+
+
+def _model(row: pd.Series, results: Results) -> Iterator[Remark]:
+    """What the choices that all models share move a threshold by."""
+    low = row["shields_model_low"]
+    high = row["shields_model_high"]
+    if pd.isna(low) or pd.isna(row["shields"]):
+        return
+    choice = row["model_share"]
+    part = f"{row['fraction']:.0%}".replace("%", " %")
+    text = (
+        f"Models with other choices of packing, forces and angles give Shields numbers "
+        f"of {labels.interval(low, high)} for the {part}. The intervals in the table "
+        "do not contain this."
+    )
+    yield Remark(f"{str(choice).capitalize()} matters more than all else.", text)
+
+
+def _fidelity(results: Results) -> Iterator[Remark]:
+    """Which fidelity answered what a study without a tolerance leaves open."""
+    decisions = results.plan.decisions.values()
+    chosen = [decision for decision in decisions if decision.is_chosen]
+    if not chosen or results.study.tolerance is not None:
+        return
+    names = dict.fromkeys(item.fidelity.name for item in chosen if item.fidelity)
+    text = caption(
+        "defaults",
+        names=", ".join(names),
+        error=max(item.known.total for item in chosen),
+        floor=min(spread.floors().values()),
+    )
+    yield Remark("The method was chosen by default.", text)
+
+
+def _tolerance(results: Results, piles: pd.DataFrame) -> Iterator[Remark]:
+    """Whether the model's own intervals are wider than the tolerance."""
+    tolerance = results.study.tolerance
+    rows = piles.dropna(subset=["shields", "shields_model_low"])
+    if not tolerance or rows.empty:
+        return
+    low = 1 - rows["shields_model_low"] / rows["shields"]
+    high = rows["shields_model_high"] / rows["shields"] - 1
+    narrowest = float(((low + high) / 2).min())
+    if tolerance >= narrowest:
+        return
+    text = caption(
+        "tolerance",
+        tolerance=tolerance,
+        ends=(low.max(), high.max()),
+        share=rows["model_share"].mode().iloc[0],
+    )
+    yield Remark("The tolerance is about numerics.", text)

@@ -1,0 +1,357 @@
+"""Cards of single grains, and what all cards need: units, measured values, worth.
+
+Rows are those of tables, or mappings with the same columns: nothing here loads pandas,
+which the command `threshold` does without.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from orchestrator.physics.beside import FIELD
+from orchestrator.physics.velocity import measurable_speeds
+from orchestrator.report.card import Card, Number, Worth, decimals
+from orchestrator.report.subjects import (
+    MEAN,
+    STRESS,
+    USTAR,
+    WIND,
+    Quantity,
+    fluid,
+    is_gas,
+    length,
+    solid,
+)
+
+Row = Any
+"""A row of a table with the columns of its scene, or a mapping with them."""
+NEAR = 1.1
+"""Factor from the measured friction velocity up to which no correction is named, where
+the measurements have no range."""
+
+
+def card(row: Row, holding: Mapping[str, float]) -> Card:
+    """Make the card of one grain.
+
+    Parameters
+    ----------
+    row
+        Its threshold.
+    holding
+        Friction velocities, m/s, by the force laws that hold.
+
+    Returns
+    -------
+    Card
+        With speed, friction velocity and stress.
+    """
+    told = quantity(row)
+    size = length(float(row["d_m"]))
+    ending = " and go on" if isinstance(row.get("decides"), str) else ""
+    return Card(
+        f"At which {told.flow} does a grain of {size} start to move{ending}?",
+        _scene_of_grain(row),
+        numbers_of_grain(row, told, holding),
+        source(row, told),
+        worth(row),
+    )
+
+
+def known(value: Any) -> float:
+    """Read a number of a row.
+
+    Parameters
+    ----------
+    value
+        The number, or None where a row of several kinds of values has none.
+
+    Returns
+    -------
+    float
+        The number; NaN for None.
+    """
+    return math.nan if value is None else float(value)
+
+
+def quantity(row: Row) -> Quantity:
+    """Choose what the flow of a row is told by: wind, mean velocity, or stress."""
+    if is_gas(float(row["rho_f_kg_m3"])):
+        return WIND
+    return MEAN if known(row.get(MEAN.column())) > 0 else STRESS
+
+
+def in_unit(row: Row, ustar: float, told: Quantity) -> float:
+    """Convert a friction velocity of a row to the quantity that its flow is told by.
+
+    Parameters
+    ----------
+    row
+        A threshold with the columns of its scene.
+    ustar
+        Undisturbed friction velocity, m/s.
+    told
+        The quantity.
+
+    Returns
+    -------
+    float
+        In the unit of the quantity; NaN where the flow has none.
+    """
+    if told is USTAR:
+        return ustar
+    if told is STRESS:
+        return float(row["rho_f_kg_m3"]) * ustar**2
+    depth = row["depth_m"]
+    speeds = measurable_speeds(
+        ustar,
+        roughness=float(row["z0_m"]),
+        density=float(row["rho_f_kg_m3"]),
+        viscosity=float(row["nu_m2_s"]),
+        depth=known(depth),
+        closed=row.get("flow_top") == "closed channel",
+    )
+    return float(speeds[told.column()])
+
+
+def measured_ustar(row: Row, ustar: float) -> float:
+    """Find the undisturbed friction velocity with the measured threshold of a grain.
+
+    Parameters
+    ----------
+    row
+        A threshold with the columns of its scene.
+    ustar
+        The computed friction velocity, m/s.
+
+    Returns
+    -------
+    float
+        That of the same flow, m/s.
+    """
+    measured = known(row["measured_level_ustar_m_s"])
+    if is_level(row):
+        return measured
+    return ustar * measured / float(row["level_ustar_m_s"])
+
+
+def is_level(row: Row) -> bool:
+    """Whether the bed of a row is level, with one stress everywhere."""
+    is_shape = not isinstance(row.get("profile"), str)
+    return row.get("bed_shape") == "flat" and is_shape
+
+
+def place_of(quantity_: Quantity, row: Row) -> str:
+    """Where a quantity of a row's flow is measured, in words."""
+    if quantity_ is MEAN:
+        return f"over a depth of {row['depth_m']:g} m"
+    if quantity_ is WIND and not is_level(row) and row["bed"] == "pile":
+        return "10 m above the flat ground upwind"
+    return quantity_.place
+
+
+def _scene_of_grain(row: Row) -> str:
+    """One line on a grain and its bed."""
+    alpha = float(row["alpha_deg"])
+    bed = "a level bed of its like"
+    if alpha > 0:
+        bed = f"a bed of its like that rises by {alpha:g}°"
+    within = fluid(float(row["rho_f_kg_m3"]), float(row["nu_m2_s"]))
+    grain = solid(float(row["rho_sol_kg_m3"]))
+    dry = "dry " if is_gas(float(row["rho_f_kg_m3"])) else ""
+    return f"One {dry}grain of {grain} on {bed}, in {within}."
+
+
+def numbers_of_grain(
+    row: Row, told: Quantity, holding: Mapping[str, float]
+) -> tuple[Number, ...]:
+    """Make the figures of one grain.
+
+    Parameters
+    ----------
+    row
+        Its threshold.
+    told
+        What its flow is told by.
+    holding
+        Friction velocities by the laws that hold.
+
+    Returns
+    -------
+    tuple of Number
+        Speed, friction velocity and stress, each with the tested interval, or else the
+        range of the laws that hold.
+    """
+    ustar = float(row["ustar0_m_s"])
+    theta = float(row["shields"])
+    low = min(holding.values(), default=math.nan)
+    high = max(holding.values(), default=math.nan)
+    of_what = f"the {len(holding)} force laws that hold here"
+    if row["tested_rows"] > 0:
+        low = ustar * math.sqrt(float(row["tested_low"]) / theta)
+        high = ustar * math.sqrt(float(row["tested_high"]) / theta)
+        share = f"{row['tested_held']:.0%}".replace("%", " %")
+        of_what = f"it held {share} of {row['tested_rows']:.0f} measured thresholds"
+    elif len(holding) < 2:
+        low = high = math.nan
+    measured = measured_ustar(row, ustar)
+    notes = {
+        WIND: "10 m above bare, level ground",
+        MEAN: place_of(MEAN, row) if told is MEAN else "",
+        USTAR: "the pull of the flow on the ground, written as a speed",
+        STRESS: f"that pull on each square metre; Shields number, the stress over the "
+        f"weight of one layer of grains: {theta:.3g}",
+    }
+    shown = [each for each in (told, USTAR, STRESS) if each is not STRESS]
+    numbers = []
+    for each in (*dict.fromkeys(shown), STRESS):
+        ends = (low, high, measured)
+        low_, high_, measured_ = (in_unit(row, end, each) for end in ends)
+        numbers.append(
+            Number(
+                in_unit(row, ustar, each),
+                each.unit,
+                each.name if each is not STRESS else "stress of the flow on the bed",
+                notes[each],
+                low=low_,
+                high=high_,
+                interval_of=of_what if each is (*shown, STRESS)[0] else "",
+                measured=measured_,
+            )
+        )
+    return tuple(numbers)
+
+
+def source(row: Row, told: Quantity, ustar: float | None = None) -> str:
+    """Say where the measured values of a card are from.
+
+    Parameters
+    ----------
+    row
+        A threshold with the columns of its scene.
+    told
+        What its flow is told by.
+    ustar
+        The flow that field measurements are told of, m/s; by default that of the row.
+
+    Returns
+    -------
+    str
+        The sentences.
+    """
+    if math.isnan(known(row["measured_level_ustar_m_s"])):
+        return "No measurement is near."
+    ustar = float(row["ustar0_m_s"]) if ustar is None else ustar
+    size = length(float(row["d_m"]))
+    alike = "" if row["bed"] == "grain" else "this bed with "
+    if is_level(row) or row["bed"] == "grain":
+        alike = ""
+    if is_gas(float(row["rho_f_kg_m3"])):
+        said = (
+            f"Squares: {alike}the threshold that wind tunnels measured on level beds "
+        )
+        said += f"of grains of {size} (Shao and Lu 2000)."
+        return f"{said} {_field(row, told, ustar)}"
+    if row["measured_rows"] > 0:
+        rows = f"{row['measured_rows']:.0f} rows of flumes"
+        ends = f"{row['measured_low']:.3f} … {row['measured_high']:.3f}"
+        return (
+            f"Squares: {alike}the median of {rows} at this Re*, level beds, by eye "
+            f"(Buffington and Montgomery 1997); 80 % of them have Shields numbers of "
+            f"{ends}."
+        )
+    return (
+        f"Squares: {alike}the curve of Soulsby and Whitehouse (1997) through flume "
+        f"data; no flume of the compilation has rows at Re* {row['reynolds']:.3g}."
+    )
+
+
+def _field(row: Row, told: Quantity, ustar: float) -> str:
+    """What the field sites would give, or why none is near."""
+    if not row["measured_rows"] > 0:
+        return "No field site is near: those have sand of 0.40 to 0.53 mm in air."
+    computed = float(row["level_ustar_m_s"])
+    density = float(row["rho_f_kg_m3"])
+    excess = (float(row["rho_sol_kg_m3"]) - density) * float(row["g_m_s2"])
+    ends = []
+    for theta in (row["measured_low"], row["measured_high"]):
+        of_grain = math.sqrt(float(theta) * excess * float(row["d_m"]) / density)
+        there = of_grain if is_level(row) else ustar * of_grain / computed
+        ends.append(in_unit(row, there, told))
+    places = decimals(ends[0])
+    low, high = (f"{end:.{places}f}" for end in ends)
+    sites = f"{len(FIELD)} field sites (Martin and Kok 2018)"
+    return f"{sites} would give {low} … {high} {told.unit}."
+
+
+def worth(row: Row, few: bool = False) -> Worth:
+    """Say what an answer is worth.
+
+    Parameters
+    ----------
+    row
+        A threshold with the columns of its scene, as table rows have them.
+    few
+        Whether some of its numbers stand on fewer than ten grains.
+
+    Returns
+    -------
+    Worth
+        Not usable where no law holds or another reason is against it; with a correction
+        where the computed threshold of one grain is outside what was measured.
+    """
+    if not row["usable"]:
+        reason, *others = str(row["why_not"]).split("; ")
+        remedies = [part for part in others if part.startswith("choose ")]
+        has_remedy = reason.endswith(")") and " (" in reason
+        if has_remedy:
+            reason, _, remedy = reason.removesuffix(")").rpartition(" (")
+            remedies.insert(0, remedy)
+        return Worth("bad", f"not usable: {reason}", _sentence("; ".join(remedies)))
+    if few:
+        advice = (
+            "Fewer than ten grains stand for some sizes; ask for more beds (seeds)."
+        )
+        return Worth("care", "usable, with doubt where grains are few", advice)
+    if is_measured(row):
+        return Worth("good", "usable", "It is within what was measured on level beds.")
+    what = "wind" if is_gas(float(row["rho_f_kg_m3"])) else "flow"
+    hold = "" if is_level(row) or row["bed"] == "grain" else "The place holds; "
+    take = f"for a {what} take the measured value; to compare beds, this one."
+    return Worth("care", "usable, with a correction", _sentence(f"{hold}{take}"))
+
+
+def is_measured(row: Row) -> bool:
+    """Whether the computed threshold of one grain on a level bed is as measured.
+
+    Parameters
+    ----------
+    row
+        A threshold with the columns of its scene.
+
+    Returns
+    -------
+    bool
+        Whether its tested interval contains the measured value, or it is within the
+        range of the measured rows, the curve included; where there are neither, within
+        a factor of `NEAR` of the curve.
+    """
+    computed = float(row["level_ustar_m_s"])
+    measured = known(row["measured_level_ustar_m_s"])
+    if row["tested_rows"] > 0:
+        theta = (measured / computed) ** 2 * float(row["shields"])
+        if row["tested_low"] <= theta <= row["tested_high"]:
+            return True
+    if not row["measured_rows"] > 0:
+        return measured / NEAR <= computed <= NEAR * measured
+    density = float(row["rho_f_kg_m3"])
+    excess = (float(row["rho_sol_kg_m3"]) - density) * float(row["g_m_s2"])
+    theta = density * computed**2 / (excess * float(row["d_m"]))
+    ends = (row["measured_low"], row["measured_high"], row["measured_curve"])
+    return bool(min(ends) <= theta <= max(ends))
+
+
+def _sentence(text: str) -> str:
+    """A text with a capital at its beginning and one point at its end."""
+    if not text:
+        return ""
+    return f"{text[0].upper()}{text[1:].rstrip('.')}."

@@ -1,0 +1,124 @@
+"""Plain words for grains, fluids and flows, for answer cards; nothing here is slow."""
+
+import math
+from typing import NamedTuple
+
+from orchestrator.physics.constants import GAS_BELOW
+from orchestrator.physics.fluids import PAPER
+
+SIZES = (
+    (6.3e-5, "silt"),
+    (2e-3, "sand"),
+    (6.4e-2, "gravel"),
+    (math.inf, "cobbles"),
+)
+"""Names of grains below some diameters, m, as in soil mechanics (ISO 14688)."""
+QUARTZ = 2650.0
+"""Density of quartz, kg/m3."""
+AIR = ((0.9, 1.5), (1.1e-5, 2.0e-5))
+"""Densities (kg/m3) and viscosities (m2/s) of air near the ground."""
+WATER = ((985.0, 1035.0), (5e-7, 2e-6))
+"""The same of water in rivers and the sea."""
+TERMS = {
+    "u*": "friction velocity: the pull of the flow on the ground, written as a speed, "
+    "√(stress ÷ density of the fluid)",
+    "shields": "Shields number: the stress on the bed over the weight of one layer of "
+    "grains",
+    "re": "Re*: the size of a grain over the thickness of the film at the ground in "
+    "which viscosity rules",
+}
+"""Terms in plain words."""
+
+
+class Quantity(NamedTuple):
+    """What a flow is told by.
+
+    Attributes
+    ----------
+    stem
+        Its column, without ending and unit.
+    unit
+        Its unit.
+    flow
+        The flow that has it, in questions: wind, flow.
+    name
+        The quantity in words.
+    place
+        Where it is measured.
+    """
+
+    stem: str
+    unit: str
+    flow: str
+    name: str
+    place: str
+
+    def column(self, end: str = "") -> str:
+        """Its column with an ending such as ``_low``."""
+        unit = {"m/s": "m_s", "Pa": "pa"}[self.unit]
+        return f"{self.stem}{end}_{unit}"
+
+
+WIND = Quantity("wind_10m", "m/s", "wind", "wind", "10 m above the ground")
+MEAN = Quantity("mean_velocity", "m/s", "flow", "mean velocity", "over the depth")
+STRESS = Quantity("stress", "Pa", "flow", "stress", "of the flow on the bed")
+USTAR = Quantity("ustar0", "m/s", "flow", "friction velocity", "of the flow upstream")
+
+
+def is_gas(density: float) -> bool:
+    """Whether a fluid is a gas, by its density, kg/m3."""
+    return density < GAS_BELOW
+
+
+def fluid(density: float, viscosity: float) -> str:
+    """Name a fluid.
+
+    Parameters
+    ----------
+    density
+        Its density, kg/m3.
+    viscosity
+        Its kinematic viscosity, m2/s.
+
+    Returns
+    -------
+    str
+        Its name with an article where it needs one, and its numbers where it has none.
+
+    Examples
+    --------
+    >>> fluid(1.225, 1.46e-5), fluid(1000.0, 1e-6), fluid(1.0, 1e-5)
+    ('air', 'water', "the paper's gas (1 kg/m³, 1e-05 m²/s), close to air")
+    """
+    numbers = f"{density:g} kg/m³, {viscosity:.3g} m²/s"
+    if (density, viscosity) == PAPER:
+        return f"the paper's gas ({numbers}), close to air"
+    for name, (densities, viscosities) in (("air", AIR), ("water", WATER)):
+        is_dense = densities[0] <= density <= densities[1]
+        is_viscous = viscosities[0] <= viscosity <= viscosities[1]
+        if is_dense and is_viscous:
+            return name
+    return f"a {'gas' if is_gas(density) else 'liquid'} of {numbers}"
+
+
+def length(metres: float) -> str:
+    """Write a length: in metres from 1 m on, else in millimetres.
+
+    Examples
+    --------
+    >>> length(40.0), length(3e-4)
+    ('40 m', '0.3 mm')
+    """
+    if abs(metres) >= 1:
+        return f"{metres:.3g} m"
+    return f"{1e3 * metres:.3g} mm"
+
+
+def kind_of_grain(diameter: float) -> str:
+    """Name grains of a diameter, m: silt, sand, gravel, cobbles."""
+    return next(name for limit, name in SIZES if diameter < limit)
+
+
+def solid(density: float) -> str:
+    """Name what grains of a density (kg/m3) are of."""
+    return "quartz" if density == QUARTZ else f"{density:g} kg/m³"

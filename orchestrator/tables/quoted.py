@@ -1,0 +1,169 @@
+"""Thresholds in the units that a report quotes: speeds and stresses, with intervals.
+
+Beside each stands what a measured threshold gives: the same flow, with the measured
+threshold of one grain on a level bed in place of the computed one.
+"""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from orchestrator.physics.constants import GAS_BELOW
+from orchestrator.physics.threshold import thresholds_of
+from orchestrator.physics.velocity import measurable_speeds
+from orchestrator.types import FloatArray
+
+ENDS = ("_low", "_high")
+"""Endings of the columns of an interval, before the unit."""
+SPEEDS = ("wind_10m", "mean_velocity")
+"""Speeds of which the interval and the measured value are told, without the unit."""
+LEVEL_GRAIN = (
+    "d_m",
+    "z0_m",
+    "rho_f_kg_m3",
+    "nu_m2_s",
+    "alpha_s",
+    "rho_sol_kg_m3",
+    "alpha_deg",
+    "beta_deg",
+    "g_m_s2",
+    "cohesion_n_m",
+)
+"""Columns of all that the closed form depends on, in the order of `SingleGrain`."""
+
+
+def quoted(rows: pd.DataFrame) -> dict[str, FloatArray]:
+    """Compute the columns that reports quote.
+
+    The ends of an interval of the Shields number are those of a stress: u*_0 goes with
+    its root. Measured values are u*_0 times the ratio of the measured friction velocity
+    of one grain on a level bed to the computed one. On a level bed under its
+    undisturbed flow every grain has the measured threshold itself.
+
+    Parameters
+    ----------
+    rows
+        Thresholds of piles or of single grains, with the columns of their scenes and
+        those of `beside`.
+
+    Returns
+    -------
+    dict of str to ndarray
+        Stress of the undisturbed flow, Pa; ends of u*_0, of the wind at 10 m, of the
+        mean velocity (m/s) and of that stress; the same with the measured threshold.
+        NaN where there is none.
+    """
+    ustar = _ustar(rows)
+    density = rows["rho_f_kg_m3"].to_numpy(float)
+    columns = {"stress_pa": density * ustar**2}
+    for end, at in zip(ENDS, _interval(rows, ustar), strict=True):
+        columns |= _in_units(rows, at, end)
+    level = _level_ustar(rows)
+    measured = {}
+    for name in ("curve", "median", "low", "high"):
+        theta = rows[f"measured_{name}"].to_numpy(float)
+        measured[name] = np.sqrt(theta * _weight(rows) / density)
+    best = measured["curve"]
+    is_liquid = density >= GAS_BELOW
+    has_rows = is_liquid & np.isfinite(measured["median"])
+    best = np.where(has_rows, measured["median"], best)
+    columns["level_ustar_m_s"] = level
+    columns["measured_level_ustar_m_s"] = best
+    is_flat = _is_flat(rows)
+    for name, of_grain in {
+        "": best,
+        "_low": measured["low"],
+        "_high": measured["high"],
+    }.items():
+        there = np.where(is_flat, of_grain, ustar * of_grain / level)
+        columns |= {f"measured_{k}": v for k, v in _in_units(rows, there, name).items()}
+    if "first_ustar0_m_s" in rows:
+        first = rows["first_ustar0_m_s"].to_numpy(float)
+        columns["measured_first_ustar0_m_s"] = np.where(
+            is_flat, best, first * best / level
+        )
+    return columns
+
+
+def _ustar(rows: pd.DataFrame) -> FloatArray:
+    """Friction velocity of the undisturbed flow at each threshold, m/s."""
+    if "ustar0_m_s" in rows:
+        return rows["ustar0_m_s"].to_numpy(float)
+    is_dem = (rows["method"] == "dem").to_numpy()
+    return np.where(is_dem, rows["ustar_m_s"], rows["ustar_closed_form_m_s"])
+
+
+def _interval(rows: pd.DataFrame, ustar: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Ends of the friction velocity, m/s; of a pile by its Shields number."""
+    if "shields_low" not in rows:
+        low = rows["ustar_low_m_s"].to_numpy(float)
+        high = rows["ustar_high_m_s"].to_numpy(float)
+        return low, high
+    theta = rows["shields"].to_numpy(float)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        low = ustar * np.sqrt(rows["shields_low"].to_numpy(float) / theta)
+        high = ustar * np.sqrt(rows["shields_high"].to_numpy(float) / theta)
+    return low, high
+
+
+def _in_units(rows: pd.DataFrame, ustar: FloatArray, end: str) -> dict[str, FloatArray]:
+    """A friction velocity (m/s) with its speeds and its stress, by column."""
+    speeds = _speeds_of(rows, ustar)
+    density = rows["rho_f_kg_m3"].to_numpy(float)
+    columns = {
+        f"ustar0{end}_m_s": ustar,
+        f"stress{end}_pa": density * ustar**2,
+    }
+    for name in SPEEDS:
+        columns[f"{name}{end}_m_s"] = speeds[f"{name}_m_s"]
+    return columns
+
+
+def _speeds_of(rows: pd.DataFrame, ustar: FloatArray) -> dict[str, FloatArray]:
+    """The measurable speeds of undisturbed flows of some friction velocities, m/s."""
+    is_closed = (rows["flow_top"] == "closed channel").to_numpy()
+    parts = []
+    for closed in (False, True):
+        speeds = measurable_speeds(
+            ustar,
+            roughness=rows["z0_m"].to_numpy(float),
+            density=rows["rho_f_kg_m3"].to_numpy(float),
+            viscosity=rows["nu_m2_s"].to_numpy(float),
+            depth=rows["depth_m"].to_numpy(float),
+            closed=closed,
+        )
+        parts.append(speeds)
+    is_open, is_shut = parts
+    return {
+        name: np.where(is_closed, is_shut[name], column)
+        for name, column in is_open.items()
+    }
+
+
+def _weight(rows: pd.DataFrame) -> FloatArray:
+    """Weight of a layer of grains under the fluid, (rho_sol - rho_f) g d, Pa."""
+    excess = rows["rho_sol_kg_m3"] - rows["rho_f_kg_m3"]
+    return (excess * rows["g_m_s2"] * rows["d_m"]).to_numpy(float)
+
+
+def _level_ustar(rows: pd.DataFrame) -> FloatArray:
+    """Computed friction velocity of one grain on a level bed by each row's law, m/s."""
+    level = rows.assign(alpha_deg=0.0)
+    found = np.full(len(rows), np.nan)
+    for law in rows["force_law"].unique():
+        is_of_law = (rows["force_law"] == law).to_numpy()
+        grains: list[Any] = list(
+            level.loc[is_of_law, list(LEVEL_GRAIN)].itertuples(index=False, name=None)
+        )
+        at = [each.friction_velocity for each in thresholds_of(str(law), grains)]
+        found[is_of_law] = np.array(at, float)
+    return found
+
+
+def _is_flat(rows: pd.DataFrame) -> Any:
+    """Whether each bed is level, so that its flow has one stress everywhere."""
+    if "bed_shape" not in rows:
+        return np.zeros(len(rows), bool)
+    is_flat = (rows["bed_shape"] == "flat") & rows["profile"].isna()
+    return is_flat.to_numpy()
