@@ -1,7 +1,7 @@
 """When does a sediment grain, or a whole bedform of grains, start to move?
 
-A study file goes in; OpenFOAM and LIGGGHTS cases, tables, figures and a page come out. Three
-functions are public: `threshold`, `run` and `open`.
+A study file goes in; OpenFOAM and LIGGGHTS cases, tables, figures and a page come out.
+Three functions are public: `threshold`, `run` and `open`.
 """
 
 from typing import TYPE_CHECKING, Any

@@ -24,8 +24,49 @@ if TYPE_CHECKING:
     from orchestrator.pipeline import Finished
 
 
+COMMANDS = {
+    "study": "run what is missing of a study, and draw it",
+    "status": "what of a study is done, running, failed and why",
+    "report": "draw tables, figures and page of a study again",
+    "gallery": "one page over the studies that a directory holds",
+    "prune": "drop the large files of finished cases; a rerun makes them anew",
+    "ladder": "what each model costs and how far it is off",
+    "budget": "what the choices are worth that all models share",
+    "stability": "for developers: maps of where each method fails",
+    "validate": "the models beside what was measured",
+    "erosion": "what wind takes from a stockpile, by its solved flow and by AP-42",
+    "doctor": "are the solvers here, can it draw; what to install",
+}
+"""Commands that this module adds, with what each does."""
+RUNNING = {
+    "study": "first-look",
+    "ladder": "ladder",
+    "budget": "budget",
+    "stability": "",
+    "validate": "validate",
+    "erosion": "stockpile",
+}
+"""Those that run cases, with the preset that each runs by default."""
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit code: 0 only if all that was asked for was done."""
+    """Run one command.
+
+    Parameters
+    ----------
+    arguments
+        The words of the command, by default those that the program was called with.
+
+    Returns
+    -------
+    int
+        The exit code: 0 only if all that was asked for was done.
+
+    Raises
+    ------
+    Exception
+        If it is none of this program's own: a fault of the program.
+    """
     # fewer searches for unreachable cycles: 6 % less time for the plan of 375 cases
     gc.set_threshold(100_000)
     terminal.listen()
@@ -55,95 +96,84 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _say(message: object) -> None:
+    """Print a message of this program."""
     print(f"orchestrator: {message}", file=sys.stderr)
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser of options that are written in full; of an unknown one it names the nearest."""
+    """A parser that names the nearest option in place of an unknown one."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**{**settings, "allow_abbrev": False})
 
     def parse_known_args(self, args: Any, namespace: Any = None) -> Any:  # type: ignore[override]
         """Refuse an unknown option first: another may be missing because of it."""
-        names = {word.partition("=")[0] for word in args if word.startswith("--")} - {
-            "--"
-        }
-        # what follows a command is its own parser's
-        for name in () if self._subparsers else names - {*self._option_string_actions}:
-            near = difflib.get_close_matches(name, self._option_string_actions, 1)
+        if not self._subparsers:  # what follows a command is its own parser's
+            self._refuse_unknown(args)
+        return super().parse_known_args(args, namespace)
+
+    def _refuse_unknown(self, args: Sequence[str]) -> None:
+        """Refuse an option that the parser does not know."""
+        known = self._option_string_actions
+        for word in args:
+            name = word.partition("=")[0]
+            if not name.startswith("--") or name == "--" or name in known:
+                continue
+            near = difflib.get_close_matches(name, known, 1)
             advice = f"did you mean {near[0]}?" if near else "--help lists all"
             self.error(f"there is no option {name}: {advice}")
-        return super().parse_known_args(args, namespace)
 
 
 def _parser() -> argparse.ArgumentParser:
+    """The parser of all commands."""
     about = "When does a sediment grain, or a whole bedform of grains, start to move?"
     parser = _Parser(prog="orchestrator", description=about)
     parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=True, metavar="command")
-    for name, run, text in (
-        ("study", _study, "run what is missing of a study, and draw it"),
-        ("status", _other, "what of a study is done, running, failed and why"),
-        ("report", _other, "draw tables, figures and page of a study again"),
-        ("gallery", _other, "one page over the studies that a directory holds"),
-        (
-            "prune",
-            _other,
-            "drop the large files of finished cases; a rerun makes them anew",
-        ),
-        ("ladder", _study, "what each model costs and how far it is off"),
-        ("budget", _study, "what the choices are worth that all models share"),
-        ("stability", _study, "for developers: maps of where each method fails"),
-        ("validate", _study, "the models beside what was measured"),
-        (
-            "erosion",
-            _study,
-            "what wind takes from a stockpile, by its solved flow and by AP-42",
-        ),
-        ("doctor", _other, "are the solvers here, can it draw; what to install"),
-    ):
+    for name, text in COMMANDS.items():
         command = commands.add_parser(name, help=text)
+        run = _study if name in RUNNING else _other
         command.set_defaults(run=run, command=name, tolerance=None)
-        add = command.add_argument
-        if run == _other and name != "doctor":
-            add("directory", type=Path, metavar="DIR")
+        if name in RUNNING:
+            _add_run_options(command, RUNNING[name])
+        elif name != "doctor":
+            command.add_argument("directory", type=Path, metavar="DIR")
         if name == "report":
-            add(
-                "--all",
-                action="store_true",
-                help="draw the figures too that it folds away",
-            )
-        if run == _study:
-            if name != "stability":
-                preset = {"study": "first-look", "erosion": "stockpile"}.get(name, name)
-                add("source", nargs="?", default=preset, metavar="FILE|PRESET")
-            count = os.cpu_count() or 1
-            add("--out", type=Path, metavar="DIR", help="default: results/NAME")
-            add(
-                "--workers",
-                type=whole_number,
-                default=count,
-                metavar="N",
-                help="cases at a time",
-            )
-            add(
-                "--plan",
-                action="store_true",
-                help="say what would run, how long, and end",
-            )
+            text = "draw the figures too that it folds away"
+            command.add_argument("--all", action="store_true", help=text)
         if name == "study":
-            text = "error that tau_c may have, such as 0.05: the cheapest models known to be within"
-            add("--tolerance", type=number, metavar="X", help=text)
-            text = "run the cases in jobs of a queue: %(choices)s; settings in the file's [cluster]"
-            add("--cluster", choices=sorted(SYSTEMS), metavar="QUEUE", help=text)
+            _add_study_options(command)
             calculator.add(commands)
     benchmark.add(commands)
     return parser
 
 
+def _add_run_options(command: argparse.ArgumentParser, preset: str) -> None:
+    """Add the options of a command that runs cases, on a study if it has a preset."""
+    add = command.add_argument
+    if preset:
+        add("source", nargs="?", default=preset, metavar="FILE|PRESET")
+    add("--out", type=Path, metavar="DIR", help="default: results/NAME")
+    count = os.cpu_count() or 1
+    text = "cases at a time"
+    add("--workers", type=whole_number, default=count, metavar="N", help=text)
+    text = "say what would run, how long, and end"
+    add("--plan", action="store_true", help=text)
+
+
+def _add_study_options(command: argparse.ArgumentParser) -> None:
+    """Add the options of the command that runs a study."""
+    text = "the cheapest models known to be within"
+    text = f"error that tau_c may have, such as 0.05: {text}"
+    command.add_argument("--tolerance", type=number, metavar="X", help=text)
+    text = "settings in the file's [cluster]"
+    text = f"run the cases in jobs of a queue: %(choices)s; {text}"
+    queues = sorted(SYSTEMS)
+    command.add_argument("--cluster", choices=queues, metavar="QUEUE", help=text)
+
+
 def _study(options: Namespace) -> int:
-    """Run a study, or an experiment: but for the maps of stability, on scenes of a study."""
+    """Run a study, or an experiment on a study or, for stability, on its own scenes."""
     is_study = options.command == "study"
     if is_study and not options.plan:
         answered = finished(options)
@@ -177,9 +207,20 @@ def _study(options: Namespace) -> int:
 
 
 def finished(options: Namespace) -> tuple[str, Path] | None:
-    """The answer and the page of a study that was finished before; None if it is not.
+    """Look up a study that was finished before.
 
-    No study is read: the bytes of its files are compared with those that it was made from.
+    No study is read: the bytes of its files are compared with those that it was made
+    from.
+
+    Parameters
+    ----------
+    options
+        The options of the command ``study``.
+
+    Returns
+    -------
+    answer, page : tuple, or None
+        The answer and the file of the page; None if it was not finished.
     """
     from orchestrator.runs import workspace
     from orchestrator.study.source import Source, digests_now, find
@@ -212,11 +253,10 @@ def _other(options: Namespace) -> int:
 
     if options.command == "report":
         return _end(pipeline.redraw(options.directory, every=options.all))
-    print(
-        (gallery.write if options.command == "gallery" else pipeline.prune)(
-            options.directory
-        )
-    )
+    if options.command == "gallery":
+        print(gallery.write(options.directory))
+    else:
+        print(pipeline.prune(options.directory))
     return 0
 
 

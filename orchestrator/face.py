@@ -20,30 +20,24 @@ from orchestrator.runs.workspace import Workspace
 from orchestrator.study import study
 
 FIRST = (
-    *(
-        "d_m",
-        "alpha_deg",
-        "rho_f_kg_m3",
-        "force_law",
-        "fraction",
-        "shields",
-        "shields_low",
-    ),
-    *(
-        "shields_high",
-        "shields_closed_form",
-        "shields_dem",
-        "ustar0_m_s",
-        "ustar_closed_form_m_s",
-    ),
-    *(
-        "ustar_m_s",
-        "wind_10m_m_s",
-        "current_1m_m_s",
-        "mean_velocity_m_s",
-        "usable",
-        "why_not",
-    ),
+    "d_m",
+    "alpha_deg",
+    "rho_f_kg_m3",
+    "force_law",
+    "fraction",
+    "shields",
+    "shields_low",
+    "shields_high",
+    "shields_closed_form",
+    "shields_dem",
+    "ustar0_m_s",
+    "ustar_closed_form_m_s",
+    "ustar_m_s",
+    "wind_10m_m_s",
+    "current_1m_m_s",
+    "mean_velocity_m_s",
+    "usable",
+    "why_not",
 )
 """Columns of `Opened.thresholds` that come before all others, those that it has."""
 if TYPE_CHECKING:
@@ -62,19 +56,19 @@ def threshold(
 ) -> pd.DataFrame:
     """Thresholds of motion of single grains by the closed form.
 
-    All parameters but `law`, `fluid`, `temperature` and `criterion` are numbers or arrays that broadcast
-    together.
+    All parameters but `law`, `fluid`, `temperature` and `criterion` are numbers or
+    arrays that broadcast together.
 
     Parameters
     ----------
     diameter
         Grain diameter, m.
     law
-        A force law, ``auto`` for `bridged`, or `bridged-gravel` where its drag law ends,
-        ``paper`` for the paper's rule, or None for every law.
+        A force law, ``auto`` for `bridged`, or `bridged-gravel` where its drag law
+        ends, ``paper`` for the paper's rule, or None for every law.
     fluid
-        "water", "seawater" or "air", in place of density and viscosity; the default is the
-        paper's fluid.
+        "water", "seawater" or "air", in place of density and viscosity; the default is
+        the paper's fluid.
     temperature
         Of that fluid, deg C, by default 15.
     criterion
@@ -83,6 +77,8 @@ def threshold(
         stresses, and there are columns of both, of the upper end by the weakest
         rebounds, of the stress at which motion ceases, and of which decides. "auto" is
         "leaves" in the paper's fluid and by its rule, "goes on" in all others.
+    **parameters
+        Any of those below, by their names.
     density, fluid_density
         Densities of the grains (2500) and of the fluid (1), kg/m3.
     viscosity
@@ -104,9 +100,11 @@ def threshold(
 
     Returns
     -------
-    A row for each point of the raveled arrays, or for each point and law, with units in the
-    columns' names; ``valid`` and ``why_not`` say where a law ends. A number that is usual in
-    another unit is asked about in a warning.
+    DataFrame
+        A row for each point of the raveled arrays, or for each point and law, with
+        units in
+    the columns' names; ``valid`` and ``why_not`` say where a law ends. A number that is
+    usual in another unit is asked about in a warning.
 
     Raises
     ------
@@ -143,17 +141,15 @@ def threshold(
 
 
 def _column(name: str, values: Any) -> "NDArray[Any]":
-    """The values of a parameter as an array: numbers, of a roughness also texts as d/30."""
-    refusal = InputError(
-        f"{values!r} is neither a number nor an array of numbers", name
-    )
+    """The values of a parameter as an array: numbers, for a roughness also texts."""
+    what = f"{values!r} is neither a number nor an array of numbers"
+    refusal = InputError(what, name)
     try:
         array = np.asarray(values)
         if name == "roughness" and array.dtype.kind in "UO":
             return np.asarray(values, object)
-        if (
-            array.dtype.kind not in "iufO"
-        ):  # Python makes numbers of texts and of truths
+        if array.dtype.kind not in "iufO":
+            # Python makes numbers of texts and of truths
             raise refusal
         return np.asarray(values, float)
     except (TypeError, ValueError):
@@ -167,14 +163,34 @@ def run(
     workers: int | None = None,
     tolerance: float | None = None,
 ) -> "Opened":
-    """Run what is missing of a study file, or of a preset by its name, draw it, and open it.
+    """Run what is missing of a study, draw it, and open it.
 
-    `out` is its directory, by default ``results/NAME``, `workers` the number of cases at a time, by
-    default one for each processor, and `tolerance` the relative error that thresholds may have. An
-    `InputError` refuses a study that cannot be answered. A `SolverError` says that a solver is
-    missing or that cases failed; what is done stays, and the same call goes on.
+    Parameters
+    ----------
+    source
+        The study file, or the name of a preset.
+    out
+        The directory, by default ``results/NAME``.
+    workers
+        Number of cases at a time, by default one for each processor.
+    tolerance
+        Relative error that thresholds may have.
+
+    Returns
+    -------
+    Opened
+        The study.
+
+    Raises
+    ------
+    InputError
+        If the study cannot be answered.
+    SolverError
+        If a solver is missing or cases failed; what is done stays, and the same call
+        goes on.
     """
-    workers = (os.cpu_count() or 1) if workers is None else workers
+    if workers is None:
+        workers = os.cpu_count() or 1
     if workers < 1:
         raise InputError(f"{workers} is below 1", where="workers")
     asked = study.load(source, tolerance)
@@ -190,7 +206,20 @@ def run(
 def open(directory: str | Path) -> "Opened":
     """Open the directory of a study that was run.
 
-    An `OrchestratorError` if it holds no study or no tables, or these have changed since.
+    Parameters
+    ----------
+    directory
+        The directory.
+
+    Returns
+    -------
+    Opened
+        The study.
+
+    Raises
+    ------
+    OrchestratorError
+        If it holds no study or no tables, or these have changed since.
     """
     space = Workspace(Path(directory).absolute())
     asked, planned = pipeline.reopen(space)
@@ -198,25 +227,36 @@ def open(directory: str | Path) -> "Opened":
 
 
 class Opened:
-    """A study that was run: its directory, page and title, and every table by its name.
+    """A study that was run; `run` and `open` make one.
 
-    Tables are DataFrames with SI units in the columns' names; `plot.shields()` draws the extended
-    Shields diagram.
+    Attributes
+    ----------
+    directory
+        The directory.
+    page
+        The file of its page.
+    title
+        Its title.
+    tables
+        Every table by its name, with SI units in the names of columns.
+    plot
+        ``plot.shields()`` draws the extended Shields diagram.
     """
 
     def __init__(self, results: Results) -> None:
-        self._results, self.plot = results, SimpleNamespace(shields=self._shields)
-        self.directory, self.page = (
-            results.cases.parent,
-            results.cases.parent / report.PAGE,
-        )
-        self.title, self.tables = results.study.title, dict(results.tables)
+        self._results = results
+        self.directory = results.cases.parent
+        self.page = self.directory / report.PAGE
+        self.title = results.study.title
+        self.tables = dict(results.tables)
+        self.plot = SimpleNamespace(shields=self._shields)
 
     @property
     def thresholds(self) -> pd.DataFrame:
-        """The thresholds of the piles, or else of the single grains, beside their scenes.
+        """The thresholds of the piles, or else of single grains, beside their scenes.
 
-        First come the columns that tell points apart, then threshold, speeds, and its use.
+        First come the columns that tell points apart, then threshold, speeds, and its
+        use.
         """
         piles = self._results.joined("pile_threshold")
         rows = piles if len(piles) else self._results.joined("single_grain")
@@ -230,28 +270,41 @@ class Opened:
 
     def __repr__(self) -> str:
         """The study in five lines."""
-        rows, scenes = self.thresholds, len(self._results.scenes)
-        usable = (
-            f"{rows['usable'].sum()} of {len(rows)} thresholds are usable"
-            if len(rows)
-            else ""
-        )
+        rows = self.thresholds
+        usable = "no threshold yet"
+        if len(rows):
+            usable = f"{rows['usable'].sum()} of {len(rows)} thresholds are usable"
         lines = [
-            f"{scenes} scenes; {usable or 'no threshold yet'}",
+            self.title,
+            f"{len(self._results.scenes)} scenes; {usable}",
             f"page: {self.page}",
-        ]
-        lines += [
             f"tables: {', '.join(self.tables)}",
             "in words: .answer; as a table: .thresholds",
         ]
-        return "\n".join([self.title, *lines])
+        return "\n".join(lines)
 
     def _repr_html_(self) -> str:
         """The answer with its table, for a notebook."""
         return f"<h3>{escape(self.title)}</h3><pre>{escape(self.answer)}</pre>"
 
     def case(self, name: str) -> Path:
-        """The directory of the one case whose name begins so; else an `InputError`."""
+        """Look up the directory of a case.
+
+        Parameters
+        ----------
+        name
+            The beginning of its name.
+
+        Returns
+        -------
+        Path
+            The directory.
+
+        Raises
+        ------
+        InputError
+            If no case has a name that begins so, or several have.
+        """
         names = [case for case in self._results.plan.cases if case.startswith(name)]
         if len(names) == 1:
             return self._results.cases / names[0]
@@ -259,7 +312,7 @@ class Opened:
         raise InputError(what, str(self.directory), "see the column case")
 
     def _shields(self) -> "Figure":
-        """The extended Shields diagram of the page; an `OrchestratorError` if there is none."""
+        """The extended Shields diagram of the page."""
         from orchestrator.report import shields, style
 
         with style.settings():

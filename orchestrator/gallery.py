@@ -1,11 +1,13 @@
 """One page over several studies: a card each, with its answer and its picture."""
 
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 from orchestrator import face
 from orchestrator.errors import InputError, OrchestratorError
-from orchestrator.report import FIGURES, PAGE, page
+from orchestrator.report import PAGE, page
+from orchestrator.report.style import FIGURES
 from orchestrator.runs.files import Folder
 from orchestrator.runs.workspace import STUDY
 
@@ -15,33 +17,58 @@ PICTURES = ("bed-*.svg", "shields.svg", "*.svg")
 
 
 def write(directory: Path) -> Path:
-    """Write the gallery of the studies in a directory, an `InputError` if there is none."""
+    """Write the gallery of the studies in a directory.
+
+    Parameters
+    ----------
+    directory
+        The directory that holds the directories of the studies.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    InputError
+        If there is no study with a page.
+    """
     cards = []
-    for study in sorted(path.parent for path in directory.glob(f"*/{PAGE}")):
-        if not (study / STUDY.marker).is_file():
-            continue
-        try:
-            opened = face.open(study)
-            title, says = opened.title, opened.answer.split("\n\n")[0].splitlines()
-        except OrchestratorError as error:
-            title, says = study.name, [error.what]
-        figures = [
-            path for name in PICTURES for path in sorted((study / FIGURES).glob(name))
-        ]
-        image = figures[0].read_bytes() if figures else b""
-        about = {
-            "title": title,
-            "directory": study.name,
-            "link": quote(f"{study.name}/{PAGE}"),
-        }
-        cards.append({**about, "says": says, "image": image})
+    for path in sorted(directory.glob(f"*/{PAGE}")):
+        if (path.parent / STUDY.marker).is_file():
+            cards.append(_card(path.parent))
     if not cards:
+        what = "there is no study with a page"
         remedy = "name the directory that holds directories of studies, such as results"
-        raise InputError(
-            "there is no study with a page", where=str(directory), remedy=remedy
-        )
-    path = directory.absolute() / NAME
-    Folder(path.parent).put(
-        NAME, page.fill("gallery.html.j2", title="Studies", cards=cards)
-    )
-    return path
+        raise InputError(what, where=str(directory), remedy=remedy)
+    folder = Folder(directory.absolute())
+    folder.put(NAME, page.fill("gallery.html.j2", title="Studies", cards=cards))
+    return folder.root / NAME
+
+
+def _card(study: Path) -> dict[str, Any]:
+    """What the page shows of a study."""
+    try:
+        opened = face.open(study)
+        title = opened.title
+        first_paragraph, *_ = opened.answer.split("\n\n")
+        says = first_paragraph.splitlines()
+    except OrchestratorError as error:
+        title = study.name
+        says = [error.what]
+    return {
+        "title": title,
+        "directory": study.name,
+        "link": quote(f"{study.name}/{PAGE}"),
+        "says": says,
+        "image": _picture(study / FIGURES),
+    }
+
+
+def _picture(figures: Path) -> bytes:
+    """The figure of a study that its card shows; empty if there is none."""
+    for pattern in PICTURES:
+        for path in sorted(figures.glob(pattern)):
+            return path.read_bytes()
+    return b""

@@ -50,11 +50,32 @@ class Finished(NamedTuple):
 def run(
     study: Study, out: Path, *, workers: int, queue: Queue | None = None
 ) -> Finished:
-    """Run a study, or what is missing of it, in a directory; `workers` cases at a time.
+    """Run a study, or what is missing of it, in a directory.
 
-    A queue of a cluster runs the cases in place of this machine. An `InputError` says that the
-    study cannot be answered or the directory not be used, a `SolverError` that a solver is missing
-    or too old; after `Interrupted`, by the user, every child has ended.
+    Parameters
+    ----------
+    study
+        The study.
+    out
+        The directory.
+    workers
+        Number of cases at a time.
+    queue
+        The queue of a cluster, which runs the cases in place of this machine.
+
+    Returns
+    -------
+    Finished
+        What came out.
+
+    Raises
+    ------
+    InputError
+        If the study cannot be answered or the directory not be used.
+    SolverError
+        If a solver is missing or too old.
+    Interrupted
+        If the user ended it; every child has ended.
     """
     space = Workspace(out.absolute())
     # what cannot be answered is refused before anything is written
@@ -63,9 +84,13 @@ def run(
         changed = _describe(space, study, planned)
         states = planned.done(space.cases)
         todo = planned.missing(space.cases, states)
-        rest = {"queue": queue, "after_s": planned.drawing_s}
         failed = complete(
-            todo, space, workers=workers, limit_s=study.time_limit_s, **rest
+            todo,
+            space,
+            workers=workers,
+            limit_s=study.time_limit_s,
+            queue=queue,
+            after_s=planned.drawing_s,
         )
         failures = _with_advice(failed, planned)
         if todo:
@@ -77,14 +102,16 @@ def run(
         if todo or answer is None:
             print("drawing tables, figures and page", file=sys.stderr)
             answer, undrawn = _draw(study, planned, space, states, failures, False)
-        if changed and (left := space.left(planned.cases)):
-            what = f"the study file has changed: {len(left)} cases are not asked for any more"
+        left = space.left(planned.cases) if changed else []
+        if left:
+            what = f"{len(left)} cases are not asked for any more"
+            what = f"the study file has changed: {what}"
             print(f"{what}; `orchestrator status {out}` names them", file=sys.stderr)
         return Finished(space.page, len(todo), failures, answer, undrawn)
 
 
 def _with_advice(failures: Failures, planned: Plan) -> Failures:
-    """Failures with what to do where levels were chosen: the scenes can be answered otherwise."""
+    """Failures with what to do where the scenes can be answered otherwise."""
     advised = dict(failures)
     for name in planned.chosen & failures.keys():
         error = failures[name]
@@ -94,7 +121,7 @@ def _with_advice(failures: Failures, planned: Plan) -> Failures:
 
 
 def _describe(space: Workspace, study: Study, planned: Plan) -> bool:
-    """Write into the directory what is asked for; whether it is something else than before."""
+    """Write into the directory what is asked for; whether it has changed."""
     about = {"study": study.text, "tolerance": study.tolerance}
     before = read_marker(space.root, STUDY)
     changed = any(before.get(key, value) != value for key, value in about.items())
@@ -109,7 +136,7 @@ def _describe(space: Workspace, study: Study, planned: Plan) -> bool:
 
 
 def _file_of(about: Mapping[str, Any]) -> str:
-    """The study file that a directory was made for, by its description; empty for none."""
+    """The study file of a directory, by its description; empty for none."""
     source = about.get("source")
     return str(source.get("file", "")) if isinstance(source, dict) else ""
 
@@ -120,67 +147,122 @@ def complete(
     *,
     workers: int,
     limit_s: float,
-    **settings: Any,
+    queue: Queue | None = None,
+    after_s: float = 0.0,
 ) -> Failures:
-    """Run cases, each for `limit_s` at most, show their progress, and give the failures.
+    """Run cases, and show their progress.
 
-    Settings are a `queue`, and the time `after_s` that is expected after the runs, s.
+    Parameters
+    ----------
+    todo
+        The cases by their names.
+    space
+        The directory of results.
+    workers
+        Number of cases at a time.
+    limit_s
+        Most time of a case, s.
+    queue
+        The queue of a cluster, which runs the cases in place of this machine.
+    after_s
+        Time that is expected after the runs, s.
+
+    Returns
+    -------
+    dict of str to OrchestratorError
+        The cases that failed, with why.
     """
     if not todo:
         return {}
-    queue, after_s = settings.get("queue"), settings.get("after_s", 0.0)
     pools = partial(cluster.pool, queue) if queue else engine.local
     opened = pools(space.cases, workers=workers, limit_s=limit_s)
-    with (
-        opened as pool,
-        engine.Display(todo.values(), space.cases, workers, after_s) as display,
-    ):
+    shown = engine.Display(todo.values(), space.cases, workers, after_s)
+    with opened as pool, shown as display:
         return engine.run(todo, pool, display, display.watch)
 
 
 def reopen(space: Workspace) -> tuple[Study, Plan]:
-    """The study that a directory was made for, and its plan; an `InputError` if it holds none."""
+    """Read the study that a directory was made for.
+
+    Parameters
+    ----------
+    space
+        The directory.
+
+    Returns
+    -------
+    study, plan
+        The study and its plan.
+
+    Raises
+    ------
+    InputError
+        If it holds none.
+    """
     about = space.description()
+    where = str(space.root)
     if "study" not in about:
-        what, remedy = (
-            f"this is the experiment {about['name']}",
-            "its own command draws it again",
-        )
-        raise InputError(what, str(space.root), remedy)
+        what = f"this is the experiment {about['name']}"
+        raise InputError(what, where, "its own command draws it again")
     # its text has those of the files that it names
     files = Files(None)
-    study = parse(
-        about["study"], name=about["name"], where=str(space.root), files=files
-    )
+    study = parse(about["study"], name=about["name"], where=where, files=files)
     study = replace(study, tolerance=about.get("tolerance"))
     return study, plan.make(study, space.cases)
 
 
 def redraw(out: Path, *, every: bool = False) -> Finished:
-    """Make tables, figures and page anew from the cases that are done; `every` figure, or most."""
+    """Make tables, figures and page anew from the cases that are done.
+
+    Parameters
+    ----------
+    out
+        The directory.
+    every
+        Whether to draw also the figures that the page folds away.
+
+    Returns
+    -------
+    Finished
+        What came out.
+    """
     space = Workspace(out.absolute())
     study, planned = reopen(space)
     with claimed(space.root, STUDY, study.name, new=False):
         states = planned.done(space.cases)
         space.check_cases_of_tables(states)
-        causes = {name: case.failure(space.cases / name)[1] for name in planned.cases}
-        failed = {name: OrchestratorError(why) for name, why in causes.items() if why}
+        failed = {}
+        for name in planned.cases:
+            _, why = case.failure(space.cases / name)
+            if why:
+                failed[name] = OrchestratorError(why)
         failures = _with_advice(failed, planned)
         answer, undrawn = _draw(study, planned, space, states, failures, every)
         return Finished(space.page, 0, failures, answer, undrawn)
 
 
 def prune(directory: Path) -> str:
-    """Drop the large files of finished cases, but for those that the page is drawn from."""
+    """Drop the large files of finished cases, but for those of the page's figures.
+
+    Parameters
+    ----------
+    directory
+        The directory of the study.
+
+    Returns
+    -------
+    str
+        What was dropped, in words.
+    """
     space = Workspace(directory.absolute())
     study, planned = reopen(space)
     with claimed(space.root, STUDY, study.name, new=False):
         done = planned.done(space.cases)
         made = tables.make(study, planned, space.cases, done)
-        shown = report.drawn_from(Results(study, planned, made, space.cases))
-        return workspace.prune(
-            space, {n: planned.cases[n] for n in done}, {c.name for c in shown}
-        )
+        drawn = report.drawn_from(Results(study, planned, made, space.cases))
+        kept = {case.name for case in drawn}
+        finished = {name: planned.cases[name] for name in done}
+        return workspace.prune(space, finished, kept)
 
 
 def _draw(
@@ -193,8 +275,9 @@ def _draw(
 ) -> tuple[str, Sequence[str]]:
     """Write tables, figures and page, and last the marker of what they are made of.
 
-    Returned are the answer, and a line for each figure that could not be drawn. Where a case
-    failed or a figure is missing there is no marker: the same command draws all again.
+    Returned are the answer, and a line for each figure that could not be drawn. Where a
+    case failed or a figure is missing there is no marker: the same command draws all
+    again.
     """
     space.drop(STATE)
     states = {name: done[name] for name in planned.cases if name in done}
@@ -209,9 +292,8 @@ def _draw(
         answer = report.said(results, guests)
         try:
             undrawn = report.write(results, causes, space, guests, every)
-        except (
-            BaseException
-        ):  # no memory for a picture, or an interrupt: the answer is found
+        except BaseException:
+            # no memory for a picture, or an interrupt: the answer is found
             print(answer, file=sys.stderr)
             raise
     terminal.check()

@@ -43,10 +43,10 @@ BY_DEM = (
 class Plan:
     """How the scenes of a study are answered, and by which cases.
 
-    By the id of the scene that was asked for: `decisions`, `piles`, `checks`, piles by DEM that
-    check an answer without DEM, and `smoothings`, noisy profiles with other smoothing, by its
-    factor. Each of the `cells` answers its single grains. `cases` has every run once, by name,
-    after those whose results it needs.
+    By the id of the scene that was asked for: `decisions`, `piles`, `checks`, piles by
+    DEM that check an answer without DEM, and `smoothings`, noisy profiles with other
+    smoothing, by its factor. Each of the `cells` answers its single grains. `cases` has
+    every run once, by name, after those whose results it needs.
     """
 
     decisions: dict[str, Decision]
@@ -139,7 +139,8 @@ def make(study: Study, cases: Path | None = None) -> Plan:
     Raises
     ------
     InputError
-        With the field, for a scene beyond a limit of the methods or a flow that cannot be solved.
+        With the field, for a scene beyond a limit of the methods or a flow that cannot
+        be solved.
     """
     limits.check_study(study)
     decisions = {scene.id: decide(scene, study.tolerance) for scene in study.scenes}

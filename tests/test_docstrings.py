@@ -17,6 +17,8 @@ import pytest
 import orchestrator
 
 PHYSICS = (
+    "orchestrator.physics.fluids",
+    "orchestrator.physics.gusts",
     "orchestrator.physics.curves",
     "orchestrator.physics.laws",
     "orchestrator.physics.measured",
@@ -27,21 +29,29 @@ PHYSICS = (
 """Modules whose public functions have an example each."""
 DESCRIBED = (
     *PHYSICS,
+    "orchestrator.physics.beside",
     "orchestrator.bed.deck",
     "orchestrator.bed.line",
     "orchestrator.bed.packing",
     "orchestrator.bed.poured",
     "orchestrator.benchmark.checks",
+    "orchestrator.benchmark.cli",
+    "orchestrator.benchmark.compare",
     "orchestrator.benchmark.export",
+    "orchestrator.benchmark.judge",
     "orchestrator.benchmark.mechanics",
+    "orchestrator.benchmark.pack",
+    "orchestrator.benchmark.page",
     "orchestrator.benchmark.scenes",
     "orchestrator.calculator",
     "orchestrator.calculator.asked",
     "orchestrator.calculator.cli",
     "orchestrator.calculator.printed",
     "orchestrator.calculator.table",
+    "orchestrator.cli",
     "orchestrator.digits",
     "orchestrator.errors",
+    "orchestrator.face",
     "orchestrator.flow.case",
     "orchestrator.flow.foam",
     "orchestrator.flow.mesh",
@@ -49,10 +59,18 @@ DESCRIBED = (
     "orchestrator.flow.stress",
     "orchestrator.flow.theory",
     "orchestrator.experiments.budget",
+    "orchestrator.experiments.erosion",
+    "orchestrator.experiments.experiment",
     "orchestrator.experiments.sphere",
     "orchestrator.experiments.stability",
     "orchestrator.experiments.strips",
     "orchestrator.experiments.validate",
+    "orchestrator.gallery",
+    "orchestrator.paper",
+    "orchestrator.paper.claims",
+    "orchestrator.paper.evidence",
+    "orchestrator.paper.measures",
+    "orchestrator.pipeline",
     "orchestrator.report",
     "orchestrator.report.labels",
     "orchestrator.report.page",
@@ -60,11 +78,13 @@ DESCRIBED = (
     "orchestrator.report.poured",
     "orchestrator.report.sheets",
     "orchestrator.report.words",
+    "orchestrator.runs.case",
     "orchestrator.runs.cluster",
     "orchestrator.runs.engine",
     "orchestrator.runs.files",
     "orchestrator.runs.process",
     "orchestrator.runs.terminal",
+    "orchestrator.runs.workspace",
     "orchestrator.solvers",
     "orchestrator.solvers.doctor",
     "orchestrator.solvers.liggghts",
@@ -123,7 +143,7 @@ def _sections(thing: Any) -> dict[str, str]:
 
 def _described(section: str) -> set[str]:
     """The names that a section of parameters or attributes describes."""
-    lines = re.findall(r"^(\w[\w, ]*)$", section, flags=re.MULTILINE)
+    lines = re.findall(r"^\*{0,2}(\w[\w, ]*)$", section, flags=re.MULTILINE)
     return {name for line in lines for name in line.split(", ")}
 
 

@@ -1,4 +1,4 @@
-"""The decks of LIGGGHTS: contact law, protocol and cost, files written and dumps read."""
+"""The decks of LIGGGHTS: contact law, protocol, cost, files written and dumps read."""
 
 import math
 from collections.abc import Mapping
@@ -26,14 +26,17 @@ MEANING = {
     "stiffness": "K d/W, normal and tangential; when a bed is poured, of each stage",
     "damping": "ratio of a collision",
     "time_step": "sqrt(m/K)",
-    "waiting_time": "time without a passage that ends a load step without rest, sqrt(d/g')",
-    "rest_energy": "kinetic energy of all grains that have not passed, below which is rest, W d",
+    "waiting_time": "time without a passage that ends a load step without rest,"
+    " sqrt(d/g')",
+    "rest_energy": "kinetic energy of all grains that have not passed, below which is"
+    " rest, W d",
     "sampling_interval": "time between two samples of the grains, sqrt(d/g')",
     "events": "gusts in each load step, whose forces are in gusts.txt; 0: none",
     "event_samples": "samples of the grains in each of them",
     "settle": "time before the first load step, at least, sqrt(d/g')",
     "most_settle": "longest such time: as long as it takes the bed to lie, sqrt(d/g')",
-    "noise": "kinetic energy of a mean grain below which a bed lies, W^2/K; 0: it need not",
+    "noise": "kinetic energy of a mean grain below which a bed lies, W^2/K;"
+    " 0: it need not",
     "settle_drag": "drag of a still fluid in that time, m sqrt(g/d)",
     "displacement_criterion": "displacement along the bed that counts as motion, d",
     "stir": "displacement from which on passage.dump lists a grain, d",
@@ -66,35 +69,36 @@ SAMPLING_INTERVAL = 0.5
 """Time between two samples of the grains, sqrt(d/g')."""
 REST_ENERGY = 1e-6
 """Kinetic energy of all mobile grains that have not passed the displacement criterion,
-W d, below which a load step ends, if it falls. Of 1476 thresholds of 369 piles, 1438 lie
-in the same load step as with the waiting time alone, 23 in one beside it, 15 further off:
-most on level and disordered rows, where round-off decides. Of 1079 single grains none
-moves in another load step."""
+W d, below which a load step ends, if it falls. Of 1476 thresholds of 369 piles, 1438
+lie in the same load step as with the waiting time alone, 23 in one beside it, 15
+further off: most on level and disordered rows, where round-off decides. Of 1079 single
+grains none moves in another load step."""
 SETTLE = 10.0
 """Time in which the bed settles before the first load step, at least, sqrt(d/g')."""
 MOST_SETTLE = 400.0
 """Time after which a bed that does not lie yet is given up, sqrt(d/g')."""
 NOISE = 0.01
 """Most kinetic energy of a mobile grain at rest, over W^2/K, which is twice what its
-weight stores in a spring. Beyond it trials at 0 to 0.9 of damping and 0.05 to 1.2 of time
-step gave other thresholds; at a damping of 0.1 and a time step of 0.3 it is 1e-5."""
+weight stores in a spring. Beyond it trials at 0 to 0.9 of damping and 0.05 to 1.2 of
+time step gave other thresholds; at a damping of 0.1 and a time step of 0.3 it is
+1e-5."""
 POURED_DRAG = 2.0
 """Drag of a still fluid in which a poured bed settles, m sqrt(g'/d): its springs may be
-softer than those of the pouring, and without a drag a pile of 25 degrees was not at rest
-at the end."""
+softer than those of the pouring, and without a drag a pile of 25 degrees was not at
+rest at the end."""
 SETTLE_FLOW = math.sqrt(0.5)
-"""Flow of the settling over that of the first load step: about half of its force. Without
-any, a bed at its limiting slope would not come to rest."""
+"""Flow of the settling over that of the first load step: about half of its force.
+Without any, a bed at its limiting slope would not come to rest."""
 STEADY = np.ones(1)
 """The gusts of a deck without any."""
 START = 0.9
 """Flow of the first load step over that of the first threshold by the pivot law."""
 BEYOND = 1.2
-"""The last load step's flow over that at which the pivot law says that enough grains have
-moved."""
+"""The last load step's flow over that at which the pivot law says that enough grains
+have moved."""
 STIR = 0.02
-"""A counted grain that is no further from its place lies there, d: it is left out of the
-dump. With a small displacement criterion, or small grains, it is less."""
+"""A counted grain that is no further from its place lies there, d: it is left out of
+the dump. With a small displacement criterion, or small grains, it is less."""
 AWAY = 10.0
 """A counted grain that has come so far along the bed is gone, d: those that it could
 still meet have left before it."""
@@ -203,8 +207,8 @@ def cost_s(
         Time until a load step of a lattice ends at rest, sqrt(d/g'); it ends at the
         latest after twice the waiting time.
     method, grain
-        Contacts and load steps, and the grains of the scene. The smallest grain of a poured bed sets
-        the time step.
+        Contacts and load steps, and the grains of the scene. The smallest grain of a
+        poured bed sets the time step.
     exposed
         Number of grains that a poured bed exposes; NaN for a lattice.
 
@@ -341,7 +345,7 @@ def write_numbers(path: Path, values: FloatArray) -> None:
 
 
 def _write_sets(path: Path, grains: IntArray, sets: FloatArray) -> None:
-    """Write sets of values of grains as LIGGGHTS reads them: a count, then ids and values."""
+    """Write values of grains as LIGGGHTS reads them: a count, then ids and values."""
     rows = "".join(f"{number} {digits.FORMAT}\n" for number in (grains + 1).tolist())
     with path.open("w") as stream:
         for values in sets.tolist():

@@ -188,7 +188,7 @@ class BedLine:
 
     @property
     def toe(self) -> FloatArray:
-        """Position of the corner where the form ends and the flat bed goes on, shape (2,)."""
+        """Position of the corner where the form ends, shape (2,)."""
         falls = np.flatnonzero(np.diff(self.z) < 0)
         last = falls[-1] + 1 if len(falls) else -1
         return np.asarray(self.corners[last])
@@ -408,7 +408,7 @@ def between_flats(corners: FloatArray, height: float) -> BedLine:
 
 
 def _train(form: FloatArray, count: int, spacing: float | None) -> FloatArray:
-    """Several forms in a row, the foot of each a spacing behind that of the one before."""
+    """Several forms in a row, the foot of each a spacing behind that of the last."""
     length = float(form[-1, 0])
     spacing = spacing or length
     if count > 1 and spacing < length * (1 - 1e-9):
@@ -437,7 +437,7 @@ def _with_obstacle(line: BedLine, obstacle: Obstacle) -> BedLine:
 
 
 def _foot(line: BedLine, top: FloatArray, way: int) -> FloatArray:
-    """Where a side that goes down from a point, up- (-1) or downstream (1), meets the bed."""
+    """Where a side that goes down, upstream (-1) or downstream (1), meets the bed."""
     x = float(top[0])
     for _ in range(FOOT_STEPS):
         depth = top[1] - line.height(np.array(x))
@@ -446,7 +446,7 @@ def _foot(line: BedLine, top: FloatArray, way: int) -> FloatArray:
 
 
 def _outline(obstacle: Obstacle) -> FloatArray:
-    """The corners of an obstacle above its sides, around the middle of its foot, (n, 2)."""
+    """Corners of an obstacle above its sides, from the middle of its foot, (n, 2)."""
     height = obstacle.height
     if obstacle.kind == "half-cylinder":
         # where the circle is steeper than the sides they go straight down

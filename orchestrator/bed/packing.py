@@ -1,14 +1,14 @@
 """Where the grains of a bed lie, which of them are exposed, and which may move.
 
-A lattice of equal spheres has rows in which the centres are ``2 d cos(beta)`` apart, each
-row resting in the pockets of the one below, ``d sin(beta)`` lower. Lengths here are in
-diameters d of the scene, with the foot of the first form at the origin; each grain has a
-size of its own.
+A lattice of equal spheres has rows in which the centres are ``2 d cos(beta)`` apart,
+each row resting in the pockets of the one below, ``d sin(beta)`` lower. Lengths here
+are in diameters d of the scene, with the foot of the first form at the origin; each
+grain has a size of its own.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,8 +33,8 @@ DISORDERED = 4
 """Least disordered rows: the packing is the same for any number of mobile layers up to
 it."""
 PERTURBATION = 1e-6
-"""How far a replica's grains lie aside, diameters: it decides which grain of a chain goes
-first. A deck has nine digits of each place."""
+"""How far a replica's grains lie aside, diameters: it decides which grain of a chain
+goes first. A deck has nine digits of each place."""
 LEE_DEPTH = 1.5
 """Thickness of the fixed lee side, layers: no grain falls through it."""
 SHARP_ROW_DEG = 8.0
@@ -57,7 +57,7 @@ OFFSET = 0.125
 FINE = 0.1
 """Distance between two places of a curve at which a row may be opened, diameters."""
 TURNS = 100
-"""How often a row is opened further; grains that overlap then are left out by `cover`."""
+"""How often a row is opened further; `cover` leaves out grains that overlap then."""
 SAMPLES = 2000
 """Places along a bed without grains, as many as a figure shows."""
 ROOM = 1 + 1e-9
@@ -365,40 +365,63 @@ def pile(line: BedLine, lattice: Lattice) -> Packing:
     Packing
         The packing.
     """
-    surface = 0.5 + lattice.gap
     row_height = np.sin(lattice.beta)
-    windward_face = line.top - 1
-    lee_face = line.top
-    thickness = line.crest[1] / line.tangents[windward_face, 0]
-    most = whole_up(thickness / row_height) + 1
-    lattice = replace(lattice, mobile_layers=min(lattice.mobile_layers, most))
-    # below the layers that hold mobile grains one is enough: a grain touches no deeper one
+    thickness = line.crest[1] / line.tangents[line.top - 1, 0]
+    layers = min(lattice.mobile_layers, whole_up(thickness / row_height) + 1)
+    lattice = replace(lattice, mobile_layers=layers)
+    # below the layers that hold mobile grains one is enough: a grain touches no deeper
+    # one
     thick = (lattice.layers + 0.5) * row_height
     thick_lee = LEE_DEPTH * row_height
-    faces = {windward_face: thick, lee_face: thick_lee}
-    points = _filling(line, lattice, surface, faces)
-    below_windward = surface - line.over(points, windward_face)
-    below_lee = surface - line.over(points, lee_face)
-    depth = np.minimum(below_windward, below_lee)
-    level = points[:, 1] - surface
-
-    is_shell = (below_windward < thick) | (below_lee < thick_lee)
-    is_inside = (depth >= -(STRAY if lattice.uneven else TIE)) & is_shell
+    surface = 0.5 + lattice.gap
+    points = _filling(
+        line, lattice, surface, {line.top - 1: thick, line.top: thick_lee}
+    )
+    depths = _Depths.of(line, points, surface)
+    depth = np.minimum(depths.windward, depths.lee)
+    is_inside = depth >= -(STRAY if lattice.uneven else TIE)
+    is_inside &= (depths.windward < thick) | (depths.lee < thick_lee)
+    level = depths.level
     is_below = (level < -TIE) & (depth > 0.5 * row_height) & (level > -1.3)
     kept = is_inside & ((level >= -TIE) | is_below)
     top = points[np.argmax(np.where(kept, points[:, 1], -np.inf))]
-    kept |= _behind(top, points) & (below_lee < -TIE)
+    kept |= _behind(top, points) & (depths.lee < -TIE)
+    return _with_roles(line, lattice, points[kept], depths.chosen(kept), surface)
 
-    body = points[kept]
-    is_buried = level[kept] < -TIE
+
+class _Depths(NamedTuple):
+    """Depths of grains below the two faces of a pile, and heights over the flat bed."""
+
+    windward: FloatArray
+    lee: FloatArray
+    level: FloatArray
+
+    @classmethod
+    def of(cls, line: BedLine, points: FloatArray, surface: float) -> "_Depths":
+        """Depths of points; the highest centres are `surface` over the line."""
+        windward = surface - line.over(points, line.top - 1)
+        lee = surface - line.over(points, line.top)
+        return cls(windward, lee, points[:, 1] - surface)
+
+    def chosen(self, kept: BoolArray) -> "_Depths":
+        """The depths of some of the grains."""
+        return _Depths(self.windward[kept], self.lee[kept], self.level[kept])
+
+
+def _with_roles(
+    line: BedLine, lattice: Lattice, body: FloatArray, depths: _Depths, surface: float
+) -> Packing:
+    """The grains of a pile that are needed, and which of them move and count."""
+    is_buried = depths.level < -TIE
     is_ahead = body[:, 0] <= line.crest[0] + TIE
-    tangents = line.tangents[np.where(is_ahead, windward_face, lee_face)]
+    tangents = line.tangents[np.where(is_ahead, line.top - 1, line.top)]
     is_free = exposed(body, tangents, slack=lattice.disorder) & ~is_buried
     windward = is_free & is_ahead
     lee = is_free & ~is_ahead
     # on a steep lee side no grain lies by itself
-    has_fallen = (below_lee[kept] < 1) & ~_rests(body)
-    is_near = below_windward[kept] < (lattice.mobile_layers - 0.5) * row_height
+    has_fallen = (depths.lee < 1) & ~_rests(body)
+    row_height = np.sin(lattice.beta)
+    is_near = depths.windward < (lattice.mobile_layers - 0.5) * row_height
     mobile = (is_near & ~is_buried & ~has_fallen) | windward
     needed = ~is_buried | _touching(body, mobile)
     apron = _apron(body[needed], surface)
@@ -413,7 +436,7 @@ def pile(line: BedLine, lattice: Lattice) -> Packing:
 
 
 def _behind(top: FloatArray, points: FloatArray) -> BoolArray:
-    """Which places bear a grain from downstream; beyond a steep lee side none else does."""
+    """Which places bear a grain from downstream: none else does at a steep lee side."""
     x, z = (points - top).T
     return np.asarray((np.hypot(x, z) < 1 + TOUCH) & (x > 0) & (z < -LOWER))
 
@@ -426,44 +449,85 @@ def _filling(
     Of all places those are made that are no deeper below a face than it is `thick`, and
     some more.
     """
-    beta = lattice.beta
-    face = line.tangents[line.top - 1]
-    direction = np.array([1.0, 0.0]) if lattice.pattern == "horizontal" else face
-    normal = np.array([-direction[1], direction[0]])
-    apex = line.crest + np.array([0, surface / face[0]])
-    corners = np.array([np.zeros(2), line.toe, line.crest]) - apex
-    along = corners @ direction / np.cos(beta) / 2
-    down = -corners @ normal / np.sin(beta)
-    rows = np.arange(0, whole_up(down.max()) + 3)
-    columns = np.arange(-whole_up(-along.min()) - 3, whole_up(along.max()) + 4)
-    beyond = {
-        number: (line.normals[number], (apex - line.corners[number]), most + 1)
-        for number, most in thick.items()
-    }
-    parts = []
-    for out, from_corner, most in beyond.values():
-        # distance of the place (row, column) over the face: a column + b row + c
-        per_column = 2 * np.cos(beta) * float(direction @ out)
-        at_first = from_corner @ out - surface
-        at_first = at_first - rows * np.sin(beta) * float(normal @ out)
-        at_first = at_first + rows % 2 * np.cos(beta) * float(direction @ out)
-        parts.append(_columns_within(at_first, per_column, most, columns))
-    row, column = np.unique(np.concatenate(parts), axis=0).T
-    offset = (2 * column + row % 2) * np.cos(beta)
-    fall = row * np.sin(beta)
-    is_near = np.zeros(offset.shape, bool)
-    for out, from_corner, most in beyond.values():
-        over_apex = offset * (direction @ out) - fall * (normal @ out)
-        is_near |= np.abs(over_apex + from_corner @ out - surface) < most
-    into = np.outer(offset[is_near], direction)
-    points = apex + into - np.outer(fall[is_near], normal)
+    pattern = _Pattern.of(line, lattice, surface)
+    faces = []
+    for number, most in thick.items():
+        from_corner = pattern.apex - line.corners[number]
+        faces.append(_Face(line.normals[number], from_corner, surface, most + 1))
+    points = pattern.near(faces, line)
     if not lattice.uneven:
-        return np.asarray(points)
+        return points
     layers = max(lattice.mobile_layers, DISORDERED)
-    count = whole_up(line.crest_s / np.cos(beta) / 2) + layers + 4
-    upper = apex + _disordered(count, layers, lattice) @ np.vstack([direction, normal])
-    is_lower = (apex - points) @ normal > (layers + 0.5) * np.sin(beta)
-    return np.vstack([upper, points[is_lower]])
+    count = whole_up(line.crest_s / pattern.half / 2) + layers + 4
+    axes = np.vstack([pattern.direction, pattern.normal])
+    upper = pattern.apex + _disordered(count, layers, lattice) @ axes
+    depth = (pattern.apex - points) @ pattern.normal
+    return np.vstack([upper, points[depth > (layers + 0.5) * pattern.row_height]])
+
+
+class _Face(NamedTuple):
+    """A face of a pile: its normal, the apex from its corner, the filled depth.
+
+    The highest centres are `surface` over it.
+    """
+
+    normal: FloatArray
+    from_corner: FloatArray
+    surface: float
+    most: float
+
+
+class _Pattern(NamedTuple):
+    """Rows of a lattice below an apex; the places of a row are two `half` apart."""
+
+    apex: FloatArray
+    direction: FloatArray
+    normal: FloatArray
+    half: float
+    row_height: float
+
+    @classmethod
+    def of(cls, line: BedLine, lattice: Lattice, surface: float) -> "_Pattern":
+        """The rows of a pile of two faces."""
+        face = line.tangents[line.top - 1]
+        direction = np.array([1.0, 0.0]) if lattice.pattern == "horizontal" else face
+        normal = np.array([-direction[1], direction[0]])
+        apex = line.crest + np.array([0, surface / face[0]])
+        return cls(apex, direction, normal, np.cos(lattice.beta), np.sin(lattice.beta))
+
+    def near(self, faces: Sequence[_Face], line: BedLine) -> FloatArray:
+        """Places near a face of a pile, shape (n, 2)."""
+        rows, columns = self._range(line)
+        places = [self._within(face, rows, columns) for face in faces]
+        row, column = np.unique(np.concatenate(places), axis=0).T
+        offset = (2 * column + row % 2) * self.half
+        fall = row * self.row_height
+        is_near = np.zeros(offset.shape, bool)
+        for face in faces:
+            over = offset * (self.direction @ face.normal)
+            over -= fall * (self.normal @ face.normal)
+            over = over + face.from_corner @ face.normal - face.surface
+            is_near |= np.abs(over) < face.most
+        into = np.outer(offset[is_near], self.direction)
+        return np.asarray(self.apex + into - np.outer(fall[is_near], self.normal))
+
+    def _range(self, line: BedLine) -> tuple[IntArray, IntArray]:
+        """Numbers of the rows and columns that a pile may have."""
+        corners = np.array([np.zeros(2), line.toe, line.crest]) - self.apex
+        along = corners @ self.direction / self.half / 2
+        down = -corners @ self.normal / self.row_height
+        rows = np.arange(0, whole_up(down.max()) + 3)
+        columns = np.arange(-whole_up(-along.min()) - 3, whole_up(along.max()) + 4)
+        return rows, columns
+
+    def _within(self, face: _Face, rows: IntArray, columns: IntArray) -> IntArray:
+        """Row and column of the places near a face, and of some more."""
+        # distance of the place (row, column) over the face: a column + b row + c
+        along = float(self.direction @ face.normal)
+        first = face.from_corner @ face.normal - face.surface
+        first = first - rows * self.row_height * float(self.normal @ face.normal)
+        first = first + rows % 2 * self.half * along
+        return _columns_within(first, 2 * self.half * along, face.most, columns)
 
 
 def _columns_within(
@@ -490,7 +554,7 @@ def _columns_within(
 
 
 def _disordered(columns: int, layers: int, lattice: Lattice) -> FloatArray:
-    """Rows over a straight one with random gaps: places along and normal to them, (n, 2)."""
+    """Rows over a straight one with random gaps: places along and normal, (n, 2)."""
     rng = np.random.default_rng(lattice.seed)
     size = lattice.disorder
     spacing = 2 * np.cos(lattice.beta) + rng.uniform(0, size, 2 * columns)
@@ -511,7 +575,7 @@ def _disordered(columns: int, layers: int, lattice: Lattice) -> FloatArray:
 
 
 def _stacked(lowest: FloatArray, layers: int) -> list[FloatArray]:
-    """Rows above a lowest one, the uppermost first: grains rest on two of the row below."""
+    """Rows above a lowest one, the uppermost first: each grain rests on two below."""
     rows = [lowest]
     for _ in range(layers):
         apart = np.diff(rows[0], axis=0)
@@ -527,7 +591,7 @@ def _overlap(row: FloatArray) -> FloatArray:
 
 
 def _apron(body: FloatArray, surface: float) -> FloatArray:
-    """Two flat rows of touching fixed grains, each starting where it touches the pile."""
+    """Two flat rows of touching fixed grains, each from where it touches the pile."""
     drop = np.abs(body[:, 1] - surface)
     is_near = drop < 1
     near = body[is_near, 0]
@@ -631,7 +695,7 @@ def offset(line: BedLine, distance: float) -> BedLine:
 
 
 def _rows(top: BedLine, counted: BoolArray, lattice: Lattice) -> Iterator[FloatArray]:
-    """Centres of the rows of each part of a line between sharp corners, counted first."""
+    """Centres of the rows of each part between sharp corners, the counted first."""
     is_sharp = np.abs(top.bends_deg[1:-1]) > SHARP_ROW_DEG
     lasts = [*np.flatnonzero(is_sharp).tolist(), len(top.lengths) - 1]
     firsts = [0, *(last + 1 for last in lasts[:-1])]
@@ -679,7 +743,7 @@ def _rows_along(
 def _on_a_curve(
     curve: BedLine, layers: int, lattice: Lattice, size: float, seed: int
 ) -> list[FloatArray]:
-    """Rows over a curve, on which the lowest lies with random gaps; the uppermost first."""
+    """Rows over a curve, the lowest on it with random gaps; the uppermost first."""
     spacing = 2 * np.cos(lattice.beta)
     count = whole_up(curve.lengths.sum() / spacing) + 1
     rng = np.random.default_rng(seed)
@@ -726,18 +790,14 @@ def _openings(rows: list[FloatArray], layers: int, count: int) -> FloatArray:
 
 
 def _level_rows(top: BedLine, lattice: Lattice) -> FloatArray:
-    """Level rows under a whole line, near to it; one grain of the uppermost is on top."""
+    """Level rows under a whole line, near it; one grain of the uppermost is on top."""
     row_height = np.sin(lattice.beta)
     half = np.cos(lattice.beta)
     layers = lattice.mobile_layers + 1
     steepest = np.radians(np.abs(top.slopes_deg).max())
     thick = (layers + 1) * row_height / np.cos(steepest)
     highest = float(np.max(top.z))
-    spacing = 2 * half
-    # where a whole number of spacings lies before the crest, its last digit decides nothing
-    before = -whole_up(-(top.crest[0] - top.x[0]) / spacing)
-    count = whole_up((top.x[-1] - top.x[0]) / spacing)
-    x = top.crest[0] + spacing * (np.arange(count) - before)
+    x = _level_row(top, 2 * half)
     parts = []
     for row in range(whole_up((highest - min(top.z)) / row_height) + layers + 2):
         z = np.full_like(x, highest - row * row_height)
@@ -747,6 +807,15 @@ def _level_rows(top: BedLine, lattice: Lattice) -> FloatArray:
     points = np.vstack(parts)
     _, depth = _depth(top, points)
     return np.asarray(points[(depth >= -TIE) & (depth < (layers + 0.5) * row_height)])
+
+
+def _level_row(top: BedLine, spacing: float) -> FloatArray:
+    """Places of a level row along a whole line, one of them under its crest."""
+    # where a whole number of spacings lies before the crest, its last digit decides
+    # nothing
+    before = -whole_up(-(top.crest[0] - top.x[0]) / spacing)
+    count = whole_up((top.x[-1] - top.x[0]) / spacing)
+    return np.asarray(top.crest[0] + spacing * (np.arange(count) - before))
 
 
 def _depth(top: BedLine, points: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -811,8 +880,8 @@ def shadows(
 ) -> tuple[IntArray, IntArray]:
     """Find the grains of any sizes that others hide.
 
-    A grain is hidden where the line through its centre, normal to the bed, meets another
-    grain whose centre lies higher.
+    A grain is hidden where the line through its centre, normal to the bed, meets
+    another grain whose centre lies higher.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Beds that LIGGGHTS pours: a mould of the bed line, the run, and the packing that it leaves.
+"""Beds that LIGGGHTS pours: a mould of the bed line, the run, and its packing.
 
 Lengths are in diameters d of the scene, with the foot of the first form at the origin.
 """
@@ -43,7 +43,7 @@ GRAVITY = 9.81
 WEIGHT = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY
 """Weight of the reference grain, N."""
 CONTACT = {"damping": 0.1, "time_step": 0.2}
-"""With more damping, or a longer step, equal spheres jitter: they settle into crystals."""
+"""With more damping, or a longer step, equal spheres jitter and form crystals."""
 STIFFNESS = (1e3, 1e4, 1e4)
 """Stiffness K d/W of each stage. The grains fall on soft springs."""
 DRAG = (0.0, 5.0, 1.0)
@@ -51,8 +51,8 @@ DRAG = (0.0, 5.0, 1.0)
 run up and down the bed, which contacts alone take off slowly. When the bed is cut, a
 small drag is enough and lets grains roll into their pockets."""
 CALM = (1e-2, 1e-4, 1e-6)
-"""Kinetic energy of a grain at which each stage ends, W d. The last is 1e-2 W^2/K, which
-is rest to other decks too: in a long bed there is always a grain that still rolls
+"""Kinetic energy of a grain at which each stage ends, W d. The last is 1e-2 W^2/K,
+which is rest to other decks too: in a long bed there is always a grain that still rolls
 somewhere."""
 LONGEST = 400
 """Time that the grains have in a stage, sqrt(d/g')."""
@@ -66,7 +66,7 @@ MOST_GRAINS = 100_000
 LAYER = np.sin(np.pi / 3)
 """Thickness of a layer, d: as of a lattice."""
 NEAR = 0.5
-"""Fixed grains whose surfaces are nearer than this to a mobile one's are in the case, d."""
+"""Fixed grains whose surfaces are nearer to that of a mobile one are in the case, d."""
 LOCAL = 5.0
 """Length of bed before and behind a grain that its height is compared with, d."""
 
@@ -224,7 +224,7 @@ class PouredBed(Case):
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Places along x of the two walls of the mould: beyond the forms, within the line."""
+        """Places along x of the walls of the mould: beyond the forms, in the line."""
         x = self.line.x
         return max(x[0], x[1] - APRON), min(x[-1], x[-2] + APRON)
 
@@ -232,14 +232,15 @@ class PouredBed(Case):
     def floor(self) -> FloatArray:
         """Centres of the fixed grains: along the line one diameter apart, shape (m, 3).
 
-        Those of a strip lie in two layers, each over the gaps of the other: nothing falls
-        through.
+        Those of a strip lie in two layers, each over the gaps of the other: nothing
+        falls through.
         """
         corners_x, corners_z = self.line.corners.T
         along = np.concatenate([[0.0], np.cumsum(self.line.lengths)])
         first, last = np.interp(self.ends, corners_x, along)
         places = np.arange(first + 0.5, last - digits.SLACK, 1.0)
-        # where grains fall in their rows depends on whether the columns over them are free
+        # where grains fall in their rows depends on whether the columns over them are
+        # free
         x = digits.on_grid(np.interp(places, along, corners_x))
         z = digits.on_grid(np.interp(places, along, corners_z) - self.depth)
         if not self.width:
@@ -439,24 +440,17 @@ def read(
     height = line.over(centres, segment)
     places = Places.of(centres, rows["y_over_d"].to_numpy(float), width)
     y = places.xyz[:, 1]
-    flat = Places.of(np.column_stack([along, np.zeros_like(along)]), y, width)
-    is_free = unshadowed(flat, height, sizes / 2) & is_poured
+    is_free = is_poured & _is_exposed(along, height, y, sizes, width)
     on_form = (segment > 0) & (segment < len(line.lengths) - 1)
-    is_near_top = surface - height < (mobile_layers - 0.5) * LAYER
-    mobile = is_poured & (is_near_top | is_free) & on_form
+    mobile = surface - height < (mobile_layers - 0.5) * LAYER
+    mobile = is_poured & (mobile | is_free) & on_form
     counted = is_free & line.counted(counts)[segment] & within(centres[:, 0], counts)
-    if not counted.any():
-        what = "no grain of the poured bed is exposed where grains are counted"
-        remedy = "choose another part of the bed, or another bed.seed"
-        raise InputError(what, "bed.counted", remedy)
-    first, second, apart = places.pairs(float(sizes.max()) + NEAR)
-    gap = np.linalg.norm(apart, axis=1) - (sizes[first] + sizes[second]) / 2
-    is_near = mobile.copy()
-    is_near[first[mobile[second] & (gap < NEAR)]] = True
+    _check_counted(counted)
+    needed = mobile | _near_to(mobile, places, sizes)
     # along the bed; the fixed ones last, for a deck must not lose the grain of its
     # highest id
     kept = np.lexsort((along, ~mobile))
-    kept = kept[is_near[kept]]
+    kept = kept[needed[kept]]
     return Packing(
         centres=centres[kept],
         sizes=sizes[kept],
@@ -469,12 +463,42 @@ def read(
     )
 
 
+def _check_counted(counted: BoolArray) -> None:
+    """Refuse a bed none of whose grains is counted."""
+    if not counted.any():
+        what = "no grain of the poured bed is exposed where grains are counted"
+        remedy = "choose another part of the bed, or another bed.seed"
+        raise InputError(what, "bed.counted", remedy)
+
+
+def _is_exposed(
+    along: FloatArray,
+    height: FloatArray,
+    across: FloatArray,
+    sizes: FloatArray,
+    width: float,
+) -> BoolArray:
+    """Which grains no other one hides, on the bed drawn out straight."""
+    on_the_bed = np.column_stack([along, np.zeros_like(along)])
+    return unshadowed(Places.of(on_the_bed, across, width), height, sizes / 2)
+
+
+def _near_to(chosen: BoolArray, places: Places, sizes: FloatArray) -> BoolArray:
+    """Which grains have their surface within `NEAR` of that of a chosen one."""
+    first, second, apart = places.pairs(float(sizes.max()) + NEAR)
+    gap = np.linalg.norm(apart, axis=1) - (sizes[first] + sizes[second]) / 2
+    is_near = np.zeros(len(sizes), bool)
+    is_near[first[chosen[second] & (gap < NEAR)]] = True
+    return is_near
+
+
 def standing(
     along: FloatArray, height: FloatArray, sizes: FloatArray, exposed: BoolArray
 ) -> FloatArray:
-    """Find how much higher each grain's lowest point is than that of a mean exposed grain.
+    """Find how much higher each grain lies than a mean exposed grain.
 
-    The mean is that of the exposed centres within `LOCAL` along the bed, less half of d.
+    The mean is that of the exposed centres within `LOCAL` along the bed, less half of
+    d.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The scenes of level 2 that check the contact law, on the reference grain of the decks."""
+"""The scenes of level 2 that check the contact law, on the grain of the decks."""
 
 from collections.abc import Iterator
 
@@ -132,8 +132,8 @@ def _contact(
 def passing_time(push: float, criterion: float) -> float:
     """Find the time in which a pushed grain rolls over its neighbour.
 
-    It rolls without slip on a circle of radius d, from rest: the work of the force and of
-    the weight is its energy, (1 + 2/5) v^2/2 by its moment of inertia.
+    It rolls without slip on a circle of radius d, from rest: the work of the force and
+    of the weight is its energy, (1 + 2/5) v^2/2 by its moment of inertia.
 
     Parameters
     ----------
@@ -149,7 +149,8 @@ def passing_time(push: float, criterion: float) -> float:
     """
     lean = np.pi / 2 - np.radians(PASSING_DEG)
     force = push * np.tan(lean)
-    # the angle from the vertical is lean - u^2: the speed is proportional to u at the start
+    # the angle from the vertical is lean - u^2: the speed is proportional to u at the
+    # start
     end = np.sqrt(lean - np.arcsin(np.sin(lean) - criterion))
     nodes, weights = np.polynomial.legendre.leggauss(40)
     u = end * (nodes + 1) / 2

@@ -1,4 +1,4 @@
-"""Run a solver on the scenes of a pack, or take answers that are there; write tables and page."""
+"""Run a solver on the scenes of a pack, or judge answers; write tables and page."""
 
 import contextlib
 import os
@@ -7,8 +7,8 @@ import shlex
 import shutil
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Sequence
-from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,11 +23,17 @@ from orchestrator.runs import process, workspace
 from orchestrator.runs.files import Folder, opened, read_json, text_of
 from orchestrator.tables import csv as text_of_table
 
-NUMBERS, VERDICTS, LOG = "comparison.csv", "verdicts.csv", "log.txt"
-LOG_BYTES, FILE_BYTES = 64 * MIB, 4096 * MIB
-"""Largest output, and largest file of a solver, bytes."""
-LISTED = 10  # failures on the terminal
-OPERATORS = re.compile(r"[|&;<>]+|\d*>\S*|\S*;")  # of a shell
+NUMBERS = "comparison.csv"
+VERDICTS = "verdicts.csv"
+LOG = "log.txt"
+LOG_BYTES = 64 * MIB
+"""Largest output of a solver, bytes."""
+FILE_BYTES = 4096 * MIB
+"""Largest file of a solver, bytes."""
+LISTED = 10
+"""Most failures that are printed on the terminal."""
+OPERATORS = re.compile(r"[|&;<>]+|\d*>\S*|\S*;")
+"""Operators of a shell."""
 MEASURE = """
 import json, resource, subprocess, sys, time
 report, memory, *command = sys.argv[1:]
@@ -40,12 +46,26 @@ with open(report, "w") as stream:
     json.dump({**numbers, "peak_mib": used.ru_maxrss / 1024}, stream)
 sys.exit(code if code >= 0 else 128 - code)
 """
-"""Program that runs the solver: the memory of a process that this one starts would count as the
-solver's."""
+"""Program that runs the solver: the memory of a process that this one starts would
+count as the solver's."""
 
 
 class Options(NamedTuple):
-    """Scenes by level and by patterns of names, all if empty; a solver's limits (s, GiB), name."""
+    """The choice of scenes, and the limits of a solver.
+
+    Attributes
+    ----------
+    levels
+        Levels of the scenes; all if empty.
+    patterns
+        Patterns of their names; all if empty.
+    seconds
+        Wall time for a scene, s.
+    memory
+        Memory of each process, GiB.
+    name
+        Name of the solver; by default that of its script, or of its program.
+    """
 
     levels: Sequence[int] = ()
     patterns: Sequence[str] = ()
@@ -55,7 +75,17 @@ class Options(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """A comparison: failures as lines, a summary as a table, and the page."""
+    """A comparison.
+
+    Attributes
+    ----------
+    failures
+        A line for each failure.
+    summary
+        A table, and a line for each solver.
+    page
+        The file of the page.
+    """
 
     failures: list[str]
     summary: str
@@ -63,7 +93,7 @@ class Outcome(NamedTuple):
 
 
 def run(root: Path, command: str, out: Path | None, options: Options) -> Outcome:
-    """Run a solver on scenes of a pack, ours in turn, judge the answers, and write the page.
+    """Run a solver on scenes of a pack, ours in turn, and judge the answers.
 
     Parameters
     ----------
@@ -76,6 +106,11 @@ def run(root: Path, command: str, out: Path | None, options: Options) -> Outcome
     options
         The scenes that are chosen, the solver's limits and its name.
 
+    Returns
+    -------
+    Outcome
+        The comparison, whose page is written.
+
     Raises
     ------
     InputError
@@ -83,8 +118,7 @@ def run(root: Path, command: str, out: Path | None, options: Options) -> Outcome
     """
     chosen = pack.read(root.absolute())
     words = split(command)
-    scripts = [word for word in words[1:] if Path(word).is_file()]
-    solver = options.name or Path([*scripts, words[0]][0]).stem
+    solver = options.name or _name_of_program(words)
     if solver == OURS:
         raise InputError("two solvers have the name ours", "--name", "choose another")
     names = chosen.chosen(options.levels, options.patterns)
@@ -98,19 +132,29 @@ def run(root: Path, command: str, out: Path | None, options: Options) -> Outcome
         # runs of an earlier time were not in turn with the solver
         shutil.rmtree(folder.path(f"{OURS}/cases"), ignore_errors=True)
         ours.root.mkdir(parents=True)
-        for level, listed in groupby(names, lambda name: chosen.scenes[name]["level"]):
-            of_level = list(listed)
-            scenes = "scene" if len(of_level) == 1 else "scenes"
-            print(
-                f"level {level}: {len(of_level)} {scenes}", file=sys.stderr, flush=True
-            )
-            for name in of_level:
-                _solve(words, chosen.root / pack.SCENES / name, options, folder, name)
-                answer, times = ours.answer(name)
-                folder.note(f"{OURS}/{name}/{ANSWER}", pack.csv(answer))
-                folder.note(f"{OURS}/{name}/{USED}", text_of(times))
+        counts = Counter(chosen.scenes[name]["level"] for name in names)
+        begun: set[int] = set()
+        for name in names:
+            level = chosen.scenes[name]["level"]
+            if level not in begun:
+                begun.add(level)
+                scenes = "scene" if counts[level] == 1 else "scenes"
+                text = f"level {level}: {counts[level]} {scenes}"
+                print(text, file=sys.stderr, flush=True)
+            _solve(words, chosen.root / pack.SCENES / name, options, folder, name)
+            answer, times = ours.answer(name)
+            folder.note(f"{OURS}/{name}/{ANSWER}", pack.csv(answer))
+            folder.note(f"{OURS}/{name}/{USED}", text_of(times))
         pack.verify(chosen.root, chosen.manifest)
         return _written(chosen, judge.judge(chosen, names, [out]), folder)
+
+
+def _name_of_program(words: Sequence[str]) -> str:
+    """The name of the script of a command, or else of its program."""
+    for word in words[1:]:
+        if Path(word).is_file():
+            return Path(word).stem
+    return Path(words[0]).stem
 
 
 def compare(
@@ -125,10 +169,15 @@ def compare(
     results
         The directory of each solver, which is named by `run`, or else by the directory.
     out
-        The directory of the page, by default the only one of the results, if `run` wrote
-        them, or else ``results/benchmark-NAME`` of the pack.
+        The directory of the page, by default the only one of the results, if `run`
+        wrote them, or else ``results/benchmark-NAME`` of the pack.
     options
         The scenes that are chosen.
+
+    Returns
+    -------
+    Outcome
+        The comparison, whose page is written.
 
     Raises
     ------
@@ -141,9 +190,8 @@ def compare(
     solvers = [OURS, *map(name_of, results)]
     for place, solver in zip(results, solvers[1:], strict=True):
         if not place.is_dir():
-            raise InputError(
-                "there is no such directory", where=str(place), remedy="name another"
-            )
+            what = "there is no such directory"
+            raise InputError(what, where=str(place), remedy="name another")
         if solvers.count(solver) > 1:
             remedy = "run one with another --name, or rename its directory"
             raise InputError(f"two solvers have the name {solver}", "RESULTS", remedy)
@@ -167,29 +215,25 @@ def compare(
 
 def _check_pack(place: Path, chosen: Pack) -> None:
     """Refuse results of `run` whose answers are to the questions of another pack."""
-    answered = workspace.read_marker(place, workspace.RESULTS).get(
-        "pack", chosen.questions
-    )
+    about = workspace.read_marker(place, workspace.RESULTS)
+    answered = about.get("pack", chosen.questions)
     if answered != chosen.questions:
         what = "it holds answers to another pack, or to an earlier export of this one"
-        remedy = (
-            "compare them with the pack that they answer, or run the solver on this one"
-        )
-        raise InputError(
-            f"{what}: {chosen.root}", where=str(place), remedy=f"{remedy} with --out"
-        )
+        what = f"{what}: {chosen.root}"
+        remedy = "run the solver on this one with --out"
+        remedy = f"compare them with the pack that they answer, or {remedy}"
+        raise InputError(what, where=str(place), remedy=remedy)
 
 
 def _note_pack(folder: Folder, chosen: Pack) -> None:
-    """Note of which pack a comparison is; refuse to replace that of another pack of its name."""
+    """Note of which pack a comparison is; refuse to replace that of another pack."""
     about = workspace.read_marker(folder.root, workspace.COMPARISON)
     at = os.path.relpath(chosen.root, folder.root)
     other = str(about.get("at", at))
     if other != at and (folder.root / other / pack.MANIFEST).is_file():
         what = f"the directory holds the comparison with another pack, {other}"
-        raise InputError(
-            what, where=str(folder.root), remedy="choose another with --out"
-        )
+        remedy = "choose another with --out"
+        raise InputError(what, where=str(folder.root), remedy=remedy)
     folder.note(workspace.COMPARISON.marker, text_of({**about, "at": at}))
 
 
@@ -203,9 +247,22 @@ def _place(out: Path | None, chosen: Pack) -> Path:
 
 
 def split(command: str) -> list[str]:
-    """The words of a solver's command; files that it names are found from any directory.
+    """Split a solver's command into words.
 
-    Raises InputError if it has no ``{case}`` or ``{out}``, is for a shell, or has no program.
+    Parameters
+    ----------
+    command
+        The command.
+
+    Returns
+    -------
+    list of str
+        Its words; files that it names are found from any directory.
+
+    Raises
+    ------
+    InputError
+        If it has no ``{case}`` or ``{out}``, is for a shell, or has no program.
     """
     try:
         words = shlex.split(command)
@@ -216,15 +273,17 @@ def split(command: str) -> list[str]:
             remedy = "such as 'my-solver {case} {out}'"
             raise InputError(f"the command has no {part}", "--solver", remedy)
     for word in filter(OPERATORS.fullmatch, words):
-        raise InputError(
-            f"no shell reads the command: {word}", "--solver", "write: sh -c '...'"
-        )
+        what = f"no shell reads the command: {word}"
+        raise InputError(what, "--solver", "write: sh -c '...'")
     if shutil.which(words[0]) is None:
         what = f"there is no program {words[0]} that may be run"
         raise InputError(what, "--solver", "give its path")
-    return [
-        str(Path(word).absolute()) if Path(word).is_file() else word for word in words
-    ]
+    found = []
+    for word in words:
+        if Path(word).is_file():
+            word = str(Path(word).absolute())
+        found.append(word)
+    return found
 
 
 def _solve(
@@ -232,27 +291,22 @@ def _solve(
 ) -> None:
     """Run a solver on a copy of a scene, in a directory that is removed afterwards.
 
-    Its answer, its output, its times (s) and memory (MiB) are put into a directory of the results;
-    with the times is ``error``, the reason why the answer does not count.
+    Its answer, its output, its times (s) and memory (MiB) are put into a directory of
+    the results; with the times is ``error``, the reason why the answer does not count.
     """
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as private:
-        work, log, report = (
-            Path(private, "work"),
-            Path(private, LOG),
-            Path(private, USED),
-        )
-        case, out, memory = (
-            work / "case",
-            work / ANSWER,
-            f"{options.memory * 2**30:.0f}",
-        )
-        shutil.copytree(scene, case)
-        command = [
-            word.replace("{case}", str(case)).replace("{out}", str(out))
-            for word in words
-        ]
+        work = Path(private, "work")
+        log = Path(private, LOG)
+        report = Path(private, USED)
+        out = work / ANSWER
+        shutil.copytree(scene, work / "case")
+        memory = f"{options.memory * 2**30:.0f}"
+        command = [sys.executable, "-ISc", MEASURE, str(report), memory]
+        for word in words:
+            word = word.replace("{case}", str(work / "case"))
+            command.append(word.replace("{out}", str(out)))
         ended = process.run(
-            [sys.executable, "-ISc", MEASURE, str(report), memory, *command],
+            command,
             cwd=work,
             log=log,
             limit_s=options.seconds,
@@ -260,18 +314,19 @@ def _solve(
             output_limit=LOG_BYTES,
             file_limit=FILE_BYTES,
         )
-        error = f"it ended with {ended.returncode}: {process.last_words(log)}".rstrip(
-            ": "
-        )
+        error = ""
         if ended.over == "time":
             error = f"it did not end within {options.seconds:g} s and was killed"
         elif ended.over:
             error = f"it printed more than {LOG_BYTES // MIB} MiB"
+        elif ended.returncode:
+            error = f"it ended with {ended.returncode}: {process.last_words(log)}"
+            error = error.rstrip(": ")
         folder.path(f"{name}/{ANSWER}").unlink(missing_ok=True)
         with contextlib.suppress(OSError), opened(out) as stream:
             folder.note(f"{name}/{ANSWER}", stream.read(ANSWER_BYTES + 1))
         used = read_json(report) or {"seconds": ended.seconds}
-        used["error"] = error if ended.over or ended.returncode else ""
+        used["error"] = error
         folder.note(f"{name}/{USED}", text_of(used))
         with log.open("rb") as stream:
             folder.note(f"{name}/{LOG}", stream.read(LOG_BYTES))
@@ -283,14 +338,10 @@ def _written(
     """Put tables, figures and page of a comparison into a directory."""
     numbers, verdicts = judged
     theirs = verdicts[verdicts["solver"] != OURS]
-    tables = {
-        NUMBERS: (numbers[numbers["solver"] != OURS], "%.9g"),
-        VERDICTS: (theirs, "%.6g"),
-    }
     with folder.renewed():
-        for name, (table, digits) in tables.items():
-            columns = ["solver", *table.columns.drop("solver")]
-            folder.put(name, text_of_table(table[columns], digits))
+        of_theirs = numbers[numbers["solver"] != OURS]
+        folder.put(NUMBERS, text_of_table(_solver_first(of_theirs), "%.9g"))
+        folder.put(VERDICTS, text_of_table(_solver_first(theirs), "%.6g"))
         page.write(chosen, numbers, verdicts, folder)
     lines = []
     for row in judge.failures(theirs).itertuples():
@@ -299,6 +350,10 @@ def _written(
         lines[LISTED:] = [f"and {len(lines) - LISTED} more: see {VERDICTS}"]
     table = judge.summary(theirs).dropna(axis=1, how="all")
     text = table.to_string(index=False, na_rep="", float_format="{:.3g}".format)
-    return Outcome(
-        lines, "\n".join([text, *judge.in_words(theirs)]), folder.root / page.PAGE
-    )
+    summary = "\n".join([text, *judge.in_words(theirs)])
+    return Outcome(lines, summary, folder.root / page.PAGE)
+
+
+def _solver_first(table: pd.DataFrame) -> pd.DataFrame:
+    """A table with the solver in its first column."""
+    return table[["solver", *table.columns.drop("solver")]]

@@ -1,4 +1,4 @@
-"""Scenes of a pack from a study, and our own answer to each scene of a pack, run anew."""
+"""Scenes of a pack from a study, and our own answer to each scene, run anew."""
 
 import re
 import shutil
@@ -28,7 +28,7 @@ from orchestrator.study.study import Group, Study
 from orchestrator.tables import Tables
 
 Times = dict[str, float]
-"""Wall time and processor time of runs, s, ``seconds`` and ``cpu_s``; empty for formulas."""
+"""``seconds`` and ``cpu_s`` of runs, wall and processor time, s; empty for formulas."""
 FORMULAS = (1, 2)
 """Levels that need no finished study."""
 LIMIT_S = 3600.0
@@ -244,7 +244,7 @@ def _of_piles(
     names: Mapping[str, str],
     kinds: Collection[str],
 ) -> Iterator[Problem]:
-    """The problems of piles that DEM answers, under the given stress and with one's own."""
+    """The problems of piles that DEM answers, under the given stress or one's own."""
     for scene_id, pile in planned.piles.items():
         # replicas of lattices are in the intervals of the others
         if pile.bed.is_replica or pile.scene.method.kind != "dem":
@@ -400,19 +400,23 @@ class Ours:
         if states:
             results = tables.make(asked, planned, self.root, states)
         (problem,) = problems(asked, planned, results, self.root, [kind])
+        times: Times = {}
+        if problem.runs:
+            ended = [states[run] for run in problem.runs]
+            times["seconds"] = sum(state["solver_s"] for state in ended)
+            times["cpu_s"] = sum(state["cpu_s"] for state in ended)
+        return self._answers(problem), times
+
+    def _answers(self, problem: Problem) -> pd.DataFrame:
+        """The answers to a problem, of a pile with the number of its time steps."""
         answer = problem.expected[["quantity", "at", "ours"]]
         answer = answer.rename(columns={"ours": "value"})
-        if kind == "pile":
-            samples = pd.read_csv(self.root / problem.runs[0] / "samples.csv")
-            steps = float(samples["step"].iloc[-1])
-            row = {"quantity": ["steps"], "at": [""], "value": [steps]}
-            answer = pd.concat([answer, pd.DataFrame(row)])
-        if not problem.runs:
-            return answer, {}
-        ended = [states[run] for run in problem.runs]
-        seconds = sum(state["solver_s"] for state in ended)
-        cpu_s = sum(state["cpu_s"] for state in ended)
-        return answer, {"seconds": seconds, "cpu_s": cpu_s}
+        if problem.kind != "pile":
+            return answer
+        samples = pd.read_csv(self.root / problem.runs[0] / "samples.csv")
+        steps = float(samples["step"].iloc[-1])
+        row = {"quantity": ["steps"], "at": [""], "value": [steps]}
+        return pd.concat([answer, pd.DataFrame(row)])
 
     def _run(self, planned: Plan, kind: str) -> None:
         """Run the cases that a kind of scene needs; several share a flow or a pile."""

@@ -1,4 +1,4 @@
-"""Judge the answers of solvers to the scenes of a pack: errors, verdicts, and what failed."""
+"""Judge the answers of solvers to the scenes of a pack: errors and verdicts."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -14,18 +14,26 @@ from orchestrator.errors import one_line, printable
 from orchestrator.runs import workspace
 from orchestrator.runs.files import opened, read_json
 
-ANSWER, USED, OURS = "answer.csv", "used.json", "ours"
-"""Files of a scene in the results: the answer and the times. The answers of our solvers
-lie in a directory beside those of the solver; they are those of the solver `OURS`."""
+ANSWER = "answer.csv"
+"""The file of a scene with a solver's answer."""
+USED = "used.json"
+"""The file of a scene with the times and the memory that the answer took."""
+OURS = "ours"
+"""Name of our own solvers, and of the directory of their answers beside those of the
+solver."""
 STEPS = "steps"
 """Quantity that a solver may add to any answer: its number of time steps."""
 TIMES = ("seconds", "cpu_s", "peak_mib")
+"""Wall time, s, processor time, s, and memory, MiB, of an answer."""
 MIB = 2**20
-ANSWER_BYTES = 4 * MIB  # of the largest answer
-ROUND = 1e-8  # relative rounding of a pack's tables
+"""Bytes of a MiB."""
+ANSWER_BYTES = 4 * MIB
+"""Size of the largest answer."""
+ROUND = 1e-8
+"""Relative rounding of a pack's tables."""
 LARGEST_ERROR = 1e300
-"""Relative errors beyond it are cut to it: the error of 1e308 against 1e-9 is no double,
-and neither are the percentage and the mean of two such errors."""
+"""Relative errors beyond it are cut to it: the error of 1e308 against 1e-9 is no
+double, and neither are the percentage and the mean of two such errors."""
 DECLINED = "it ended with 2(:|$)"
 """Message of a solver that does not know a kind of scene."""
 
@@ -36,16 +44,42 @@ Key = tuple[str, str, str]
 def name_of(place: Path) -> str:
     """The name of the solver of a directory of results.
 
-    It is what `run` noted there, or else the name of the directory.
+    Parameters
+    ----------
+    place
+        The directory.
+
+    Returns
+    -------
+    str
+        What `run` noted there, or else the name of the directory.
     """
     noted = workspace.read_marker(place, workspace.RESULTS).get("solver")
     return printable(str(noted or place.absolute().name))
 
 
 def place_of(at: str) -> str:
-    """The number ``at`` to seven digits; empty for a quantity that is one number.
+    """The number ``at`` of a question, to seven digits.
 
-    Raises ValueError if the text is no number.
+    Parameters
+    ----------
+    at
+        Its text.
+
+    Returns
+    -------
+    str
+        The number; empty for a quantity that is one number.
+
+    Raises
+    ------
+    ValueError
+        If the text is no number.
+
+    Examples
+    --------
+    >>> place_of("0.333333333"), place_of("")
+    ('0.3333333', '')
     """
     if not at.strip():
         return ""
@@ -56,9 +90,14 @@ def place_of(at: str) -> str:
 class Answers:
     """The answers of a solver to some scenes, and what each scene took.
 
-    `numbers` has each answer by scene, quantity and `place_of`. `used` has a row for each
-    scene, by its name: ``message``, the reason why its answer does not count, or empty;
-    `TIMES` in s, s and MiB, and `STEPS`; NaN where one is not known.
+    Attributes
+    ----------
+    numbers
+        Each answer by scene, quantity and `place_of`.
+    used
+        A row for each scene, by its name: ``message``, the reason why its answer does
+        not count, or empty; `TIMES` in s, s and MiB, and `STEPS`, NaN where one is not
+        known.
     """
 
     numbers: Mapping[Key, float]
@@ -66,7 +105,20 @@ class Answers:
 
     @classmethod
     def read(cls, place: Path, names: Sequence[str]) -> "Answers":
-        """Read what a solver left in a directory of results for some scenes."""
+        """Read what a solver left in a directory of results.
+
+        Parameters
+        ----------
+        place
+            The directory.
+        names
+            Names of the scenes.
+
+        Returns
+        -------
+        Answers
+            Its answers.
+        """
         numbers: dict[Key, float] = {}
         rows = []
         for name in names:
@@ -157,11 +209,11 @@ def judge(
     -------
     numbers
         A row for each solver, `OURS` the last, and each expectation: the columns of the
-        expectation, ``solver``, ``answer``, ``error`` (relative, at most `LARGEST_ERROR`;
-        of a value of zero the answer) and ``within``.
+        expectation, ``solver``, ``answer``, ``error`` (relative, at most
+        `LARGEST_ERROR`; of a value of zero the answer) and ``within``.
     verdicts
-        A row for each solver and scene: ``passed``, ``failed`` or, by a solver that answers
-        another scene, ``declined``; ``message``, errors and times.
+        A row for each solver and scene: ``passed``, ``failed`` or, by a solver that
+        answers another scene, ``declined``; ``message``, errors and times.
     """
     expected = chosen.expected[chosen.expected["scene"].isin(names)]
     numbers = []
@@ -183,7 +235,7 @@ def judge(
 def _compared(
     expected: pd.DataFrame, solver: str, theirs: Answers | None, ours: Answers
 ) -> pd.DataFrame:
-    """The expectations with the answers of a solver; without one those of our own runs."""
+    """The expectations with the answers of a solver, by default of our own runs."""
     places = expected["at"].map(place_of)
     keys = list(zip(expected["scene"], expected["quantity"], places, strict=True))
     table = expected.assign(solver=solver)
@@ -213,7 +265,7 @@ def _verdicts(
     used: pd.DataFrame,
     ours: pd.DataFrame,
 ) -> pd.DataFrame:
-    """The verdict of each scene from the `_compared` table of a solver and the times."""
+    """The verdict of each scene from the `_compared` table of a solver and times."""
     judged = table[table["tolerance"].notna()]
     of_scene = dict(iter(table.groupby("scene")))
     off_in = dict(iter(judged[~judged["within"]].groupby("scene")))
@@ -303,19 +355,25 @@ def _question(row: Mapping[Any, Any]) -> str:
 
 
 def failures(verdicts: pd.DataFrame) -> pd.DataFrame:
-    """The failures of solvers, one for each cause.
+    """List the failures of solvers, one for each cause.
 
-    Columns ``solver``, ``scenes``, ``kind``, ``why``.
+    Parameters
+    ----------
+    verdicts
+        The verdicts of `judge`.
+
+    Returns
+    -------
+    DataFrame
+        Columns ``solver``, ``scenes``, ``kind``, ``why``.
     """
     failed = verdicts[verdicts["failed"]]
     # messages of one cause differ in their numbers
-    cause = failed["message"].str.replace(
-        r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "#", regex=True
-    )
+    number = r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?"
+    cause = failed["message"].str.replace(number, "#", regex=True)
     rows = []
-    for (solver, kind, _), group in failed.groupby(
-        ["solver", "kind", cause], sort=False
-    ):
+    groups = failed.groupby(["solver", "kind", cause], sort=False)
+    for (solver, kind, _), group in groups:
         first = group.iloc[0]
         scenes = first["scene"]
         if len(group) > 1:
@@ -325,27 +383,49 @@ def failures(verdicts: pd.DataFrame) -> pd.DataFrame:
 
 
 def summary(verdicts: pd.DataFrame) -> pd.DataFrame:
-    """One row for each level and kind that was asked, and each solver; errors in per cent."""
+    """Sum up the verdicts.
+
+    Parameters
+    ----------
+    verdicts
+        The verdicts of `judge`.
+
+    Returns
+    -------
+    DataFrame
+        A row for each level and kind that was asked, and each solver; errors in per
+        cent.
+    """
     groups = verdicts.groupby(["level", "kind", "solver"], sort=False)
-    table = pd.DataFrame(
-        {
-            "scenes": groups["scene"].size(),
-            "passed": groups["passed"].sum(),
-            "failed": groups["failed"].sum(),
-            "declined": groups["declined"].sum(),
-            "error, %": 100 * groups["error"].median(),
-            "bias, %": 100 * groups["bias"].median(),
-            "largest, %": 100 * groups["worst"].max(),
-            "time over ours": groups["ratio"].median(),
-            "CPU over ours": groups["cpu_ratio"].median(),
-            "peak, MiB": groups["peak_mib"].max(),
-        }
-    )
-    return table.reset_index()
+    columns = {
+        "scenes": groups["scene"].size(),
+        "passed": groups["passed"].sum(),
+        "failed": groups["failed"].sum(),
+        "declined": groups["declined"].sum(),
+        "error, %": 100 * groups["error"].median(),
+        "bias, %": 100 * groups["bias"].median(),
+        "largest, %": 100 * groups["worst"].max(),
+        "time over ours": groups["ratio"].median(),
+        "CPU over ours": groups["cpu_ratio"].median(),
+        "peak, MiB": groups["peak_mib"].max(),
+    }
+    return pd.DataFrame(columns).reset_index()
 
 
 def in_words(verdicts: pd.DataFrame) -> list[str]:
-    """A line for each solver: PASSED or FAILED, its name, and the numbers of its scenes."""
+    """Sum up the verdicts in words.
+
+    Parameters
+    ----------
+    verdicts
+        The verdicts of `judge`.
+
+    Returns
+    -------
+    list of str
+        A line for each solver: PASSED or FAILED, its name, and the numbers of its
+        scenes.
+    """
     lines = []
     for solver, scenes in verdicts.groupby("solver", sort=False):
         passed, failed, declined = scenes[["passed", "failed", "declined"]].sum()

@@ -1,7 +1,8 @@
-"""A benchmark pack on disk: its scenes, questions and expected answers, written and read.
+"""A benchmark pack on disk: its scenes, questions and expected answers.
 
-docs/benchmark.md is the contract for solvers. `read` refuses a pack whose files are not those of
-its manifest, or whose names or links lead out of it: a pack may come from anywhere.
+docs/benchmark.md is the contract for solvers. `read` refuses a pack whose files are not
+those of its manifest, or whose names or links lead out of it: a pack may come from
+anywhere.
 """
 
 import json
@@ -27,37 +28,42 @@ from orchestrator.types import Row
 
 SCHEMA = 2
 """Version of the exchange format. A key or column that is renamed is a new version."""
-MANIFEST, EXPECTED, STUDY, TIMES = (
-    "manifest.json",
-    "expected.csv",
-    "study.toml",
-    "times.csv",
-)
-FILES = (EXPECTED, "scenes.csv", TIMES, STUDY, "README.md")
+MANIFEST = "manifest.json"
+EXPECTED = "expected.csv"
+LIST = "scenes.csv"
+STUDY = "study.toml"
+TIMES = "times.csv"
+ABOUT = "README.md"
+FILES = (EXPECTED, LIST, TIMES, STUDY, ABOUT)
 """Files of a pack beside its manifest and the directory of its scenes."""
-SCENES, SCENE = "scenes", "scene.json"
+SCENES = "scenes"
+"""The directory of the scenes."""
+SCENE = "scene.json"
+"""The file of a scene with its entries."""
 COLUMNS = ["quantity", "at", "value", "low", "high", "tolerance", "ours"]
 """Columns of the expected answers beside the scene's name."""
 COUNTS = ("moved", "not_moved", "carried_off")
 """Quantities that count grains."""
-LARGEST_TOLERANCE = 1.0  # relative, of an expected answer
-NUMBER = "%.9g"  # format of the numbers in all tables
+LARGEST_TOLERANCE = 1.0
+"""Largest relative tolerance of an expected answer."""
+NUMBER = "%.9g"
+"""Format of the numbers in all tables."""
 KINDS = {
-    **{
-        "closed-form": 1,
-        "collision": 2,
-        "incline": 2,
-        "sliding": 2,
-        "passing": 2,
-        "pivot": 2,
-    },
-    **{"flow": 3, "pile": 4, "line": 5},
+    "closed-form": 1,
+    "collision": 2,
+    "incline": 2,
+    "sliding": 2,
+    "passing": 2,
+    "pivot": 2,
+    "flow": 3,
+    "pile": 4,
+    "line": 5,
 }
 """Kinds of scenes, and the level of each."""
 CONTRACT = "## Write a solver\n"
 """Heading in docs/benchmark.md with which the contract for solvers begins."""
 _DECIMAL = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
-"""A number as programs print it; Python would also take 1_000 and digits of other scripts."""
+"""A number as programs print it: Python would take 1_000 and other scripts, too."""
 _IN_SCENES = re.compile(
     r"[1-5]-[a-z0-9]+([.+-][a-z0-9]+)*/[a-z0-9]+([_-][a-z0-9]+)*\.(csv|json)"
 )
@@ -85,10 +91,22 @@ _ENTRIES = TypeAdapter(
 class Problem:
     """A scene with its questions and their answers.
 
-    `name` is unique among the scenes of its level. The entries of ``scene.json`` are `parameters`;
-    `tables` lie beside it, by the stems of their files. `rows` are made by `expectation`, one for
-    each number that is asked. `runs` are the names of the cases of our answer, `seconds` is its
-    time, s.
+    Attributes
+    ----------
+    name
+        A name that no other scene of its level has.
+    kind
+        Its kind, one of `KINDS`.
+    parameters
+        The entries of ``scene.json``.
+    tables
+        The tables beside it, by the stems of their files.
+    rows
+        A row for each number that is asked, made by `expectation`.
+    runs
+        Names of the cases of our answer.
+    seconds
+        The time of our answer, s.
     """
 
     name: str
@@ -133,19 +151,34 @@ class Problem:
         return {**head, **self.parameters}
 
     def write(self, folder: Path) -> None:
-        """Write the directory that a solver is given."""
+        """Write the directory that a solver is given.
+
+        Parameters
+        ----------
+        folder
+            The directory, which does not exist yet.
+        """
         folder.mkdir(parents=True)
         text = json.dumps({"schema": SCHEMA, **self.entries}, indent=1, allow_nan=False)
         (folder / SCENE).write_text(text + "\n", encoding="utf-8")
-        for stem, table in {
-            **self.tables,
-            "ask": self.expected[["quantity", "at"]],
-        }.items():
+        questions = self.expected[["quantity", "at"]]
+        for stem, table in {**self.tables, "ask": questions}.items():
             (folder / f"{stem}.csv").write_text(csv(table), encoding="utf-8")
 
 
 def csv(table: pd.DataFrame) -> str:
-    """The text of a table of a pack."""
+    """Write a table of a pack.
+
+    Parameters
+    ----------
+    table
+        The table.
+
+    Returns
+    -------
+    str
+        Its text.
+    """
     return table.to_csv(index=False, float_format=NUMBER)
 
 
@@ -156,18 +189,66 @@ def expectation(
     at: float | None = None,
     *interval: float,
 ) -> Row:
-    """A row of the expected answers; the value is also our answer.
+    """Make a row of the expected answers; the value is also our answer.
 
-    `at` is the argument of a quantity that is a function; the interval, low and high, is by default
-    the value itself. A relative tolerance of NaN is not judged.
+    Parameters
+    ----------
+    quantity
+        The quantity that is asked.
+    value
+        The expected answer.
+    tolerance
+        Relative tolerance; a number whose tolerance is NaN is not judged.
+    at
+        Argument of a quantity that is a function.
+    *interval
+        Low and high end of the expected answer, by default the value itself.
+
+    Returns
+    -------
+    dict
+        The columns `COLUMNS`.
+
+    Examples
+    --------
+    >>> expectation("moved", 3.0, 0.0, 7, 2.0, 4.0)["at"]
+    '7'
     """
-    place = "" if at is None else NUMBER % at
-    values = (quantity, place, value, *(interval or (value, value)), tolerance, value)
-    return dict(zip(COLUMNS, values, strict=True))
+    low, high = interval or (value, value)
+    return {
+        "quantity": quantity,
+        "at": "" if at is None else NUMBER % at,
+        "value": value,
+        "low": low,
+        "high": high,
+        "tolerance": tolerance,
+        "ours": value,
+    }
 
 
 def number_of(text: str) -> float:
-    """A finite number from its text; ValueError for any other text."""
+    """Read a finite number.
+
+    Parameters
+    ----------
+    text
+        The number as programs print it.
+
+    Returns
+    -------
+    float
+        The number.
+
+    Raises
+    ------
+    ValueError
+        If it is no number, or beyond the largest double.
+
+    Examples
+    --------
+    >>> number_of(" 1e-3")
+    0.001
+    """
     if not _DECIMAL.fullmatch(text.strip()):
         raise ValueError(f"{text!r} is not a number")
     number = float(text)
@@ -178,7 +259,19 @@ def number_of(text: str) -> float:
 
 @dataclass(frozen=True)
 class Pack:
-    """A pack that was read: its directory, its scenes' entries by name, its expected answers."""
+    """A pack that was read.
+
+    Attributes
+    ----------
+    root
+        Its directory.
+    manifest
+        Its manifest.
+    scenes
+        The entries of each scene, by its name.
+    expected
+        The expected answers: columns ``scene`` and `COLUMNS`.
+    """
 
     root: Path
     manifest: Manifest
@@ -187,29 +280,43 @@ class Pack:
 
     @property
     def questions(self) -> str:
-        """Digest of all that a solver is given: answers belong to these questions alone.
+        """Digest of all that a solver is given: answers belong to these questions.
 
         A pack that was exported again has the same one, unless a scene has changed.
         """
-        asked = self.manifest.sha256.items()
-        given = {
-            name: digest for name, digest in asked if name.startswith(f"{SCENES}/")
-        }
+        given = {}
+        for name, digest in self.manifest.sha256.items():
+            if name.startswith(f"{SCENES}/"):
+                given[name] = digest
         return digest_text(canonical_json(given))
 
     def chosen(
         self, levels: Collection[int] = (), patterns: Collection[str] = ()
     ) -> list[str]:
-        """Names of the scenes of some levels and patterns, empty for all, by rising level.
+        """Choose scenes.
 
-        Raises InputError if none is left.
+        Parameters
+        ----------
+        levels
+            Levels of the scenes; all if empty.
+        patterns
+            Patterns of their names; all if empty.
+
+        Returns
+        -------
+        list of str
+            Names of the scenes, by rising level.
+
+        Raises
+        ------
+        InputError
+            If none is left.
         """
         names = []
         for name, given in self.scenes.items():
             is_of_level = not levels or given["level"] in levels
-            if is_of_level and any(
-                fnmatchcase(name, pattern) for pattern in patterns or ["*"]
-            ):
+            fits = any(fnmatchcase(name, pattern) for pattern in patterns or ["*"])
+            if is_of_level and fits:
                 names.append(name)
         if not names:
             remedy = "see its scenes.csv, and --level and --scene"
@@ -218,14 +325,29 @@ class Pack:
 
 
 def read(root: Path) -> Pack:
-    """Read a pack; raises InputError if there is none, or it is of another schema or changed."""
+    """Read a pack.
+
+    Parameters
+    ----------
+    root
+        Its directory.
+
+    Returns
+    -------
+    Pack
+        The pack.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it is of another schema or changed.
+    """
     if not os.path.lexists(root / MANIFEST):
         what = f"there is no pack here: {MANIFEST} is missing"
         remedy = "write one with: python -m orchestrator benchmark export"
         if (root / EXPECTED).is_file() and not (root / SCENES).exists():
-            what = (
-                f"this is a table of expected answers, and no pack: it has no {SCENES}"
-            )
+            what = f"it has no {SCENES}"
+            what = f"this is a table of expected answers, and no pack: {what}"
             remedy = "its README.md says how the pack is written"
         raise InputError(what, str(root), remedy)
     path = root / MANIFEST
@@ -235,19 +357,35 @@ def read(root: Path) -> Pack:
         scenes: dict[str, Row] = {}
         for name in manifest.scenes:
             path = root / SCENES / name / SCENE
-            entries = scenes[name] = _ENTRIES.validate_json(path.read_bytes())
+            entries = _ENTRIES.validate_json(path.read_bytes())
             head = [entries.get(key) for key in ("schema", "scene", "level")]
-            if head != [SCHEMA, name, KINDS.get(str(entries.get("kind")), 0)]:
+            level = KINDS.get(str(entries.get("kind")), 0)
+            if head != [SCHEMA, name, level]:
                 _refuse(f"schema, scene, level and kind are not those of {name}", path)
-            entries["level"] = int(entries["level"])
+            entries["level"] = level
+            scenes[name] = entries
     except ValidationError as error:
         fault = error.errors()[0]
-        _refuse(f"{'.'.join(map(str, fault['loc'][:2]))}: {fault['msg']}", path)
+        place = ".".join(map(str, fault["loc"][:2]))
+        _refuse(f"{place}: {fault['msg']}", path)
     return Pack(root, manifest, scenes, _expected(root / EXPECTED, scenes))
 
 
 def verify(root: Path, manifest: Manifest) -> None:
-    """See that no file of a pack has changed; raises InputError naming the first that has."""
+    """See that no file of a pack has changed.
+
+    Parameters
+    ----------
+    root
+        Its directory.
+    manifest
+        Its manifest, with the digests.
+
+    Raises
+    ------
+    InputError
+        If one has; it names the first.
+    """
     paths = [root / name for name in FILES]
     for path in (root / SCENES).rglob("*"):  # it does not follow links to directories
         if path.is_symlink() or not path.is_dir():
@@ -262,20 +400,19 @@ def verify(root: Path, manifest: Manifest) -> None:
         if manifest.sha256.get(name) != digests.get(name):
             how = "is missing" if name not in digests else "is not what was exported"
             _refuse(f"the file {name} {how}", root)
-    if {name.split("/")[1] for name in manifest.sha256 if "/" in name} != {
-        *manifest.scenes
-    }:
+    directories = {name.split("/")[1] for name in manifest.sha256 if "/" in name}
+    if directories != {*manifest.scenes}:
         _refuse(f"its manifest does not list the scenes of {SCENES}", root)
 
 
 def _refuse(what: str, where: Path) -> NoReturn:
-    raise InputError(
-        what, where=str(where), remedy="the pack is not used: export it again"
-    )
+    """Refuse a pack."""
+    remedy = "the pack is not used: export it again"
+    raise InputError(what, where=str(where), remedy=remedy)
 
 
 def _expected(path: Path, scenes: Mapping[str, Row]) -> pd.DataFrame:
-    """Read the expected answers of some scenes; raises InputError if they mean nothing."""
+    """Read the expected answers of some scenes; refuse some that mean nothing."""
     texts = ["scene", *COLUMNS[:2]]
     numbers = COLUMNS[2:]
     kinds = {**dict.fromkeys(texts, object), **dict.fromkeys(numbers, float)}
@@ -307,11 +444,30 @@ def write(
     study: tuple[str, str],
     programs: Mapping[str, str],
 ) -> int:
-    """Write a pack, in place of one of the same study, and return how many scenes it has.
+    """Write a pack, in place of one of the same study.
 
-    Scenes of which no number is judged are left out. `study` are the name and the text of the study
-    file; `programs` gave the expected answers, with their versions. Raises InputError if the
-    directory holds something else.
+    Scenes of which no number is judged are left out.
+
+    Parameters
+    ----------
+    root
+        Its directory.
+    problems
+        The scenes.
+    study
+        Name and text of the study file.
+    programs
+        The programs that gave the expected answers, with their versions.
+
+    Returns
+    -------
+    int
+        How many scenes it has.
+
+    Raises
+    ------
+    InputError
+        If the directory holds something else.
     """
     name, text = study
     with workspace.claimed(root, workspace.PACK, name) as folder:
@@ -322,50 +478,59 @@ def write(
         for one in listed:
             one.write(scenes / one.scene)
         expected = pd.concat([one.expected.assign(scene=one.scene) for one in listed])
-        times = pd.DataFrame(
-            {"scene": one.scene, "seconds": one.seconds} for one in listed
-        )
+        scene_names = [one.scene for one in listed]
+        seconds = [one.seconds for one in listed]
+        times = pd.DataFrame({"scene": scene_names, "seconds": seconds})
         files = {
             EXPECTED: csv(expected[["scene", *COLUMNS]]),
-            "scenes.csv": csv(pd.DataFrame(one.entries for one in listed)),
+            LIST: csv(pd.DataFrame(one.entries for one in listed)),
             TIMES: csv(times.dropna()),
             STUDY: text,
-            "README.md": _readme(programs),
+            ABOUT: _readme(programs),
         }
         for file, content in files.items():
             folder.put(file, content)
-        model = re.search(
-            "(?m)^model name.*: (.*)$", Path("/proc/cpuinfo").read_text("utf-8")
-        )
-        processor, paths = (
-            model[1] if model else platform.machine(),
-            [root / f for f in files],
-        )
+        paths = [root / file for file in files]
         manifest = {
             "schema": SCHEMA,
-            "scenes": [one.scene for one in listed],
+            "scenes": scene_names,
             "programs": dict(programs),
-            "machine": {"processor": processor, "cores": os.cpu_count()},
+            "machine": {"processor": _processor(), "cores": os.cpu_count()},
             "sha256": digest_files([*paths, *scenes.glob("*/*")], root=root),
         }
         folder.note(MANIFEST, text_of(about | manifest))
     return len(listed)
 
 
-README = """# A benchmark pack
+def _processor() -> str:
+    """Name of the processor."""
+    text = Path("/proc/cpuinfo").read_text("utf-8")
+    model = re.search("(?m)^model name.*: (.*)$", text)
+    return model[1] if model else platform.machine()
 
-Scenes of the model of Bravo, Ortiz and Pérez-Aparicio with their questions (`scenes/`) and expected
-answers (`expected.csv`), for a native code of the same model. What follows is all that a solver has
-to know, schema 2; the program `orchestrator` runs and judges one: `orchestrator benchmark run PACK
---solver 'my-solver {case} {out}'`.
 
-"""
+README = (
+    "# A benchmark pack\n\n"
+    "Scenes of the model of Bravo, Ortiz and Pérez-Aparicio with their questions"
+    " (`scenes/`) and expected\n"
+    "answers (`expected.csv`), for a native code of the same model. What follows is all"
+    " that a solver has\n"
+    "to know, schema 2; the program `orchestrator` runs and judges one:"
+    " `orchestrator benchmark run PACK\n"
+    "--solver 'my-solver {case} {out}'`.\n\n"
+)
+"""Beginning of the README of a pack."""
 
 
 def contract() -> str:
-    """The contract for solvers: the page docs/benchmark.md from its section "Write a solver" on.
+    """The contract for solvers, a part of the page docs/benchmark.md.
 
     The page lies beside the package, or in it in a wheel.
+
+    Returns
+    -------
+    str
+        The page from its section "Write a solver" on.
     """
     inside = PACKAGE / "docs"
     folder = inside if inside.is_dir() else PACKAGE.parent / "docs"
@@ -374,13 +539,10 @@ def contract() -> str:
 
 
 def _readme(programs: Mapping[str, str]) -> str:
-    """The text of a pack's README, with the programs of our answers and their versions."""
-    lines = [
-        f"- {program} {version}\n" for program, version in sorted(programs.items())
-    ]
-    by = (
-        "\n## Programs that gave the answers of our runs\n\n" + "".join(lines)
-        if lines
-        else ""
-    )
-    return README + contract() + by
+    """The README of a pack, with the programs of our answers and their versions."""
+    text = README + contract()
+    if programs:
+        text += "\n## Programs that gave the answers of our runs\n\n"
+    for program, version in sorted(programs.items()):
+        text += f"- {program} {version}\n"
+    return text

@@ -1,11 +1,12 @@
 """The page of a comparison: figures and tables of all solvers side by side."""
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 
@@ -18,10 +19,13 @@ from orchestrator.report import page, style
 from orchestrator.report.page import Section
 from orchestrator.report.style import DIAMETERS, PANELS, WATER, Figure, Look
 from orchestrator.runs.files import Folder
+from orchestrator.types import FloatArray
 
 PAGE = "comparison.html"
-FLOOR, CEILING = 1e-6, 1e3
-"""Least and largest relative error on a logarithmic axis."""
+FLOOR = 1e-6
+"""Least relative error on a logarithmic axis."""
+CEILING = 1e3
+"""Largest relative error on a logarithmic axis."""
 CPU_S = (1e-6, 1e8)
 """Least and largest time on a logarithmic axis, s: others may have noted any number."""
 EXPECTED = "0.25"
@@ -29,23 +33,36 @@ EXPECTED = "0.25"
 ROOM = 1.0
 """Room above and below the expected answers of a panel in which answers are drawn, over
 their range."""
-MARKERS = {1: "o", 2: "s", 3: "D", 4: "^", 5: "v"}  # of the levels
+MARKERS = {1: "o", 2: "s", 3: "D", 4: "^", 5: "v"}
+"""Markers of the levels."""
 LIMITS = (
     "Levels 1 and 2 are compared with exact answers, levels 3 to 5 with our own runs.",
-    "The intervals hold a load step, the resolution of the count and the scatter over packings "
-    "where it was run; they do not hold the error of the flow model.",
+    "The intervals hold a load step, the resolution of the count and the scatter over"
+    " packings where it was run; they do not hold the error of the flow model.",
     "Scenes of less than a second are mostly start-up of the programs.",
 )
-ERRORS = """Errors are relative, over the judged numbers of a scene; the bias is their median with
-its sign. Times are the solver’s over ours, which ran in turn with it, the median of the scenes.
-Every number is in comparison.csv beside this page, every scene in verdicts.csv. The programs below
-gave the expected answers."""
-THRESHOLDS = """Threshold Shields numbers. One with a * is outside the interval of the expected
-answer, one with ** also beyond its tolerance: it fails."""
+ERRORS = (
+    "Errors are relative, over the judged numbers of a scene; the bias is their median"
+    " with\nits sign. Times are the solver’s over ours, which ran in turn with it, the"
+    " median of the scenes.\nEvery number is in comparison.csv beside this page, every"
+    " scene in verdicts.csv. The programs below\ngave the expected answers."
+)
+THRESHOLDS = (
+    "Threshold Shields numbers. One with a * is outside the interval of the"
+    " expected\nanswer, one with ** also beyond its tolerance: it fails."
+)
 SHOWN = {
-    **{"solver": "solver", "scene": "scene", "passed": "passed", "error": "error, %"},
-    **{"worst": "largest, %", "seconds": "s", "ratio": "over ours", "cpu_s": "CPU, s"},
-    **{"cpu_ratio": "CPU over ours", "peak_mib": "MiB", "steps": "time steps"},
+    "solver": "solver",
+    "scene": "scene",
+    "passed": "passed",
+    "error": "error, %",
+    "worst": "largest, %",
+    "seconds": "s",
+    "ratio": "over ours",
+    "cpu_s": "CPU, s",
+    "cpu_ratio": "CPU over ours",
+    "peak_mib": "MiB",
+    "steps": "time steps",
 }
 """Columns of the table of scenes."""
 BEDS = (
@@ -69,88 +86,117 @@ AXES: dict[str, tuple[str, str, Look]] = {
 def write(
     chosen: Pack, numbers: pd.DataFrame, verdicts: pd.DataFrame, folder: Folder
 ) -> None:
-    """Put the page and its figures into a directory; the tables are those of `judge.judge`."""
+    """Put the page and its figures into a directory.
+
+    Parameters
+    ----------
+    chosen
+        The pack.
+    numbers, verdicts
+        The tables of `judge.judge`.
+    folder
+        The directory.
+    """
     theirs = verdicts[verdicts["solver"] != OURS]
-    percent = {name: 100 * theirs[name] for name in ("error", "worst")}
     scenes = theirs[[*SHOWN]].assign(
-        **percent, passed=np.where(theirs["passed"], "yes", "no")
+        error=100 * theirs["error"],
+        worst=100 * theirs["worst"],
+        passed=np.where(theirs["passed"], "yes", "no"),
     )
     scenes = scenes.rename(columns=SHOWN)
     with style.settings(), warnings.catch_warnings():
         # the name of a solver may have letters that the font has not
         warnings.filterwarnings("ignore", "Glyph .* missing from font")
-        answered = theirs[theirs["answered"]].groupby("kind")["scene"].unique()
-        beds = [
-            _panels(numbers, answered[kind], *of)
-            for kind, *of in BEDS
-            if kind in answered
-        ]
-        beds += _shields(chosen, numbers)
+        beds = _beds(numbers, theirs) + _shields(chosen, numbers)
+        said = "\n\n".join(judge.in_words(theirs))
         sections = [
-            Section(
-                "", "\n\n".join(judge.in_words(theirs)), (), (judge.summary(theirs),)
-            ),
+            Section("", said, (), (judge.summary(theirs),)),
             Section("What failed", tables=(judge.failures(theirs),)),
             Section("Beds", THRESHOLDS, beds, (thresholds(numbers),)),
             Section("Time and error", ERRORS, _speed(verdicts), (scenes,), LIMITS),
         ]
         names = ", ".join(theirs["solver"].unique())
         title = f"Against the pack “{printable(chosen.root.name)}”: {names}"
-        shown = [
-            part for part in sections if part.figures or any(map(len, part.tables))
-        ]
+        shown = []
+        for section in sections:
+            if section.figures or any(map(len, section.tables)):
+                shown.append(section)
         page.write(title, shown, folder, PAGE, chosen.manifest.programs)
 
 
+def _beds(numbers: pd.DataFrame, theirs: pd.DataFrame) -> list[Figure]:
+    """The figures of `BEDS` whose kind of scene a solver has answered."""
+    answered = theirs[theirs["answered"]].groupby("kind")["scene"].unique()
+    figures = []
+    for kind, quantity, name, title in BEDS:
+        if kind in answered:
+            figures.append(_panels(numbers, answered[kind], quantity, name, title))
+    return figures
+
+
 def _looks(table: pd.DataFrame) -> dict[str, Look]:
-    """A colour for each solver, ours first, and rings one in the other: equal answers hide none."""
+    """A colour for each solver, ours first, and rings of sizes that hide none."""
     names = [name for name in table["solver"].unique() if name != OURS]
     looks: dict[str, Look] = {OURS: {"color": EXPECTED, "ms": 3}}
     for number, name in enumerate(names):
-        colour, size = DIAMETERS[number % len(DIAMETERS)], 2 * (len(names) - number) + 1
+        colour = DIAMETERS[number % len(DIAMETERS)]
+        size = 2 * (len(names) - number) + 1
         looks[name] = {"color": colour, "ms": size, "mfc": "none", "mew": 0.7}
     return looks
 
 
 def thresholds(numbers: pd.DataFrame) -> pd.DataFrame:
-    """The threshold Shields numbers of piles: ours, each solver's, the interval."""
+    """List the threshold Shields numbers of piles.
+
+    Parameters
+    ----------
+    numbers
+        The table of `judge.judge`.
+
+    Returns
+    -------
+    DataFrame
+        A row for each scene and n/N: ours, that of each solver, and the interval, as
+        texts.
+    """
     asked = numbers[numbers["quantity"].eq("shields") & numbers["at"].ne("")]
     margin = judge.ROUND * asked["value"]
     is_inside = asked["answer"].between(asked["low"] - margin, asked["high"] + margin)
-    marks = np.where(asked["within"], np.where(is_inside, "", " *"), " **")
-    pairs = zip(asked["answer"], marks, strict=True)
-    texts = ["—" if x != x else f"{x:#.3g}{mark}" for x, mark in pairs]
+    marks = np.where(is_inside, "", " *")
+    marks = np.where(asked["within"], marks, " **")
+    texts = []
+    for answer, mark in zip(asked["answer"], marks, strict=True):
+        texts.append("—" if np.isnan(answer) else f"{answer:#.3g}{mark}")
     ends = zip(asked["low"], asked["high"], strict=True)
     interval = [f"{low:#.3g} ... {high:#.3g}" for low, high in ends]
     table = asked.assign(texts=texts, interval=interval, **{"n/N": asked["at"]})
-    table = table.pivot(
-        index=["scene", "n/N", "interval"], columns="solver", values="texts"
-    )
-    table = table.reindex(columns=[*_looks(asked)]).reset_index()
-    return table[["scene", "n/N", *_looks(asked), "interval"]]
+    keys = ["scene", "n/N", "interval"]
+    table = table.pivot(index=keys, columns="solver", values="texts")
+    solvers = [*_looks(asked)]
+    table = table.reindex(columns=solvers).reset_index()
+    return table[["scene", "n/N", *solvers, "interval"]]
 
 
 def _legends(
-    canvas: Canvas, looks: dict[str, Look], levels: Any, *samples: Line2D
+    canvas: Canvas, looks: dict[str, Look], levels: Iterable[int], *samples: Line2D
 ) -> None:
     """A legend of the solvers above, and one of samples and levels below."""
-    # a dollar sign in the name of a solver begins no formula
-    solvers = [
-        style.entry(name.replace("$", r"\$"), look["color"])
-        for name, look in looks.items()
-    ]
-    grey: Look = {"color": "0.3", "mfc": "none", "ls": "none"}
-    marks = [
-        Line2D([], [], marker=MARKERS[n], label=f"level {n}", **grey)
-        for n in sorted(levels)
-    ]
+    solvers = []
+    for name, look in looks.items():
+        # a dollar sign in the name of a solver begins no formula
+        solvers.append(style.entry(name.replace("$", r"\$"), look["color"]))
+    marks = []
+    for level in sorted(levels):
+        mark = Line2D([], [], color="0.3", mfc="none", ls="none")
+        mark.set(marker=MARKERS[level], label=f"level {level}")
+        marks.append(mark)
     style.legends(canvas, solvers, [*samples, *marks])
 
 
 def _panels(
     numbers: pd.DataFrame, scenes: Sequence[str], quantity: str, name: str, title: str
 ) -> Figure:
-    """A quantity along the bed, or over the load steps, of some scenes, spread over the pack."""
+    """A quantity along the bed, or over the load steps, of scenes of the pack."""
     places = np.unique(np.linspace(0, len(scenes) - 1, PANELS).astype(int))
     drawn = [scenes[place] for place in places]
     looks = _looks(numbers)
@@ -159,29 +205,37 @@ def _panels(
     canvas, axes = style.grid(drawn, 1.7, x_label, y_label, columns=3)
     outside = 0
     for ax, scene in zip(axes, drawn, strict=True):
-        rows = numbers[numbers["scene"] == scene]
-        last = rows[rows["solver"] == OURS].groupby("quantity")["value"].last()
-        count = last.get("moved", 1.0) + last.get("not_moved", 0.0)
-        asked = rows[rows["quantity"] == quantity]
-        low = float(asked["low"].min() / count)
-        high = float(asked["high"].max() / count)
-        room = ROOM * (high - low)
-        for solver, of in asked.groupby("solver"):
-            x = of["at"].astype(float)
-            if solver == OURS:
-                ax.fill_between(
-                    x, of["low"] / count, of["high"] / count, color="0.85", lw=0
-                )
-                ax.plot(x, of["value"] / count, color=EXPECTED)
-                continue
-            answer = of["answer"] / count
-            is_near = answer.between(low - room, high + room)
-            outside += int((answer.notna() & ~is_near).sum())
-            ax.plot(x[is_near], answer[is_near], "o", **looks[str(solver)])
+        outside += _panel(ax, numbers[numbers["scene"] == scene], quantity, looks)
         ax.set(**limits)
     _legends(canvas, looks, (), style.entry("expected, interval", EXPECTED))
-    caption = f"{len(drawn)} of {len(scenes)} scenes: expected answers, and rings of the solvers."
+    caption = f"{len(drawn)} of {len(scenes)} scenes"
+    caption = f"{caption}: expected answers, and rings of the solvers."
     return Figure(name, title, caption + _left_out(outside), (), canvas)
+
+
+def _panel(
+    ax: Axes, rows: pd.DataFrame, quantity: str, looks: Mapping[str, Look]
+) -> int:
+    """Draw a quantity of one scene; the number of the answers that are left out."""
+    last = rows[rows["solver"] == OURS].groupby("quantity")["value"].last()
+    count = last.get("moved", 1.0) + last.get("not_moved", 0.0)
+    asked = rows[rows["quantity"] == quantity]
+    low = float(asked["low"].min() / count)
+    high = float(asked["high"].max() / count)
+    room = ROOM * (high - low)
+    outside = 0
+    for solver, part in asked.groupby("solver"):
+        x = part["at"].astype(float)
+        if solver == OURS:
+            ends = (part["low"] / count, part["high"] / count)
+            ax.fill_between(x, *ends, color="0.85", lw=0)
+            ax.plot(x, part["value"] / count, color=EXPECTED)
+            continue
+        answer = part["answer"] / count
+        is_near = answer.between(low - room, high + room)
+        outside += int((answer.notna() & ~is_near).sum())
+        ax.plot(x[is_near], answer[is_near], "o", **looks[str(solver)])
+    return outside
 
 
 def _left_out(count: int) -> str:
@@ -197,13 +251,7 @@ def _shields(chosen: Pack, numbers: pd.DataFrame) -> list[Figure]:
     if asked.empty:
         return []
     given = pd.DataFrame([chosen.scenes[name] for name in asked["scene"]], asked.index)
-    # of theta = rho_f u*^2/((rho_sol - rho_f) g d) and Re* = u* d/nu
-    excess = (
-        (given["rho_sol_kg_m3"] / given["rho_f_kg_m3"] - 1)
-        * given["g_m_s2"]
-        * given["d_m"]
-    )
-    unit = np.sqrt(excess) * given["d_m"] / given["nu_m2_s"]
+    asked = asked.assign(level=given["level"], unit=_reynolds_unit(given))
     looks = _looks(numbers)
     canvas = style.canvas(3.8)
     ax = canvas.subplots()
@@ -211,37 +259,57 @@ def _shields(chosen: Pack, numbers: pd.DataFrame) -> list[Figure]:
         ax.plot(*curve.points(), color=WATER, lw=0.8)
     here = asked[asked["solver"] == OURS]
     theta = here["value"]
-    x = unit[here.index] * np.sqrt(theta)
+    x = here["unit"] * np.sqrt(theta)
     spread = [theta - here["low"], here["high"] - theta]
-    ax.errorbar(
-        x, theta, spread, fmt="none", ecolor=looks.pop(OURS)["color"], elinewidth=0.7
-    )
+    del looks[OURS]
+    ax.errorbar(x, theta, spread, fmt="none", ecolor=EXPECTED, elinewidth=0.7)
     x_ends = (float(x.min()) / 3, float(x.max()) * 3)
     y_ends = (max(min(theta.min(), 0.02) / 2, 1e-6), max(theta.max(), 0.2) * 2)
-
     table = asked[asked["solver"] != OURS]
-    # the root of a negative answer is none
-    answer = table["answer"].where(table["answer"] > 0)
-    reynolds = unit[table.index] * np.sqrt(answer)
-    table = table.assign(level=given["level"], reynolds=reynolds)
-    is_near = reynolds.between(*x_ends) & answer.between(*y_ends)
-    outside = int((table["answer"].notna() & ~is_near).sum())
-    groups: Any = table[is_near].groupby(["solver", "level"])
-    for (solver, level), rows in groups:
-        ax.plot(rows["reynolds"], rows["answer"], MARKERS[level], **looks[solver])
+    outside = _answers(ax, table, looks, x_ends, y_ends)
     ax.set(xscale="log", yscale="log", ylabel="Shields number")
     ax.set_xlabel(r"$Re^\star = u^\star d/\nu$")
     ax.set_xlim(*x_ends)
     ax.set_ylim(*y_ends)
-    samples = {"curves for water": WATER, "expected, interval": EXPECTED}
     _legends(
         canvas,
         looks,
         table["level"].unique(),
-        *map(style.entry, samples, samples.values()),
+        style.entry("curves for water", WATER),
+        style.entry("expected, interval", EXPECTED),
     )
-    caption = "Thresholds in the Shields diagram: bars are the intervals of the expected answers."
+    caption = "bars are the intervals of the expected answers."
+    caption = f"Thresholds in the Shields diagram: {caption}"
     return [Figure("shields", "Thresholds", caption + _left_out(outside), (), canvas)]
+
+
+def _reynolds_unit(given: pd.DataFrame) -> FloatArray:
+    """Re* of a grain at a Shields number of 1.
+
+    theta = rho_f u*^2/((rho_sol - rho_f) g d) and Re* = u* d/nu.
+    """
+    excess = given["rho_sol_kg_m3"] / given["rho_f_kg_m3"] - 1
+    speed_squared = excess * given["g_m_s2"] * given["d_m"]
+    unit = np.sqrt(speed_squared) * given["d_m"] / given["nu_m2_s"]
+    return np.asarray(unit, float)
+
+
+def _answers(
+    ax: Axes,
+    table: pd.DataFrame,
+    looks: Mapping[str, Look],
+    x_ends: tuple[float, float],
+    y_ends: tuple[float, float],
+) -> int:
+    """Draw the thresholds of solvers; the number of those that are left out."""
+    # the root of a negative answer is none
+    answer = table["answer"].where(table["answer"] > 0)
+    reynolds = table["unit"] * np.sqrt(answer)
+    is_near = reynolds.between(*x_ends) & answer.between(*y_ends)
+    groups: Any = table.assign(reynolds=reynolds)[is_near].groupby(["solver", "level"])
+    for (solver, level), rows in groups:
+        ax.plot(rows["reynolds"], rows["answer"], MARKERS[level], **looks[solver])
+    return int((table["answer"].notna() & ~is_near).sum())
 
 
 def _speed(verdicts: pd.DataFrame) -> list[Figure]:
@@ -264,8 +332,8 @@ def _speed(verdicts: pd.DataFrame) -> list[Figure]:
     )
     _legends(canvas, looks, timed["level"].unique())
     caption = (
-        "Each point is a scene: CPU time, and largest error of its judged numbers; ours is filled. "
-        f"Errors below {FLOOR:g} and above {CEILING:g} are drawn there: at levels 3 to 5 our own "
-        "run is expected."
+        "Each point is a scene: CPU time, and largest error of its judged numbers;"
+        f" ours is filled. Errors below {FLOOR:g} and above {CEILING:g} are drawn"
+        " there: at levels 3 to 5 our own run is expected."
     )
     return [Figure("speed-accuracy", "Speed and accuracy", caption, (), canvas)]

@@ -1,4 +1,4 @@
-"""The scenes of a pack: levels 1 and 2 are formulas, levels 3 to 5 the results of a study."""
+"""The scenes of a pack: levels 1 and 2 are formulas, 3 to 5 results of a study."""
 
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -29,18 +29,19 @@ STRESS = 0.10
 MEAN_STRESS = 0.05
 """Relative tolerance of its mean."""
 FACE = (0.1, 0.9)
-"""Part of the windward face on which it is judged: toe and crest are points of the mesh."""
+"""Part of the windward face on which it is judged: toe and crest are mesh points."""
 THRESHOLD = {"pile": 0.03, "line": 0.10}
 """Relative tolerances of a pile's thresholds, under the given stress and with one's own
 flow."""
 SCATTER = 0.10
-"""Part of N by which the count of moved grains may differ besides one load step, as runs
-do that differ by round-off: grains hold up others, chains go at once (engines.md)."""
+"""Part of N by which the count of moved grains may differ besides one load step, as
+runs do that differ by round-off: grains hold up others, chains go at once
+(engines.md)."""
 POURED_SCATTER = 0.15
 """The same of poured beds."""
 LEVEL_ROWS = 0.35
-"""Part of N until which level rows are judged: then a whole step goes at once or not, as
-the least detail decides (docs/engines.md)."""
+"""Part of N until which level rows are judged: then a whole step goes at once or not,
+as the least detail decides (docs/engines.md)."""
 LIFT_OFF = 0.20
 """Tolerance of thresholds where grains are carried off, which collide."""
 LIFT_OFF_SCATTER = 0.25
@@ -49,20 +50,26 @@ FLOWS = (0.5, 0.8, 1.1, 1.4)
 """Friction velocities at which the forces are asked, over that of the threshold."""
 LEAST_QUIET = 5.0
 """Load steps shorter than this, sqrt(d/g'), are ramps with other thresholds."""
-_GRAIN = """rho_f_kg_m3 nu_m2_s g_m_s2 d_m rho_sol_kg_m3 alpha_deg beta_deg z0_m force_law alpha_s
-regime mass_kg reduced_gravity_m_s2 weight_n"""
-_DEM = """phi_deg stiffness damping spring_n_m time_unit_s time_step displacement_criterion
-waiting_time load_increment"""
+_GRAIN = (
+    "rho_f_kg_m3 nu_m2_s g_m_s2 d_m rho_sol_kg_m3 alpha_deg beta_deg z0_m force_law"
+    " alpha_s regime mass_kg reduced_gravity_m_s2 weight_n"
+)
+_DEM = (
+    "phi_deg stiffness damping spring_n_m time_unit_s time_step"
+    " displacement_criterion waiting_time load_increment"
+)
 _BED = "h_m packing disorder seed flow_model stress update final_fraction"
-_FLOW = """mobile_layers averaging_length loaded_grains solve_z0_m solve_nu_m2_s first_cell_m
-cells_per_face turbulence_model"""
+_FLOW = (
+    "mobile_layers averaging_length loaded_grains solve_z0_m solve_nu_m2_s"
+    " first_cell_m cells_per_face turbulence_model"
+)
 ENTRIES = {
     "closed-form": f"{_GRAIN} relative_size",
     "pivot": f"{_GRAIN} relative_size {_DEM}",
     "pile": f"{_GRAIN} {_DEM} {_BED}",
     "line": f"{_GRAIN} {_DEM} {_BED} {_FLOW}",
 }
-"""Entries of the kinds whose scenes are those of a study: what has an effect on the answer."""
+"""Entries of the scenes of a study, by kind: what has an effect on the answer."""
 
 
 def parameters(scene: Scene, kind: str) -> Row:
@@ -312,7 +319,7 @@ def _judged(kind: str, pile: Pile, has_lift_off: bool) -> _Judged:
 
 
 def _roof(pile: Pile) -> Row:
-    """Entries of the roof above which a grain in flight is gone, of a bed of any shape."""
+    """Entries of the roof of a bed, above which a grain in flight is gone."""
     if pile.bed.is_triangle:
         return {}
     slope, ridge = pile.line.roof(MARGIN + 0.5)
@@ -321,7 +328,7 @@ def _roof(pile: Pile) -> Row:
 
 
 def _counts(curve: pd.DataFrame, judged: _Judged) -> list[Row]:
-    """Numbers of grains, with an interval of a load step more or less, and the scatter."""
+    """Numbers of grains, with an interval of a load step and the scatter."""
     total = float(curve["count"].iloc[-1])
     end = len(curve) - 1
     scatter = judged.scatter * total
@@ -354,11 +361,7 @@ def _threshold(
     shields = row["shields"]
     flow = row["ustar0_m_s"]
     tolerance = judged.tolerance if fraction <= judged.until else np.nan
-    # the number is the mean of two load steps: one load step more to each side
-    ustar0 = curve["ustar0_m_s"].to_numpy(float)
-    step = int(np.searchsorted(ustar0, flow))
-    slowest = ustar0[max(step - 2, 0)]
-    fastest = ustar0[min(step + 1, len(ustar0) - 1)]
+    slowest, fastest = _near_flows(curve, flow)
     (ours,) = pile.thresholds(cases, [fraction])
     unit = shields / ours.tau
     last = float(curve["shields"].iloc[-1])
@@ -374,11 +377,8 @@ def _threshold(
         # Grains of a poured bed go by chance, and those of a train by turns: n/N stands
         # still for some load steps and leaps in the next. The interval also holds the
         # thresholds of our run at so much less of N, and at more.
-        most = float(curve["moved"].iloc[-1] / curve["count"].iloc[-1])
-        less = max(fraction - judged.scatter, 1e-9)
-        fewer, more = pile.thresholds(
-            cases, (less, min(fraction + judged.scatter, most))
-        )
+        nearby = _near_fractions(curve, fraction, judged.scatter)
+        fewer, more = pile.thresholds(cases, nearby)
         low = min(low, fewer.tau_low * unit)
         high = max(high, upper(more))
         slowest = min(slowest, fewer.ustar0)
@@ -389,8 +389,23 @@ def _threshold(
     ]
 
 
+def _near_fractions(
+    curve: pd.DataFrame, fraction: float, scatter: float
+) -> tuple[float, float]:
+    """So much less of N than a fraction, and more, as far as a run went."""
+    most = float(curve["moved"].iloc[-1] / curve["count"].iloc[-1])
+    return max(fraction - scatter, 1e-9), min(fraction + scatter, most)
+
+
+def _near_flows(curve: pd.DataFrame, flow: float) -> tuple[float, float]:
+    """A flow that is the mean of two load steps, with one load step to each side."""
+    ustar0 = curve["ustar0_m_s"].to_numpy(float)
+    step = int(np.searchsorted(ustar0, flow))
+    return ustar0[max(step - 2, 0)], ustar0[min(step + 1, len(ustar0) - 1)]
+
+
 def _grains(pile: Pile, cases: Path) -> pd.DataFrame:
-    """The grains of a pile, with slope and local friction velocity of the exposed ones."""
+    """The grains of a pile, with slope and local u* of the exposed ones."""
     packing = pile.packing
     d = pile.scene.grain.diameter
     pushed = packing.mobile & packing.lee

@@ -1,1 +1,1 @@
-"""Experiments on the method: what a level costs, how far it is off, where a method fails."""
+"""Experiments on the method: what it costs, how far it is off, where it fails."""

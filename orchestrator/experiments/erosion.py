@@ -1,9 +1,9 @@
-"""What wind takes from a stockpile: the solved stress on its surface beside AP-42, section 13.2.5.
+"""What wind takes from a stockpile: the solved stress beside AP-42, section 13.2.5.
 
-Between two disturbances a surface loses its erosion potential P, which the fastest mile of
-that time decides (U.S. EPA, Industrial Wind Erosion, 2006). AP-42 has classes of u_s/u_r,
-the speed 25 cm above a pile over that at 10 m, from a wind tunnel (Billman and Arya,
-EPA/600/S3-85/059).
+Between two disturbances a surface loses its erosion potential P, which the fastest mile
+of that time decides (U.S. EPA, Industrial Wind Erosion, 2006). AP-42 has classes of
+u_s/u_r, the speed 25 cm above a pile over that at 10 m, from a wind tunnel (Billman and
+Arya, EPA/600/S3-85/059).
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,10 +19,12 @@ from matplotlib.figure import Figure as Canvas
 from numpy.typing import ArrayLike
 
 from orchestrator import plan
+from orchestrator.bed.line import BedLine
 from orchestrator.errors import InputError
 from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs, piles
 from orchestrator.fidelity import limits
 from orchestrator.flow.model import FlowModel
+from orchestrator.flow.stress import WallStress
 from orchestrator.physics.threshold import thresholds_of
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.report import labels, style
@@ -38,17 +40,31 @@ from orchestrator.types import FloatArray, Row
 
 MEASURED = Path(__file__).parent / "measured"
 AREAS = pd.read_csv(MEASURED / "ap42_areas.csv", keep_default_na=False)
+"""Shares of the surfaces of the four piles of AP-42, by class."""
 MATERIALS = pd.read_csv(MEASURED / "ap42_thresholds.csv", keep_default_na=False)
+"""Threshold friction velocities of AP-42."""
 USTAR_T = dict(zip(MATERIALS["material"], MATERIALS["ustar_m_s"], strict=True))
+"""The same by material, m/s."""
+MOST_USTAR_T = 10.0
+"""Largest threshold friction velocity that a wind can reach, m/s."""
 CLASSES = np.unique(AREAS["us_over_ur"])
-WIND_HEIGHT = 10.0  # of the fastest mile and of u_r, m
+"""Classes of u_s/u_r."""
+WIND_HEIGHT = 10.0
+"""Height of the fastest mile and of u_r, m."""
 OVER_FLAT = log(WIND_HEIGHT / 0.005) / log(0.25 / 0.005)
-"""u*/u*_0 over u_s/u_r, by the log laws of both heights over a roughness length of 5 mm."""
-PILE, FLAT = 0.10, 0.053
-"""AP-42: u* over u_s on a pile, and over the wind on flat ground."""
-FLAT_BELOW = 0.2  # height over base below which AP-42 takes a pile for flat ground
-LEVEL_DEG = 5.0  # slope up to which a surface is neither windward nor lee
-GROUND = 0.01  # height of the bed over the pile's up to which it is the ground around
+"""u*/u*_0 over u_s/u_r, by the log laws of both heights over a z0 of 5 mm."""
+PILE = 0.10
+"""AP-42: u* over u_s on a pile."""
+FLAT = 0.053
+"""AP-42: u* over the wind on flat ground."""
+FLAT_BELOW = 0.2
+"""Height over base below which AP-42 takes a pile for flat ground."""
+LEVEL_DEG = 5.0
+"""Slope up to which a surface is neither windward nor lee, degrees."""
+GROUND = 0.01
+"""Height of the bed over the pile's up to which it is the ground around."""
+BASE_PLACES = 10_001
+"""Places at which the length of a base is looked for."""
 IN_NAME = {"bed_shape", "profile", "h_m", "alpha_deg", "solve_z0_m", "obstacles"}
 """Columns of a scene that the name of its pile, or of its surface, has in any case."""
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
@@ -56,25 +72,46 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 LINES = ("-", "--", "-.", ":")
 """Line styles of the four piles of AP-42."""
 GREY = "0.3"
-DRAWN = 4  # most piles of the figure
+"""Colour of AP-42."""
+DRAWN = 4
+"""Most piles of the figure."""
 
 
 class Surface(NamedTuple):
-    """The surface of a pile in the columns `part`, `share` and `ratio` of its faces.
+    """The surface of a pile.
 
-    The ratio is the friction velocity |u*| over that of the undisturbed flow. `name` says
-    what the surface has on it: its obstacles, or that it is one of AP-42's.
+    Attributes
+    ----------
+    name
+        What it has on it: its obstacles, or that it is one of AP-42's.
+    faces
+        Its faces, with the columns `part`, `share` and `ratio`, the friction velocity
+        |u*| over that of the undisturbed flow.
+    ustar0_over_wind
+        Friction velocity of the undisturbed flow over the wind at 10 m.
+    threshold
+        u*_t, m/s.
     """
 
     name: str
     faces: pd.DataFrame
     ustar0_over_wind: float
-    threshold: float  # u*_t, m/s
+    threshold: float
 
     def potential(self, winds: ArrayLike) -> FloatArray:
-        """Erosion potential, mean of the surface, in winds at 10 m (m/s), g/m2.
+        """Mean erosion potential of the surface.
 
         AP-42, Eq. 3: P = 58 (u* - u*_t)^2 + 25 (u* - u*_t), 0 where u* is below u*_t.
+
+        Parameters
+        ----------
+        winds
+            Winds at 10 m, m/s.
+
+        Returns
+        -------
+        FloatArray
+            P of each wind, g/m2.
         """
         ratio = self.faces["ratio"].to_numpy()
         share = self.faces["share"].to_numpy()
@@ -84,7 +121,18 @@ class Surface(NamedTuple):
         return np.asarray(lost @ (share / share.sum()))
 
     def total(self, winds: ArrayLike) -> float:
-        """Erosion potential of several winds, one after another, g/m2."""
+        """Erosion potential of several winds, one after another.
+
+        Parameters
+        ----------
+        winds
+            Winds at 10 m, m/s.
+
+        Returns
+        -------
+        float
+            The sum of P, g/m2.
+        """
         return float(self.potential(winds).sum())
 
 
@@ -92,9 +140,18 @@ class Surface(NamedTuple):
 class Pile:
     """A pile with the surfaces that it has without and with obstacles, at least one.
 
-    They are alike in everything else: shape, grains, flow and how that is solved. The
-    surface without an obstacle comes first, if there is one. `is_flat` says whether AP-42
-    takes the pile for flat ground.
+    They are alike in everything else: shape, grains, flow and how that is solved.
+
+    Attributes
+    ----------
+    name
+        What tells it from other piles.
+    surfaces
+        Its surfaces; that without an obstacle comes first, if there is one.
+    is_flat
+        Whether AP-42 takes the pile for flat ground.
+    has_bare
+        Whether there is a surface without an obstacle.
     """
 
     name: str
@@ -104,7 +161,7 @@ class Pile:
 
     @property
     def by_epa(self) -> list[Surface]:
-        """The surfaces by which AP-42 answers it: flat ground, or the four piles measured."""
+        """The surfaces by which AP-42 answers it: flat ground, or its four piles."""
         threshold = self.surfaces[0].threshold
         if self.is_flat:
             faces = AREAS[:1].assign(part="all", ratio=1.0)
@@ -117,37 +174,63 @@ class Pile:
 
 
 def without_obstacles(scene: Scene) -> Scene:
-    """The scene of a pile with nothing on it: piles of one such scene may be compared."""
+    """Take the obstacles from a pile: piles of one such scene may be compared.
+
+    Parameters
+    ----------
+    scene
+        The scene of the pile.
+
+    Returns
+    -------
+    Scene
+        The scene without them.
+    """
     bed = scene.bed.model_copy(update={"obstacles": ()})
     parts = {name: getattr(scene, name) for name in Scene.model_fields}
     return Scene.model_construct(**{**parts, "bed": bed})
 
 
 def names_of(scenes: Sequence[Scene]) -> list[str]:
-    """A name for each of some different piles, from what tells it from the others."""
+    """Name some different piles, each by what tells it from the others.
+
+    Parameters
+    ----------
+    scenes
+        Their scenes.
+
+    Returns
+    -------
+    list of str
+        The names.
+    """
     table = pd.DataFrame([fields.asked(scene) for scene in scenes])
     differing = [name for name in table if table[name].nunique(dropna=False) > 1]
     apart = set(differing) - {*IN_NAME, *fields.TWINS}
     columns = [column for column in fields.COLUMNS if column in apart]
     found: list[str] = []
     for scene, (_, row) in zip(scenes, table.iterrows(), strict=True):
-        bed = scene.bed
-        assert isinstance(bed, PileBed)
-        words = [str(bed.profile.name if bed.profile else bed.shape)]
-        if _rises(bed):
-            height = FlowModel(scene).line.h
-            words += [f"{height:g} m high", f"{bed.slope_deg:g}°"]
-        words.append(f"z₀ {1e3 * scene.solve_roughness:g} mm")
-        words += labels.told(row, columns)
-        name = ", ".join(words)
+        name = ", ".join([*_form(scene), *labels.told(row, columns)])
         # fields that are in no table tell them apart
         same = sum(other.partition(" (pile ")[0] == name for other in found)
         found.append(f"{name} (pile {same + 1})" if same else name)
     return found
 
 
+def _form(scene: Scene) -> list[str]:
+    """The form of a pile in words."""
+    bed = scene.bed
+    assert isinstance(bed, PileBed)
+    words = [str(bed.profile.name if bed.profile else bed.shape)]
+    if _rises(bed):
+        height = FlowModel(scene).line.h
+        words += [f"{height:g} m high", f"{bed.slope_deg:g}°"]
+    words.append(f"z₀ {1e3 * scene.solve_roughness:g} mm")
+    return words
+
+
 def solved(scene: Scene, threshold: float | None, cases: Path) -> Surface:
-    """The surface of a pile by its flow.
+    """Find the surface of a pile by its flow.
 
     Parameters
     ----------
@@ -160,31 +243,12 @@ def solved(scene: Scene, threshold: float | None, cases: Path) -> Surface:
 
     Returns
     -------
-    The surface; its faces have the columns ``x_m`` and ``z_m`` as well.
+    Surface
+        The surface; its faces have the columns ``x_m`` and ``z_m`` as well.
     """
     bed = scene.bed
     assert isinstance(bed, PileBed)
-    line = FlowModel(scene).line
-    stress = FlowModel(scene).stress(cases)
-    x, z = stress.x_m, stress.z_m
-    is_on = (x > line.x[1]) & (x < line.x[-2])
-    if _rises(bed):
-        is_on &= z > GROUND * line.h
-    for start, end in line.bare:
-        is_on &= (x < start) | (x > end)
-    segment = np.searchsorted(line.x, x) - 1
-    slope = line.slopes_deg[np.clip(segment, 0, len(line.x) - 2)]
-    part = np.select(
-        [slope > LEVEL_DEG, slope < -LEVEL_DEG], ["windward", "lee"], "top"
-    )
-    columns = {
-        "x_m": x,
-        "z_m": z,
-        "part": part,
-        "share": stress.length_m,
-        "ratio": np.abs(stress.ustar_over_ustar0_wall),
-    }
-    faces = pd.DataFrame(columns)[is_on]
+    faces = _faces(bed, FlowModel(scene).line, FlowModel(scene).stress(cases))
     if threshold is None:
         level = single_grain(scene)._replace(slope_deg=0)
         (own,) = thresholds_of(scene.forces.law, [level])
@@ -192,6 +256,29 @@ def solved(scene: Scene, threshold: float | None, cases: Path) -> Surface:
     over_wind = float(log_law_ustar(1.0, WIND_HEIGHT, scene.solve_roughness))
     name = " and a ".join(map(str, bed.obstacles)) or "no obstacle"
     return Surface(name, faces, over_wind, threshold)
+
+
+def _faces(bed: PileBed, line: BedLine, stress: WallStress) -> pd.DataFrame:
+    """The faces of a pile, without the ground around it and without obstacles."""
+    x = stress.x_m
+    z = stress.z_m
+    is_on = (x > line.x[1]) & (x < line.x[-2])
+    if _rises(bed):
+        is_on &= z > GROUND * line.h
+    for start, end in line.bare:
+        is_on &= (x < start) | (x > end)
+    segment = np.searchsorted(line.x, x) - 1
+    slope = line.slopes_deg[np.clip(segment, 0, len(line.x) - 2)]
+    sides = [slope > LEVEL_DEG, slope < -LEVEL_DEG]
+    part = np.select(sides, ["windward", "lee"], "top")
+    columns = {
+        "x_m": x,
+        "z_m": z,
+        "part": part,
+        "share": stress.length_m,
+        "ratio": np.abs(stress.ustar_over_ustar0_wall),
+    }
+    return pd.DataFrame(columns)[is_on]
 
 
 def _rises(bed: PileBed) -> bool:
@@ -202,7 +289,22 @@ def _rises(bed: PileBed) -> bool:
 def grouped(
     scenes: Sequence[Scene], threshold: float | None, cases: Path
 ) -> list[Pile]:
-    """The piles of some scenes whose flows are done, each without and with its obstacles."""
+    """Find the piles of some scenes, each without and with its obstacles.
+
+    Parameters
+    ----------
+    scenes
+        The scenes, whose flows are done.
+    threshold
+        u*_t, m/s; None for that of each grain.
+    cases
+        The directory of the finished runs.
+
+    Returns
+    -------
+    list of Pile
+        The piles.
+    """
     alike: dict[Scene, list[Scene]] = {}
     for scene in scenes:
         alike.setdefault(without_obstacles(scene), []).append(scene)
@@ -221,34 +323,36 @@ def grouped(
 
 
 def _base(x: Sequence[float], z: Sequence[float], height: float) -> float:
-    """Length of a bed line between where it first and last stands above the ground, m."""
-    places = np.linspace(x[1], x[-2], 10_001)
+    """Length of a bed line from its first to its last place above the ground, m."""
+    places = np.linspace(x[1], x[-2], BASE_PLACES)
     above = places[np.interp(places, x, z) > GROUND * height]
     return float(np.ptp(above)) if len(above) else 0.0
 
 
 def experiment(study: Study, out: Path) -> Experiment:
-    """The erosion potential of the piles of a study, by the solved flow and by AP-42.
+    """Make the experiment on the erosion potential of the piles of a study.
+
+    Parameters
+    ----------
+    study
+        The study.
+    out
+        The directory, which the experiment does not depend on.
+
+    Returns
+    -------
+    Experiment
+        The experiment.
 
     Raises
     ------
     InputError
-        If the threshold is neither a number that a wind can reach nor a material of AP-42,
-        if the study has no pile, or if the flow over one cannot be solved.
+        If the threshold is neither a number that a wind can reach nor a material of
+        AP-42, if the study has no pile, or if the flow over one cannot be solved.
     """
-    winds, asked = study.erosion.fastest_mile, study.erosion.threshold
+    winds = study.erosion.fastest_mile
     where = study.file or study.name
-    least = USTAR_T.get(asked, -1.0) if isinstance(asked, str) else asked
-    if least is not None and not 0 < least <= 10:
-        remedy = f"a value in m/s up to 10, or one of: {', '.join(USTAR_T)}"
-        raise InputError(
-            f"{asked!r} is not accepted", f"{where}: erosion.threshold", remedy
-        )
-    source = ""
-    if isinstance(asked, str):
-        source = f" (AP-42, {asked})"
-    elif asked is None:
-        source = " (closed form)"
+    least, source = _threshold(study.erosion.threshold, where)
     flows = {scene: FlowModel(scene) for scene in piles(study)}
     for scene in flows:
         limits.check(scene, where, grains=False)
@@ -260,34 +364,72 @@ def experiment(study: Study, out: Path) -> Experiment:
                 done.append(scene)
         if not done:
             return {}, ()
-        found = grouped(done, least, runs.cases)
-        words = TEXTS["erosion"]
-        table = rows(found, winds)
-        caption = words["figure"]
-        if len(found) > DRAWN:
-            caption += f" The first {DRAWN} of {len(found)} piles are drawn."
-        drawing = picture(found[:DRAWN], winds)
-        figure = Figure("erosion", "Stress and loss", caption, (), drawing)
-        told = "\n\n".join([*sentences(found, winds, source), words["sure"]])
-        return {"erosion": table}, [
-            Section("", told, [figure]),
-            Section("Parts", words["rows"], (), [table], words["limits"].split("\n\n")),
-            Section("The tables of AP-42", words["sources"], (), [AREAS, MATERIALS]),
-        ]
+        return _results(grouped(done, least, runs.cases), winds, source)
 
     every = plan.listed(run for flow in flows.values() for run in flow.cases)
-    planned = plan.Plan({}, {}, (), {}, every)
-    limit_s = study.time_limit_s
     return Experiment(
-        "erosion", study.title, planned, results, limit_s, source=study.source
+        name="erosion",
+        title=study.title,
+        planned=plan.Plan({}, {}, (), {}, every),
+        results=results,
+        limit_s=study.time_limit_s,
+        source=study.source,
     )
 
 
-def rows(found: Sequence[Pile], winds: ArrayLike) -> pd.DataFrame:
-    """A row for each part of each surface of each pile, those of AP-42 after the solved ones.
+def _threshold(asked: str | float | None, where: str) -> tuple[float | None, str]:
+    """u*_t that a study asks for, m/s, None for that of each grain, and its source."""
+    if asked is None:
+        return None, " (closed form)"
+    source = ""
+    least = asked
+    if isinstance(asked, str):
+        source = f" (AP-42, {asked})"
+        least = USTAR_T.get(asked, -1.0)
+    assert not isinstance(least, str)
+    if not 0 < least <= MOST_USTAR_T:
+        what = f"{asked!r} is not accepted"
+        materials = ", ".join(USTAR_T)
+        remedy = f"a value in m/s up to {MOST_USTAR_T:g}, or one of: {materials}"
+        raise InputError(what, f"{where}: erosion.threshold", remedy)
+    return least, source
 
-    It has the part's share of the surface, P, u*/u*_0, its largest value, and the share of
-    the whole surface that is nearest to each class of AP-42.
+
+def _results(found: Sequence[Pile], winds: Sequence[float], source: str) -> Results:
+    """The table and the page of some piles."""
+    words = TEXTS["erosion"]
+    table = rows(found, winds)
+    caption = words["figure"]
+    if len(found) > DRAWN:
+        caption += f" The first {DRAWN} of {len(found)} piles are drawn."
+    drawing = picture(found[:DRAWN], winds)
+    figure = Figure("erosion", "Stress and loss", caption, (), drawing)
+    told = "\n\n".join([*sentences(found, winds, source), words["sure"]])
+    sections = [
+        Section("", told, [figure]),
+        Section("Parts", words["rows"], (), [table], words["limits"].split("\n\n")),
+        Section("The tables of AP-42", words["sources"], (), [AREAS, MATERIALS]),
+    ]
+    return {"erosion": table}, sections
+
+
+def rows(found: Sequence[Pile], winds: ArrayLike) -> pd.DataFrame:
+    """List the parts of the surfaces of some piles.
+
+    Parameters
+    ----------
+    found
+        The piles.
+    winds
+        Winds at 10 m, m/s.
+
+    Returns
+    -------
+    DataFrame
+        A row for each part of each surface of each pile, those of AP-42 after the
+        solved ones: the share of the surface that it has, P, u*/u*_0, its largest
+        value, and the share of the whole surface that is nearest to each class of
+        AP-42.
     """
     listed = []
     for pile in found:
@@ -299,42 +441,69 @@ def rows(found: Sequence[Pile], winds: ArrayLike) -> pd.DataFrame:
                 by_part[str(name)] = part_of
             for part, faces in by_part.items():
                 row: Row = {"pile": pile.name, "surface": surface.name, "part": part}
-                row["u*ₜ, m/s"] = surface.threshold
-                ratio = faces["ratio"].to_numpy()
-                share = 100 * faces["share"].to_numpy() / whole
-                row["share, %"] = share.sum()
-                row["P, g/m²"] = surface._replace(faces=faces).total(winds)
-                row["u*/u*₀"] = np.average(ratio, weights=share)
-                row["largest"] = ratio[share > 0].max()
-                apart = np.abs(ratio[:, None] - OVER_FLAT * CLASSES)
-                shares = np.bincount(apart.argmin(axis=1), share, len(CLASSES))
-                for us, near in zip(CLASSES, shares, strict=True):
-                    row[f"{us:g} ({OVER_FLAT * us:.2f}), %"] = near
+                row |= _row(surface._replace(faces=faces), whole, winds)
                 listed.append(row)
     return pd.DataFrame(listed)
+
+
+def _row(part: Surface, whole: float, winds: ArrayLike) -> Row:
+    """The numbers of a part of a surface; `whole` is the sum of all its shares."""
+    ratio = part.faces["ratio"].to_numpy()
+    share = 100 * part.faces["share"].to_numpy() / whole
+    row: Row = {
+        "u*ₜ, m/s": part.threshold,
+        "share, %": share.sum(),
+        "P, g/m²": part.total(winds),
+        "u*/u*₀": np.average(ratio, weights=share),
+        "largest": ratio[share > 0].max(),
+    }
+    apart = np.abs(ratio[:, None] - OVER_FLAT * CLASSES)
+    shares = np.bincount(apart.argmin(axis=1), share, len(CLASSES))
+    for us, near in zip(CLASSES, shares, strict=True):
+        row[f"{us:g} ({OVER_FLAT * us:.2f}), %"] = near
+    return row
 
 
 def sentences(
     found: Sequence[Pile], winds: Sequence[float], source: str
 ) -> Iterator[str]:
-    """The answer in words: each pile by both, and what its obstacles take away."""
+    """Say what wind takes from each pile, by both, and what its obstacles take away.
+
+    Parameters
+    ----------
+    found
+        The piles.
+    winds
+        Winds at 10 m, m/s.
+    source
+        The source of the threshold, in words.
+
+    Yields
+    ------
+    str
+        A paragraph for each pile.
+    """
     speeds = ", ".join(map("{:g}".format, winds))
     for pile in found:
         first, *others = pile.surfaces
         lost = first.total(winds)
         epa = [surface.total(winds) for surface in pile.by_epa]
-        ends = " to ".join(dict.fromkeys(f"{end:.3g}" for end in (min(epa), max(epa))))
+        ends = [f"{min(epa):.3g}"]
+        if f"{max(epa):.3g}" not in ends:
+            ends.append(f"{max(epa):.3g}")
         with_what = first.name if pile.has_bare else f"with {_named(first)}"
         by_epa = "by AP-42, to which it is flat ground," if pile.is_flat else "by AP-42"
         told = (
-            f"Wind of {speeds} m/s at 10 m can take {lost:.3g} g/m² from the surface of a pile "
-            f"({pile.name}; {with_what}), {by_epa} {ends} g/m². Its threshold u*ₜ is "
-            f"{first.threshold:.3g} m/s{source}."
+            f"Wind of {speeds} m/s at 10 m can take {lost:.3g} g/m² from the surface of"
+            f" a pile ({pile.name}; {with_what}), {by_epa} {' to '.join(ends)} g/m²."
+            f" Its threshold u*ₜ is {first.threshold:.3g} m/s{source}."
         )
         for other in others:
             left = other.total(winds)
             # obstacles are compared with none, not with one another
-            change = f" ({left / lost - 1:+.0%})" if lost and pile.has_bare else ""
+            change = ""
+            if lost and pile.has_bare:
+                change = f" ({left / lost - 1:+.0%})"
             told += f" With {_named(other)}: {left:.3g} g/m²{change}."
         yield told
 
@@ -345,7 +514,20 @@ def _named(surface: Surface) -> str:
 
 
 def picture(found: Sequence[Pile], winds: Sequence[float]) -> Canvas:
-    """A row for each pile: u*/u*_0 over it, its share of the surface, P over the wind."""
+    """Draw a row for each pile: u*/u*_0 over it, its share of the surface, P.
+
+    Parameters
+    ----------
+    found
+        The piles.
+    winds
+        Winds at 10 m, m/s.
+
+    Returns
+    -------
+    Figure
+        The figure.
+    """
     canvas = style.canvas(2.3 * len(found) + 1.0)
     grid = canvas.subplots(len(found), 3, squeeze=False, width_ratios=[1.3, 1, 1])
     for axes, pile in zip(grid, found, strict=True):
@@ -362,9 +544,8 @@ def _draw(axes: Sequence[Axes], pile: Pile, winds: Sequence[float]) -> None:
         colour = COLOURS[number % len(COLOURS)]
         _draw_shares(middle, surface, colour, "-")
         right.plot(axis, surface.potential(axis), color=colour)
-        left.plot(
-            surface.faces["x_m"], surface.faces["ratio"], ".", ms=2.5, color=colour
-        )
+        places = surface.faces["x_m"]
+        left.plot(places, surface.faces["ratio"], ".", ms=2.5, color=colour)
     for surface, line_style in zip(pile.by_epa, LINES, strict=False):
         _draw_shares(middle, surface, GREY, line_style)
         right.plot(axis, surface.potential(axis), color=GREY, ls=line_style)
@@ -373,9 +554,8 @@ def _draw(axes: Sequence[Axes], pile: Pile, winds: Sequence[float]) -> None:
     bed.fill_between(x, z, color=style.BED, lw=0)
     bed.set(ylim=(0, 4 * (z.max() or 1)), yticks=[])
     middle.set(xlim=(0, 100), ylim=(0, None), xlabel="share of the surface above, %")
-    left.set(
-        zorder=1, frame_on=False, ylim=middle.get_ylim(), xlabel="x, m", ylabel=USTAR
-    )
+    left.set(zorder=1, frame_on=False, ylim=middle.get_ylim())
+    left.set(xlabel="x, m", ylabel=USTAR)
     left.set_title(pile.name, loc="left")
     right.set(xlim=(0, axis[-1]), ylim=(0, None), xlabel="wind at 10 m, m/s")
     right.set_title("P, g/m² of surface", loc="left")

@@ -16,6 +16,7 @@ from orchestrator.plan import Plan
 from orchestrator.report import page, style
 from orchestrator.report.page import Section
 from orchestrator.runs import case
+from orchestrator.runs.files import Folder
 from orchestrator.runs.workspace import EXPERIMENT, Workspace, claimed, read_marker
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
@@ -24,38 +25,83 @@ from orchestrator.study.study import TIME_LIMIT_S, Study
 from orchestrator.tables import csv
 
 Results = tuple[Mapping[str, pd.DataFrame], Sequence[Section]]
-TEXTS = tomllib.loads(
-    Path(__file__).with_name("texts.toml").read_text(encoding="utf-8")
-)
+_FILE = Path(__file__).with_name("texts.toml")
+TEXTS = tomllib.loads(_FILE.read_text(encoding="utf-8"))
 """The texts of the pages, by experiment and by what they are about."""
 
 
 @dataclass(frozen=True)
 class Runs:
-    """Plan and directory of the runs, and the markers of those that are done, by name."""
+    """The runs of an experiment.
+
+    Attributes
+    ----------
+    planned
+        Their plan.
+    cases
+        Their directory.
+    done
+        The markers of those that are done, by name.
+    """
 
     planned: Plan
     cases: Path
     done: Mapping[str, Mapping[str, Any]]
 
     def are_done(self, *piles: str) -> bool:
-        """Whether all runs of some piles of the plan are done, by their names."""
+        """Whether all runs of some piles are done.
+
+        Parameters
+        ----------
+        *piles
+            Names of the piles in the plan.
+
+        Returns
+        -------
+        bool
+            Whether all are.
+        """
         return all(self.planned.piles[key].is_run(self.done) for key in piles)
 
     def cpu_s(self, runs: Sequence[case.Case]) -> float:
-        """Processor seconds of some runs; NaN if one is not done."""
-        return sum(
-            float(self.done.get(run.name, {}).get("cpu_s", "nan")) for run in runs
-        )
+        """Add the processor time of some runs.
+
+        Parameters
+        ----------
+        runs
+            The runs.
+
+        Returns
+        -------
+        float
+            The time, s; NaN if one is not done.
+        """
+        times = [self.done.get(run.name, {}).get("cpu_s", "nan") for run in runs]
+        return sum(map(float, times))
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """What an experiment runs and makes: its name and title, its scenes and runs, its page.
+    """What an experiment runs and makes.
 
-    `results` gives the tables by name and the sections of the page; no table where too little is
-    known. A run may take `limit_s`, s. A failed run that ends by one of the `verdicts` is not run
-    again: its failure is the answer. Failures of the runs named in `failing` count (None: of all).
+    Attributes
+    ----------
+    name, title
+        Its name and its title.
+    planned
+        Its scenes and runs.
+    results
+        Gives the tables by name and the sections of the page; no table where too little
+        is known.
+    limit_s
+        Time that a run may take, s.
+    verdicts
+        A failed run that ends by one of them is not run again: its failure is the
+        answer.
+    failing
+        Names of the runs whose failures count; None for all.
+    source
+        The study file that it is on; None for scenes of its own.
     """
 
     name: str
@@ -66,45 +112,75 @@ class Experiment:
     verdicts: Container[str] = ()
     failing: Container[str] | None = None
     source: Source | None = None
-    """The study file that it is on; None for scenes of its own."""
 
     def run(self, out: Path, *, workers: int) -> Finished:
-        """Run what is missing, write tables and page; an `OrchestratorError` if too little ran."""
-        space, planned = Workspace(out.absolute()), self.planned
+        """Run what is missing, and write tables and page.
+
+        Parameters
+        ----------
+        out
+            The directory.
+        workers
+            Number of cases at a time.
+
+        Returns
+        -------
+        Finished
+            What came out.
+
+        Raises
+        ------
+        OrchestratorError
+            If too little ran.
+        """
+        space = Workspace(out.absolute())
         with claimed(space.root, EXPERIMENT, self.name) as folder:
             self._describe(space)
-            missing = planned.missing(space.cases, planned.done(space.cases)).items()
-            ends = {name: case.failure(space.cases / name)[0] for name, _ in missing}
-            todo = {
-                name: run for name, run in missing if ends[name] not in self.verdicts
-            }
-            failures = pipeline.complete(
+            todo = self._todo(space.cases)
+            failed = pipeline.complete(
                 todo, space, workers=workers, limit_s=self.limit_s
             )
-            with style.settings():
-                done = planned.done(space.cases)
-                tables, sections = self.results(Runs(planned, space.cases, done))
-                if not tables:
-                    what = "no reference ran to its end: `orchestrator status` names the causes"
-                    raise OrchestratorError(what, str(out))
-                with folder.renewed():
-                    for key, table in tables.items():
-                        folder.put(f"tables/{key}.csv", csv(table))
-                    solvers = case.programs(space.cases, planned.cases)
-                    page.write(self.title, sections, folder, space.page.name, solvers)
-        if self.failing is not None:
-            failures = {
-                name: error for name, error in failures.items() if name in self.failing
-            }
-        answer = "\n".join(
-            p.text.replace("\n\n", "\n") for p in sections if not p.title
-        )
+            sections = self._write(folder, space)
+        failures = {}
+        for name, error in failed.items():
+            if self.failing is None or name in self.failing:
+                failures[name] = error
+        untitled = [section.text for section in sections if not section.title]
+        answer = "\n".join(text.replace("\n\n", "\n") for text in untitled)
         return Finished(space.page, len(todo), failures, answer)
 
-    def _describe(self, space: Workspace) -> None:
-        """Write into the directory what it is of; an InputError if it is of another file.
+    def _todo(self, cases: Path) -> dict[str, case.Case]:
+        """The runs that are missing, but for those that have ended by a verdict."""
+        todo = {}
+        missing = self.planned.missing(cases, self.planned.done(cases))
+        for name, run in missing.items():
+            ended, _ = case.failure(cases / name)
+            if ended not in self.verdicts:
+                todo[name] = run
+        return todo
 
-        All experiments of a name have one directory by default, whatever file they are on.
+    def _write(self, folder: Folder, space: Workspace) -> Sequence[Section]:
+        """Write tables and page, and give the sections of the page."""
+        cases = space.cases
+        with style.settings():
+            runs = Runs(self.planned, cases, self.planned.done(cases))
+            tables, sections = self.results(runs)
+            if not tables:
+                what = "`orchestrator status` names the causes"
+                what = f"no reference ran to its end: {what}"
+                raise OrchestratorError(what, str(space.root))
+            with folder.renewed():
+                for key, table in tables.items():
+                    folder.put(f"tables/{key}.csv", csv(table))
+                solvers = case.programs(cases, self.planned.cases)
+                page.write(self.title, sections, folder, space.page.name, solvers)
+        return sections
+
+    def _describe(self, space: Workspace) -> None:
+        """Write into the directory what it is of, unless it is of another file.
+
+        All experiments of a name have one directory by default, whatever file they are
+        on.
         """
         source = self.source.described(space.root) if self.source else {}
         before = read_marker(space.root, EXPERIMENT).get("source")
@@ -117,7 +193,17 @@ class Experiment:
 
 
 def piles(study: Study) -> dict[Scene, PileBed]:
-    """The piles of a study as they are written, with their beds and with the method that answers.
+    """Find the piles of a study.
+
+    Parameters
+    ----------
+    study
+        The study.
+
+    Returns
+    -------
+    dict of Scene to PileBed
+        The scenes as they are written, with the method that answers, and their beds.
 
     Raises
     ------
@@ -135,15 +221,49 @@ def piles(study: Study) -> dict[Scene, PileBed]:
 
 
 def label(scene: Scene) -> str:
-    """A pile in a few words."""
-    bed, fluid, d = scene.bed, scene.fluid, scene.grain.diameter
+    """Describe a pile in a few words.
+
+    Parameters
+    ----------
+    scene
+        The scene of the pile.
+
+    Returns
+    -------
+    str
+        Its form, grains, fluid, force law and packing.
+    """
+    bed = scene.bed
+    fluid = scene.fluid
     assert isinstance(bed, PileBed)
-    rows = {"aligned": "rows along the slope", "horizontal": "level rows"}
-    gaps = f"gaps up to {bed.disorder:g} d" if bed.packing == "disordered" else "poured"
-    packing = rows.get(bed.packing, f"{gaps}, seed {bed.seed}")
-    form = "level" if bed.is_level else f"{bed.slope_deg:g}°"
-    if not bed.is_triangle and not bed.is_level:
-        form = f"{'profile' if bed.profile else bed.shape}, {form}"
-    strip = f", strip of {bed.width:g} d" if bed.width else ""
-    size = f"{1e3 * d:g} mm, ρ_f {fluid.density:g} kg/m³, ν {fluid.viscosity:g} m²/s"
-    return f"{form}, {size}, {scene.forces.law}, {packing}{strip}"
+    size = f"{1e3 * scene.grain.diameter:g} mm"
+    words = [
+        *_form(bed),
+        f"{size}, ρ_f {fluid.density:g} kg/m³, ν {fluid.viscosity:g} m²/s",
+        scene.forces.law,
+        _packing(bed),
+    ]
+    if bed.width:
+        words.append(f"strip of {bed.width:g} d")
+    return ", ".join(words)
+
+
+def _form(bed: PileBed) -> list[str]:
+    """The form of a bed in words."""
+    if bed.is_level:
+        return ["level"]
+    slope = f"{bed.slope_deg:g}°"
+    if bed.is_triangle:
+        return [slope]
+    return ["profile" if bed.profile else bed.shape, slope]
+
+
+def _packing(bed: PileBed) -> str:
+    """The packing of a bed in words."""
+    if bed.packing == "aligned":
+        return "rows along the slope"
+    if bed.packing == "horizontal":
+        return "level rows"
+    if bed.packing == "disordered":
+        return f"gaps up to {bed.disorder:g} d, seed {bed.seed}"
+    return f"poured, seed {bed.seed}"

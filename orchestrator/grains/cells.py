@@ -1,14 +1,15 @@
-"""Cases of LIGGGHTS on grains; single grains on their two fixed neighbours, many cells in a case.
+"""Single grains on their two fixed neighbours: many cells in a case of LIGGGHTS.
 
-In units of d, W and sqrt(d/g') a bed knows no scale, so the cells are models of one size: every
-grain has the reference diameter, its forces are those of its own scene times the ratio of the
-weights. The flow of the deck is the friction velocity over that of the closed form.
+In units of d, W and sqrt(d/g') a bed knows no scale, so the cells are models of one
+size: every grain has the reference diameter, its forces are those of its own scene
+times the ratio of the weights. The flow of the deck is the friction velocity over that
+of the closed form.
 """
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -24,14 +25,20 @@ from orchestrator.study.parts import Grain
 from orchestrator.study.scene import Scene
 from orchestrator.types import FloatArray
 
-DIAMETER, DENSITY, GRAVITY = 1e-3, 2500.0, 9.81
-"""The reference grain of a deck, SI; GRAVITY is its g'."""
+DIAMETER = 1e-3
+"""Diameter of the reference grain of a deck, m."""
+DENSITY = 2500.0
+"""Its density, kg/m3."""
+GRAVITY = 9.81
+"""Its reduced gravity g', m/s2."""
 WEIGHT = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY
+"""Its weight, N."""
 LAST = 1.2
-"""Flow of the last load step: a grain that still lies then contradicts the closed form by 20 %."""
+"""Flow of the last load step: a grain that still lies then is 20 % off the closed
+form."""
 SPACING = 3.0
-"""Spacing of the cells across the flow, in diameters of the largest grain: grains of two cells
-never meet."""
+"""Spacing of the cells across the flow, in diameters of the largest grain: grains of
+two cells never meet."""
 UNUSED: dict[str, Any] = {
     "threshold": {"fractions"},
     "method": {"grains": {"final_fraction"}},
@@ -42,7 +49,7 @@ DIFFERENT: dict[str, Any] = {
     "threshold": {"fractions"},
     "method": {"grains": {"final_fraction"}},
 }
-"""Fields of the grain that change the forces of a cell alone; all others change its contacts."""
+"""Fields that change the forces of a cell, and not its contacts."""
 REST = 2.5
 """Mean time until the grains are at rest in a load step, sqrt(d/g')."""
 BLOCK = 512
@@ -64,11 +71,28 @@ class GrainCase(Case):
     bulky: ClassVar[tuple[str, ...]] = ("passage.dump", "bed.dump")
 
     def versions(self) -> dict[str, str]:
-        """The programs that run the case, with their versions."""
+        """The programs that run the case.
+
+        Returns
+        -------
+        dict of str to str
+            The version of each.
+        """
         return liggghts.programs(self.ranks)
 
     def share(self, directory: Path) -> float:
-        """Load steps that have begun over those that there may be."""
+        """Load steps that have begun over those that there may be.
+
+        Parameters
+        ----------
+        directory
+            The case.
+
+        Returns
+        -------
+        float
+            The share of the work that is done.
+        """
         step, *_ = process.last_words(directory / "samples.csv").split(",")
         if not step.isdecimal():
             return 0.0
@@ -78,7 +102,13 @@ class GrainCase(Case):
 
 @dataclass(frozen=True)
 class SingleGrainCase(GrainCase):
-    """Cells of three grains, one for each scene; all scenes share grain contact and protocol."""
+    """Cells of three grains, one for each scene.
+
+    Attributes
+    ----------
+    scenes
+        The scenes, which share contact and protocol.
+    """
 
     scenes: tuple[Scene, ...]
     kind: ClassVar[str] = "cells"
@@ -87,10 +117,8 @@ class SingleGrainCase(GrainCase):
     @property
     def parameters(self) -> dict[str, Any]:
         """The scenes, but for what only the reading of the results depends on."""
-        scenes = []
-        for scene in self.scenes:
-            scenes.append(scene.model_dump(mode="json", exclude=UNUSED))
-        return {"scenes": scenes}
+        values = [one.model_dump(mode="json", exclude=UNUSED) for one in self.scenes]
+        return {"scenes": values}
 
     @property
     def grain(self) -> Grain:
@@ -105,107 +133,167 @@ class SingleGrainCase(GrainCase):
         return deck.cost_s(load_steps, 3 * len(self.scenes), REST, method, self.grain)
 
     def write(self, directory: Path, cases: Path) -> None:
-        """Write the grains with their forces, and the load steps of the protocol."""
+        """Write the grains with their forces, and the load steps of the protocol.
+
+        Parameters
+        ----------
+        directory
+            The case, a copy of the template.
+        cases
+            The directory of all cases.
+        """
         shared = self.scenes[0]
+        displacement = shared.threshold.displacement
         parameters = {
-            **{
-                "diameter": DIAMETER,
-                "smallest": 1.0,
-                "density": DENSITY,
-                "gravity": GRAVITY,
-            },
-            **deck.protocol(
-                shared.grain, shared.method.grains, shared.threshold.displacement
-            ),
+            "diameter": DIAMETER,
+            "smallest": 1.0,
+            "density": DENSITY,
+            "gravity": GRAVITY,
+            **deck.protocol(shared.grain, shared.method.grains, displacement),
             # a grain that falls out of its cell never comes to rest
             "noise": 0.0,
             # no face, no ceiling, no crest: the planes lie far outside the box
-            **{"slope": 0.0, "ceiling_x": 0.0, "ceiling_z": 1e3 * DIAMETER},
+            "slope": 0.0,
+            "ceiling_x": 0.0,
+            "ceiling_z": 1e3 * DIAMETER,
             "behind": 1e3 * DIAMETER,
         }
         rising = flows(self.scenes[0])
         pushes = np.zeros((len(rising), 3 * len(self.scenes), 2))
         for place, scene in enumerate(self.scenes):
             pushes[:, 3 * place + 2] = force(scene, rising) * WEIGHT / scene.weight
-        deck.write(
-            directory, self._grains(), parameters, rising, pushes, margin=4 * DIAMETER
-        )
+        grains = self._grains()
+        deck.write(directory, grains, parameters, rising, pushes, margin=4 * DIAMETER)
 
     def collect(self, directory: Path) -> None:
-        """Check the run and write what each grain did to ``motion.csv``."""
+        """Check the run and write what each grain did to ``motion.csv``.
+
+        Parameters
+        ----------
+        directory
+            The case, after `Allrun`.
+        """
         liggghts.check_log(directory)
         grains = self._grains()
-        motion.check_rest(
-            directory,
-            grains,
-            WEIGHT,
-            self.scenes[0].method.grains.stiffness,
-            all_rest=False,
-        )
+        stiffness = self.scenes[0].method.grains.stiffness
+        motion.check_rest(directory, grains, WEIGHT, stiffness, all_rest=False)
         criterion = self.scenes[0].threshold.displacement
-        motion.read(directory, grains, criterion, falls_out=True).to_csv(
-            directory, grains
-        )
+        moved = motion.read(directory, grains, criterion, falls_out=True)
+        moved.to_csv(directory, grains)
 
     def _grains(self) -> deck.GrainTable:
-        centres, along, sizes = zip(
-            *(cell(scene) for scene in self.scenes), strict=True
-        )
-        x, z = np.concatenate(centres).T * DIAMETER
-        largest = np.concatenate(sizes).max()
-        across = np.repeat(np.arange(len(centres)) * SPACING * largest * DIAMETER, 3)
+        """The grains of all cells."""
+        cells = [cell(scene) for scene in self.scenes]
+        centres = np.concatenate([each.centres for each in cells])
+        sizes = np.concatenate([each.sizes for each in cells])
+        x, z = centres.T * DIAMETER
+        rows = np.arange(len(cells)) * SPACING * sizes.max() * DIAMETER
         return deck.GrainTable(
-            position=np.column_stack([x, across, z]),
-            kind=np.tile([deck.FIXED, deck.FIXED, deck.COUNTED], len(centres)),
-            along=np.repeat(along, 3, axis=0),
-            sizes=np.concatenate(sizes),
+            position=np.column_stack([x, np.repeat(rows, 3), z]),
+            kind=np.tile([deck.FIXED, deck.FIXED, deck.COUNTED], len(cells)),
+            along=np.repeat([each.along for each in cells], 3, axis=0),
+            sizes=sizes,
             diameter=DIAMETER,
             density=DENSITY,
         )
 
 
-def cell(scene: Scene) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Two neighbours and the grain: their centres, shape (3, 2), and sizes, in its diameter.
+class Cell(NamedTuple):
+    """Two neighbours and the grain, in diameters of the grain.
 
-    Between them the unit vector up the slope, shape (2,).
+    Attributes
+    ----------
+    centres
+        Their centres; shape (3, 2).
+    along
+        Unit vector up the slope; shape (2,).
+    sizes
+        Their sizes; shape (3,).
+    """
+
+    centres: FloatArray
+    along: FloatArray
+    sizes: FloatArray
+
+
+def cell(scene: Scene) -> Cell:
+    """Place a grain on its two neighbours.
+
+    Parameters
+    ----------
+    scene
+        The scene of the grain.
+
+    Returns
+    -------
+    Cell
+        The neighbours and the grain, which is at the origin.
     """
     alpha = np.radians(scene.bed.slope_deg)
-    beta, apart = (
-        np.radians(scene.pocket_angle_deg),
-        (1 + 1 / scene.bed.relative_size) / 2,
-    )
+    beta = np.radians(scene.pocket_angle_deg)
+    neighbour = 1 / scene.bed.relative_size
+    apart = (1 + neighbour) / 2
     along = np.array([np.cos(alpha), np.sin(alpha)])
     outward = np.array([-along[1], along[0]])
-    behind, ahead = (
-        apart * (side * np.cos(beta) * along - np.sin(beta) * outward)
-        for side in (-1, 1)
-    )
-    neighbour = 1 / scene.bed.relative_size
-    return (
-        np.vstack([behind, ahead, [0.0, 0.0]]),
-        along,
-        np.array([neighbour, neighbour, 1.0]),
-    )
+    behind = apart * (-1 * np.cos(beta) * along - np.sin(beta) * outward)
+    ahead = apart * (np.cos(beta) * along - np.sin(beta) * outward)
+    centres = np.vstack([behind, ahead, [0.0, 0.0]])
+    return Cell(centres, along, np.array([neighbour, neighbour, 1.0]))
 
 
 def flows(scene: Scene) -> FloatArray:
-    """Friction velocity of the settling and of each load step, over that of the closed form."""
+    """List the flows of a deck.
+
+    Parameters
+    ----------
+    scene
+        The scene of a grain.
+
+    Returns
+    -------
+    FloatArray
+        Friction velocity of the settling and of each load step, over that of the closed
+        form.
+    """
     return deck.rising_flows(deck.START, LAST, scene.method.grains.load_increment)
 
 
 def force(scene: Scene, rising: FloatArray) -> FloatArray:
-    """Force of the flow on the scene's grain at such flows, N, shape (flows, 2)."""
-    _, along, _ = cell(scene)
+    """Force of the flow on the grain of a scene.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    rising
+        Flows, as `flows` gives them; shape (F,).
+
+    Returns
+    -------
+    FloatArray
+        The force, N; shape (F, 2).
+    """
+    along = cell(scene).along
     ustar = rising * float(closed_form(scene).friction_velocity)
     drag, lift = (law(ustar) for law in forces(scene))
     return np.outer(drag, along) + np.outer(lift, [-along[1], along[0]])
 
 
 def batches(scenes: Iterable[Scene]) -> Iterator[SingleGrainCase]:
-    """Cases for the single-grain scenes of a study: those that can share a deck, in fixed blocks.
+    """Make the cases for the single-grain scenes of a study.
 
-    The split depends on the study alone, never on what is left to do: a study that was interrupted
-    must not differ from one that was not.
+    The split depends on the study alone, never on what is left to do: a study that was
+    interrupted must not differ from one that was not.
+
+    Parameters
+    ----------
+    scenes
+        The scenes.
+
+    Yields
+    ------
+    SingleGrainCase
+        Scenes that can share a deck, in blocks of `BLOCK`.
     """
     groups: dict[str, list[Scene]] = {}
     for scene in scenes:

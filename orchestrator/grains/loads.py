@@ -1,6 +1,7 @@
-"""The bed of a scene in grains, and the flow's forces on them: what each needs to move."""
+"""The bed of a scene in grains, and the forces of the flow on them."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from pathlib import Path
@@ -39,12 +40,12 @@ from orchestrator.study.scene import Scene
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
 TOE = 0.05
-"""Part of the windward face, from its foot, that `forces.loaded_grains` may leave out."""
+"""Part of the windward face, from its foot, that may be left without loads."""
 KINDS = 20
 """Kinds of grains in a bed beyond which their tables of forces have fewer places."""
 LONGEST_PACKED = 5000.0
-"""Length of a bed, d, beyond which a range that is counted is packed alone, and of which
-no grain is packed where no method is asked for."""
+"""Length of a bed, d, beyond which a range that is counted is packed alone, and of
+which no grain is packed where no method is asked for."""
 MARGIN = 20.0
 """Fixed bed before and behind the grains of such a range, d: twice the way of a grain
 that goes."""
@@ -52,8 +53,8 @@ LOOSE = 1e-4
 """Threshold over that of the scene's grain, below which a grain lies loose: at the
 limiting slope round-off leaves it 1e-8. Tables of forces begin there."""
 DECIMALS = 7
-"""Decimals of the lengths, in d, that a poured bed depends on: beds of another scale share
-it."""
+"""Decimals of the lengths, in d, that a poured bed depends on: beds of another scale
+share it."""
 
 _covered = cache(packing.cover)
 
@@ -65,7 +66,7 @@ def _poured(state: tuple[int, ...], directory: Path, *shown: Any) -> Packing:
 
 
 def has_rows_along(scene: Scene) -> bool:
-    """Tell whether the grains of a pile lie in rows along its bed line, in like pockets.
+    """Tell whether the grains of a pile lie in rows along its bed line.
 
     The closed form along the bed line (`method.kind` "local") then answers as pivots
     do. Level rows make stairs of a slope, where each step holds the grains of the one
@@ -88,7 +89,7 @@ def has_rows_along(scene: Scene) -> bool:
 
 @cache
 def _packed(ground: BedLine, lattice: Lattice, line: BedLine) -> Packing:
-    """A pile of two faces on a bed line: obstacles before it make the way along that longer."""
+    """A pile of two faces on a bed line, which obstacles before it make longer."""
     packed = packing.pile(ground, lattice)
     _, arc_length = line.nearest(packed.centres)
     return replace(packed, arc_length=arc_length)
@@ -97,7 +98,8 @@ def _packed(ground: BedLine, lattice: Lattice, line: BedLine) -> Packing:
 def forget() -> None:
     """Forget what beds and grains share within a process.
 
-    The time that a bed takes afterwards is what it takes alone, whatever was asked before.
+    The time that a bed takes afterwards is what it takes alone, whatever was asked
+    before.
     """
     for shared in (_covered, _packed, _poured):
         shared.cache_clear()
@@ -150,7 +152,7 @@ def _constant(value: FloatArray, ustar: ArrayLike) -> FloatArray:
 
 
 def on_slopes(scene: Scene, slopes_deg: FloatArray) -> FloatArray:
-    """Find the friction velocity at which the grain of a scene would leave on other slopes.
+    """Find the friction velocity at which a grain would leave on other slopes.
 
     Parameters
     ----------
@@ -184,8 +186,8 @@ class Geometry:
     scene
         The scene.
     cases
-        The directory of the finished runs; only the grains of a poured bed, and the flow
-        over a profile, are read there.
+        The directory of the finished runs; only the grains of a poured bed, and the
+        flow over a profile, are read there.
     part
         The part of the bed on which grains are packed, a range of x in diameters; by
         default all.
@@ -286,9 +288,9 @@ class Geometry:
     def packing(self) -> Packing:
         """The grains' places, in diameters.
 
-        Scenes that differ in their forces alone share them. By the method "local" they are
-        places along the bed line, as many as a figure shows. On the windward sides of a
-        profile none is counted where the flow runs back.
+        Scenes that differ in their forces alone share them. By the method "local" they
+        are places along the bed line, as many as a figure shows. On the windward sides
+        of a profile none is counted where the flow runs back.
         """
         packed = self._packing
         if not self.turned or self.cases is None:
@@ -371,8 +373,8 @@ class Geometry:
     def exposed(self, present: BoolArray) -> BoolArray:
         """Find the grains that meet the flow while some are present.
 
-        Where the grains share its stress these are those, too, that others hid that have
-        gone.
+        Where the grains share its stress these are those, too, that others hid that
+        have gone.
 
         Parameters
         ----------
@@ -474,7 +476,6 @@ class Geometry:
         dict of int to ForceTable
             The tables by the numbers of the grains.
         """
-        scene = self.scene
         patch = np.zeros(len(exposed), int)
         if self.is_balanced:
             patch, _ = self.patches
@@ -484,29 +485,34 @@ class Geometry:
         rows = np.column_stack([column[pushed] for column in columns])
         # grains that are alike share a table
         kinds, kind_of = np.unique(rows, axis=0, return_inverse=True)
-        sizes = kinds[:, :1]
-        gaps = kinds[:, 1:2]
-        patch_of = kinds[:, 2].astype(int)
-        level: Force = np.zeros_like
-        if self.is_balanced:
-            shelter = self.sheltered(exposed, chosen)
-            ustar = shelter.ustar
-            level = partial(_constant, shelter.levels.T[patch_of])
-        else:
-            places = FINE_TABLE if len(kinds) <= KINDS else COARSE_TABLE
-            unit = float(closed_form(scene).friction_velocity)
-            ustar = unit * np.geomspace(*RANGE, places)
-        drag, lift = forces(scene, sizes, gaps, level)
-        tables = ForceTable.of(drag, lift, scene.weight * sizes[:, 0] ** 3, ustar)
+        shelter = self.sheltered(exposed, chosen) if self.is_balanced else None
+        tables = self._tables_of(kinds, shelter)
         numbers = np.flatnonzero(pushed).tolist()
         each = zip(numbers, kind_of.tolist(), strict=True)
         return {number: tables[kind] for number, kind in each}
 
+    def _tables_of(
+        self, kinds: FloatArray, shelter: Shelter | None
+    ) -> Sequence[ForceTable]:
+        """The force tables of kinds of grains: rows of size (d), gap (m) and patch."""
+        scene = self.scene
+        level: Force = np.zeros_like
+        if shelter is not None:
+            ustar = shelter.ustar
+            level = partial(_constant, shelter.levels.T[kinds[:, 2].astype(int)])
+        else:
+            count = FINE_TABLE if len(kinds) <= KINDS else COARSE_TABLE
+            unit = float(closed_form(scene).friction_velocity)
+            ustar = unit * np.geomspace(*RANGE, count)
+        drag, lift = forces(scene, kinds[:, :1], kinds[:, 1:2], level)
+        return ForceTable.of(drag, lift, scene.weight * kinds[:, 0] ** 3, ustar)
+
     @cached_property
     def pivot_angles_deg(self) -> FloatArray:
-        """Angle from the bed's normal over which each counted grain has to roll, shape (N,).
+        """Angle from the bed's normal over which each counted grain rolls, shape (N,).
 
-        In a plane that of its foremost contact, in space that of the saddle between two.
+        In a plane that of its foremost contact, in space that of the saddle between
+        two.
         """
         packed = self.packing
         angles = peeling.pivot_angles_deg(packed.places, packed.sizes, self.tangents)
@@ -604,8 +610,8 @@ class Geometry:
         """Find by how much the grains of a lattice's rows hold one another.
 
         It is 1 on a poured bed and on a pile of two faces, whose rows end at the crest.
-        Where no method has packed the bed, grains are packed around the place where motion
-        starts.
+        Where no method has packed the bed, grains are packed around the place where
+        motion starts.
 
         Parameters
         ----------
@@ -616,8 +622,8 @@ class Geometry:
         -------
         float
             The flow (u*_0) at which the first counted grain leaves by peeling, over the
-            least at which one of them moves by itself, at least 1; NaN if no grain can lie
-            there.
+            least at which one of them moves by itself, at least 1; NaN if no grain can
+            lie there.
         """
         if self.scene.is_poured or self.bed.is_wedge:
             return 1.0
@@ -706,21 +712,21 @@ class Loads:
 
     @property
     def along(self) -> FloatArray:
-        """Unit vector along the bed, the way that the flow pushes each grain, shape (n, 2)."""
+        """Unit vector along the bed, as the flow pushes each grain, shape (n, 2)."""
         return np.where(self.ratio < 0, -1.0, 1.0)[:, None] * self.geometry.tangents
 
     def alone(self) -> FloatArray:
         """Find the flow at which each counted grain moves by itself.
 
-        In a lattice where its stress reaches that of Eq. 3 or 5, in a poured bed where it
-        begins to roll out of its own pocket. Where the flow runs back it pushes the grain
-        upstream.
+        In a lattice where its stress reaches that of Eq. 3 or 5, in a poured bed where
+        it begins to roll out of its own pocket. Where the flow runs back it pushes the
+        grain upstream.
 
         Returns
         -------
         FloatArray
-            Undisturbed friction velocities, m/s, shape (N,); infinite for grains without
-            flow.
+            Undisturbed friction velocities, m/s, shape (N,); infinite for grains
+            without flow.
 
         Raises
         ------
@@ -760,7 +766,7 @@ class Loads:
         return digits.all_rounded(np.divide(local, ratio, out=flows, where=ratio > 0))
 
     def _by_tables(self) -> FloatArray:
-        """Local mean u* (m/s) at which each counted grain of a lattice rolls on its slope.
+        """Local mean u* (m/s) at which each counted grain of a lattice rolls.
 
         By drag and lift of the tables of forces, as in peeling, without a torque of the
         law.
@@ -817,7 +823,8 @@ class Loads:
     def lifting(self, rolling: FloatArray) -> FloatArray:
         """Find the flow at which lift takes each counted grain off.
 
-        It then bears the weight normal to the bed, and what the contacts of a pocket pull.
+        It then bears the weight normal to the bed, and what the contacts of a pocket
+        pull.
 
         Parameters
         ----------
@@ -860,8 +867,8 @@ class Loads:
         Returns
         -------
         float
-            The flow (u*_0) at which the first counted grain leaves by peeling over that of
-            pivots; infinite where the row never lets one go.
+            The flow (u*_0) at which the first counted grain leaves by peeling over that
+            of pivots; infinite where the row never lets one go.
         """
         alone = self._undisturbed(self._by_tables())
         leaving = self.leaving()

@@ -1,8 +1,8 @@
 """Motion of the counted grains of a deck: which moved, at which flow, and how.
 
-The counting rule is described in docs/benchmark.md, "The counting rule". The deck in.bed
-has the same criterion to know when a load step may end, and its counts are compared with
-those here.
+The counting rule is described in docs/benchmark.md, "The counting rule". The deck
+in.bed has the same criterion to know when a load step may end, and its counts are
+compared with those here.
 """
 
 from collections.abc import Sequence
@@ -38,12 +38,12 @@ BED_COLUMNS = ("id", "type", "x", "z", "vx", "vz", "omegay")
 MODES = ("none", "rolled", "slid", "lifted")
 """How a grain moved."""
 LIFTED = 0.3
-"""A grain has lifted when it rises by this over its bed, d: to roll over a neighbour takes
-0.13 at an entrainment angle of 60 degrees."""
+"""A grain has lifted when it rises by this over its bed, d: to roll over a neighbour
+takes 0.13 at an entrainment angle of 60 degrees."""
 ROLLED = 0.5
 """A grain rolls when its spin makes at least this part of its speed, else it slides."""
 WINDOW = 5
-"""Samples from the passage of the criterion on in which a grain may lift: 2 sqrt(d/g')."""
+"""Samples after the passage in which a grain may lift: 2 sqrt(d/g')."""
 LAST = 5
 """Samples in a row in which a bed at rest has less energy than `NOISE`."""
 GROWS = 2.0
@@ -51,7 +51,10 @@ GROWS = 2.0
 settling has more than this times that of the second."""
 BURST = 10.0
 """Kinetic energy per grain, over W d, that no fall of a grain can give it."""
-REMEDY = "a smaller method.grains.time_step or method.grains.damping, or look for grains that overlap"
+REMEDY = (
+    "a smaller method.grains.time_step or method.grains.damping,"
+    " or look for grains that overlap"
+)
 POURED_REMEDY = (
     "another bed.seed, a gentler slope, or a larger grain.friction_angle_deg; the "
     "springs of a poured bed are at most of method.grains.stiffness = 1e5"
@@ -76,13 +79,13 @@ class Motion:
         Load step in which a grain was first the criterion upstream of its place; 0 for
         never; shape (N,).
     carried
-        Whether it was gone before it was seen beyond the displacement criterion: carried
-        off; shape (N,).
+        Whether it was gone before it was seen beyond the displacement criterion:
+        carried off; shape (N,).
     mode
         How it moved: index into `MODES`; shape (N,).
     exact
-        Whether a grain moves at its level's very flow, as by a formula; else between the
-        load step before and that one.
+        Whether a grain moves at its level's very flow, as by a formula; else between
+        the load step before and that one.
     """
 
     flow: FloatArray
@@ -212,7 +215,7 @@ class Motion:
 
     @cached_property
     def moved(self) -> IntArray:
-        """How many grains had moved by the end of each load step, shape (levels + 1,)."""
+        """How many grains had moved by the end of each load step; (levels + 1,)."""
         return self._by_load_step(self.level)
 
     @property
@@ -290,8 +293,8 @@ class Track(NamedTuple):
     Attributes
     ----------
     travel, rise, aside
-        Displacement since the settling in the grain's own diameter: along the bed as the
-        flow goes, normal to it, and across the flow to either side; shape (T, N).
+        Displacement since the settling in the grain's own diameter: along the bed as
+        the flow goes, normal to it, and across the flow to either side; shape (T, N).
     roll
         Speed of the surface by spinning over that of the centre: 1 for pure rolling;
         shape (T, N).
@@ -309,8 +312,8 @@ class Count(NamedTuple):
     Attributes
     ----------
     moved
-        Displaced downstream or aside by the criterion at a sample, or carried off; shape
-        (T, N).
+        Displaced downstream or aside by the criterion at a sample, or carried off;
+        shape (T, N).
     fallen
         Displaced upstream by it; such a grain has not moved, but may yet.
     carried
@@ -339,9 +342,9 @@ def count(
     criterion
         The displacement criterion, d.
     falls_out
-        Whether a grain that is gone and was not seen beyond the criterion fell upstream:
-        from the two neighbours of a single grain it did, for no bed is behind them; only
-        lift can have taken it from a pile.
+        Whether a grain that is gone and was not seen beyond the criterion fell
+        upstream: from the two neighbours of a single grain it did, for no bed is behind
+        them; only lift can have taken it from a pile.
 
     Returns
     -------
@@ -409,7 +412,7 @@ def read(
 
 
 def _first_step(happened: BoolArray, load_step: IntArray) -> IntArray:
-    """The load step of the first sample at which it happened to each grain; 0 for never."""
+    """Load step of the first sample at which it happened to each grain; 0 for never."""
     first = load_step[happened.argmax(axis=0)]
     return np.where(happened.any(axis=0), first, 0)
 
@@ -436,8 +439,8 @@ def _mode(track: Track, counts: Count) -> IntArray:
 def read_track(directory: Path, grains: GrainTable, samples: pd.DataFrame) -> Track:
     """Read what the counted grains did at each sample.
 
-    A counted grain that ``passage.dump`` does not list, and that ``bed.dump`` has at the
-    end of the load step, is at rest where it had settled.
+    A counted grain that ``passage.dump`` does not list, and that ``bed.dump`` has at
+    the end of the load step, is at rest where it had settled.
 
     Parameters
     ----------
@@ -461,32 +464,20 @@ def read_track(directory: Path, grains: GrainTable, samples: pd.DataFrame) -> Tr
         If a dump is of another run.
     """
     ids = grains.counted_ids
-    path = directory / PASSAGE
-    steps, rows = read_dump(path, PASSAGE_COLUMNS)
-    if rows.empty:
-        remedy = "a smaller method.grains.time_step, or look for grains that overlap"
-        raise Exploded("every counted grain was lost", where=str(path), remedy=remedy)
-    if not np.array_equal(steps[1:], samples["step"]):
-        raise _of_another_run(path, "its samples are not those of samples.csv")
-    if not rows["id"].isin(ids).all():
-        raise _of_another_run(path, "it lists grains that are not counted")
-    state = np.full((len(PASSAGE_COLUMNS) - 1, len(steps), len(ids)), np.nan)
-    sample = np.searchsorted(steps, rows["step"])
-    grain = np.searchsorted(ids, rows["id"])
-    for values, name in zip(state, PASSAGE_COLUMNS[1:], strict=True):
-        values[sample, grain] = rows[name]
+    state = _passage(directory / PASSAGE, ids, samples)
     is_listed = ~np.isnan(state[0, 1:])
     is_resting = ~is_listed & _present(is_listed, directory, ids, samples)
     x, z, vx, vz, spin, y = state
-    for values, at_rest in (
-        (x, x[0]),
-        (z, z[0]),
-        (vx, 0.0),
-        (vz, 0.0),
-        (spin, 0.0),
-        (y, y[0]),
-    ):
-        np.copyto(values[1:], at_rest, where=is_resting)
+    for place in (x, y, z):
+        np.copyto(place[1:], place[0], where=is_resting)
+    for speed in (vx, vz, spin):
+        np.copyto(speed[1:], 0.0, where=is_resting)
+    return _track(grains, ids, state)
+
+
+def _track(grains: GrainTable, ids: IntArray, state: FloatArray) -> Track:
+    """The motion of the counted grains from their places and speeds."""
+    x, z, vx, vz, spin, y = state
     diameter = grains.diameter * grains.sizes[ids - 1]
     along_x, along_z = grains.along[ids - 1].T
     right = (x[1:] - x[0]) / diameter
@@ -503,10 +494,31 @@ def read_track(directory: Path, grains: GrainTable, samples: pd.DataFrame) -> Tr
     )
 
 
+def _passage(path: Path, ids: IntArray, samples: pd.DataFrame) -> FloatArray:
+    """What ``passage.dump`` lists of the counted grains, NaN of one that it does not.
+
+    The shape is (numbers of a grain, T + 1, N), as in `PASSAGE_COLUMNS` after the id.
+    """
+    steps, rows = read_dump(path, PASSAGE_COLUMNS)
+    if rows.empty:
+        remedy = "a smaller method.grains.time_step, or look for grains that overlap"
+        raise Exploded("every counted grain was lost", where=str(path), remedy=remedy)
+    if not np.array_equal(steps[1:], samples["step"]):
+        raise _of_another_run(path, "its samples are not those of samples.csv")
+    if not rows["id"].isin(ids).all():
+        raise _of_another_run(path, "it lists grains that are not counted")
+    state = np.full((len(PASSAGE_COLUMNS) - 1, len(steps), len(ids)), np.nan)
+    sample = np.searchsorted(steps, rows["step"])
+    grain = np.searchsorted(ids, rows["id"])
+    for values, name in zip(state, PASSAGE_COLUMNS[1:], strict=True):
+        values[sample, grain] = rows[name]
+    return state
+
+
 def _present(
     listed: BoolArray, directory: Path, ids: IntArray, samples: pd.DataFrame
 ) -> BoolArray:
-    """Which grains were there at each sample: listed then, or later in the load step."""
+    """Which grains were there at each sample: listed then, or later in that step."""
     steps, rows = read_dump(directory / BED, BED_COLUMNS)
     load_step = samples["load_step"].to_numpy(np.int64)
     last = np.append(np.flatnonzero(np.diff(load_step)), len(load_step) - 1)

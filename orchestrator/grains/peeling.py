@@ -1,14 +1,14 @@
 """Forces of the flow on grains, and thresholds by geometry, without dynamics.
 
-By a pivot a grain moves when the resultant of flow and weight passes beyond the contacts
-that it rests on; each grain is taken by itself. In one plane this is the foremost contact
-(Eq. 1 for a grain on two neighbours), in space a side of the pyramid of its contacts: the
-grain rolls over the saddle between two of them.
+By a pivot a grain moves when the resultant of flow and weight passes beyond the
+contacts that it rests on; each grain is taken by itself. In one plane this is the
+foremost contact (Eq. 1 for a grain on two neighbours), in space a side of the pyramid
+of its contacts: the grain rolls over the saddle between two of them.
 
-Peeling goes on from there: a grain rolls over its foremost contact, and over whatever it
-meets on its way until it is displaced by the criterion. A grain whose way is blocked has
-to wait until the blocking one is gone, or for the flow that lifts it over. The flow's
-forces stay as they were, as in the deck; rolling needs no friction.
+Peeling goes on from there: a grain rolls over its foremost contact, and over whatever
+it meets on its way until it is displaced by the criterion. A grain whose way is blocked
+has to wait until the blocking one is gone, or for the flow that lifts it over. The
+flow's forces stay as they were, as in the deck; rolling needs no friction.
 """
 
 import math
@@ -95,9 +95,9 @@ class Loading:
 class ForceTable:
     """Drag and lift over the weight, tabulated so that thousands of grains ask in turn.
 
-    Between its places each is a power of the friction velocity times a small correction,
-    a cubic spline of the logarithms: with all places it reproduces the force laws within
-    1e-12.
+    Between its places each is a power of the friction velocity times a small
+    correction, a cubic spline of the logarithms: with all places it reproduces the
+    force laws within 1e-12.
 
     Parameters
     ----------
@@ -126,8 +126,8 @@ class ForceTable:
         Parameters
         ----------
         drag, lift
-            Laws that take the friction velocities of the tables for all grains, and give
-            forces, N, shape (n, places), or alike for all.
+            Laws that take the friction velocities of the tables for all grains, and
+            give forces, N, shape (n, places), or alike for all.
         weights
             Weights of the grains, N, shape (n,).
         ustar
@@ -164,8 +164,8 @@ class ForceTable:
         Returns
         -------
         float
-            The local friction velocity, m/s; 0 where they always do, infinite where they
-            never do.
+            The local friction velocity, m/s; 0 where they always do, infinite where
+            they never do.
         """
         asked = (drag_arm, lift_arm, goal)
         # a grain asks again when a neighbour has left
@@ -213,8 +213,8 @@ class Disc(NamedTuple):
 class _Roller:
     """A grain that the flow pushes towards +x, and its neighbours by their numbers.
 
-    Lengths are in d. `along` and `outward` are the unit vectors of that way and out of the
-    bed; `bond` is the pull of a contact between two grains of d over their weight.
+    Lengths are in d. `along` and `outward` are the unit vectors of that way and out of
+    the bed; `bond` is the pull of a contact between two grains of d over their weight.
     """
 
     start: Disc
@@ -328,8 +328,8 @@ def leaving(
     loading
         Forces on the grains.
     tables
-        Grains that may leave, by their numbers: their force law over their own submerged
-        weight.
+        Grains that may leave, by their numbers: their force law over their own
+        submerged weight.
     criterion
         Displacement along the bed that counts as motion, of the grain's own diameter.
     present
@@ -404,8 +404,8 @@ def pivots(
     Returns
     -------
     FloatArray
-        Undisturbed friction velocities, m/s, shape (n,); 0 for a grain that its contacts
-        do not hold, infinite for one without a force.
+        Undisturbed friction velocities, m/s, shape (n,); 0 for a grain that its
+        contacts do not hold, infinite for one without a force.
     """
     least = np.full(len(sizes), np.inf)
     is_pushed = loading.ratio != 0
@@ -458,7 +458,7 @@ def surrounded(places: Places, sizes: FloatArray, chosen: BoolArray) -> BoolArra
 def pivot_angles_deg(
     places: Places, sizes: FloatArray, along: FloatArray, only: int | None = None
 ) -> FloatArray:
-    """Find the angle from the bed's normal over which each grain has to roll downstream.
+    """Find the angle from the bed's normal over which each grain rolls downstream.
 
     In a plane that of its foremost contact, in space that to which the grain bears a
     force, as a board is tilted until it rolls.
@@ -528,7 +528,7 @@ def _discs(places: Places, sizes: FloatArray, side: float) -> list[Disc]:
 def _neighbours(
     places: Places, sizes: FloatArray, chosen: BoolArray
 ) -> Iterator[tuple[int, list[int]]]:
-    """The chosen grains, each with those within its reach, in order of their numbers."""
+    """The chosen grains, each with those within its reach, by rising numbers."""
     first, second, apart = places.pairs((REACH + 1) * float(sizes.max()))
     reach = REACH * sizes[first] + (sizes[first] + sizes[second]) / 2
     is_near = np.linalg.norm(apart, axis=1) < reach
@@ -541,7 +541,7 @@ def _neighbours(
 def _by_grain(
     first: IntArray, second: IntArray, chosen: BoolArray
 ) -> Iterator[tuple[int, IntArray]]:
-    """The chosen grains, each with the places of its pairs, in order of the other's number."""
+    """The chosen grains, each with the places of its pairs, by the other's number."""
     order = np.lexsort((second, first))
     ends = np.searchsorted(first[order], np.arange(len(chosen) + 1))
     for i in np.flatnonzero(chosen).tolist():
@@ -576,8 +576,8 @@ def _pyramids(
 ) -> Iterator[tuple[int, FloatArray, FloatArray]]:
     """The chosen grains, each with the inward normals of its contacts' pyramid, (k, 3).
 
-    Beside them is what its contacts pull along each normal, over the weight for a bond of
-    1, (k,).
+    Beside them is what its contacts pull along each normal, over the weight for a bond
+    of 1, (k,).
     """
     first, second, apart = places.contacts(sizes)
     directions = apart / np.linalg.norm(apart, axis=1)[:, None]
@@ -599,5 +599,5 @@ def _pyramids(
 
 
 def _in_plane(sides: FloatArray, direction: FloatArray) -> FloatArray:
-    """Part of each side's normal along a direction of the plane of the flow, shape (k,)."""
+    """Part of each side's normal along a direction of the flow's plane, shape (k,)."""
     return np.asarray(sides[:, 0] * direction[0] + sides[:, 2] * direction[1])

@@ -1,4 +1,4 @@
-"""Thresholds from motion: of single grains, of a pile at a fraction, of a mixture's classes."""
+"""Thresholds from motion: of single grains, of piles, of the classes of a mixture."""
 
 import math
 from collections.abc import Iterator
@@ -12,12 +12,14 @@ from orchestrator.digits import DIGITS
 from orchestrator.grains.motion import Motion
 from orchestrator.types import BoolArray, FloatArray
 
-OUTSIDE = 0.1  # part of samples beyond each end of the interval of a size class
-STEP = np.sqrt(
-    2
-)  # ratio of the ends of a class: half a phi; d lies in the middle of one
+OUTSIDE = 0.1
+"""Part of samples beyond each end of the interval of a size class."""
+STEP = np.sqrt(2)
+"""Ratio of the ends of a size class, half a phi; d lies in the middle of one."""
+COUNT_SLACK = 1e-9
+"""Grains by which a fraction of all may miss a whole number."""
 EQUAL_MOBILITY = 2.0
-"""Exponent m of the parts D_i^-m of size classes that move where all sizes are as mobile.
+"""Exponent m of the parts D_i^-m of size classes that move where all are as mobile.
 
 Measured hiding is that of equal dimensionless transport W*_i. It is as the part of the
 class that moves in a time, times its diameter and the length of a step. A step is some
@@ -28,9 +30,16 @@ class that moves in a time, times its diameter and the length of a step. A step 
 
 @dataclass(frozen=True)
 class Thresholds:
-    """Flows at which grains moved, arrays of shape (N,); NaN where a grain never moved.
+    """Flows at which grains moved, NaN where a grain never moved.
 
-    At `low` a grain had not yet moved, at `high` it had; `value` is their geometric mean.
+    Attributes
+    ----------
+    value
+        The geometric mean of the other two; shape (N,), as theirs.
+    low
+        The last flow at which a grain had not yet moved.
+    high
+        The first at which it had.
     """
 
     value: FloatArray
@@ -39,7 +48,18 @@ class Thresholds:
 
 
 def of_grains(motion: Motion) -> Thresholds:
-    """The deck's flow at which each counted grain moved."""
+    """Find the deck's flow at which each counted grain moved.
+
+    Parameters
+    ----------
+    motion
+        The motion of the grains.
+
+    Returns
+    -------
+    Thresholds
+        In the deck's unit of flow.
+    """
     moved = motion.level > 0
     low = np.where(moved, motion.low[motion.level], np.nan)
     high = np.where(moved, motion.flow[motion.level], np.nan)
@@ -47,12 +67,25 @@ def of_grains(motion: Motion) -> Thresholds:
 
 
 def mean_tau(motion: Motion, speed: FloatArray, fluid_density: float) -> FloatArray:
-    """Mean wall stress on the grains that had moved by each load step, Pa, shape (levels + 1,).
+    """Mean wall stress on the grains that had moved by each load step.
 
-    It is NaN before any had. Of `speed`, the local friction velocity over the undisturbed one of
-    the N counted grains, only the size matters; the density is in kg/m3.
+    Parameters
+    ----------
+    motion
+        The motion of the N counted grains.
+    speed
+        Local friction velocity of each over the undisturbed one; only the size
+        matters. Shape (N,).
+    fluid_density
+        Density of the fluid, kg/m3.
+
+    Returns
+    -------
+    FloatArray
+        The stress, Pa, NaN before any had; shape (levels + 1,).
     """
-    moved, squares = motion.moved, np.bincount(motion.level, speed**2, len(motion.flow))
+    moved = motion.moved
+    squares = np.bincount(motion.level, speed**2, len(motion.flow))
     squares[0] = 0.0  # those that never move
     mean = np.where(moved > 0, np.cumsum(squares) / np.maximum(moved, 1), np.nan)
     return np.asarray(fluid_density * motion.flow**2 * mean)
@@ -60,14 +93,26 @@ def mean_tau(motion: Motion, speed: FloatArray, fluid_density: float) -> FloatAr
 
 @dataclass(frozen=True)
 class PileThreshold:
-    """The flow at which a fraction n/N of a pile's grains has moved; NaN if it was not reached.
+    """The flow at which a fraction of a pile's grains has moved.
 
-    `ustar0` is the undisturbed friction velocity, m/s; `tau` is tau_c, Pa: the mean over the grains
-    that have moved of the stress that drives each along its own way, whichever way that is. Its
-    interval, from `tau_low` to `tau_high`, holds the step between two flows and the count's
-    resolution of 1/N. An end that is not known is NaN: the interval is open there. Of a fraction
-    that was not reached the lower end is known. The last two are shares of the grains that had
-    moved: carried off, and driven upstream by a reversed flow.
+    Numbers are NaN if it was not reached, but for the lower end of the interval.
+
+    Attributes
+    ----------
+    fraction
+        The fraction n/N.
+    ustar0
+        The undisturbed friction velocity, m/s.
+    tau
+        The threshold stress tau_c, Pa: the mean over the grains that have moved of the
+        stress that drives each along its own way, whichever way that is.
+    tau_low, tau_high
+        Its interval, Pa, which holds the step between two flows and the count's
+        resolution of 1/N. An end that is not known is NaN: the interval is open there.
+    carried_off
+        Share of the grains that had moved and were carried off.
+    against_the_flow
+        Share of those that a reversed flow had driven upstream.
     """
 
     fraction: float
@@ -80,22 +125,22 @@ class PileThreshold:
 
 
 def within(value: Any, error: Any) -> tuple[Any, Any]:
-    """Ends of the interval of a reference from which a value is off by at most an error.
+    """Interval of a reference from which a value is off by at most an error.
 
     Parameters
     ----------
     value
         A number, or an array of numbers.
     error
-        For each, or for all, the largest difference from the reference over the reference,
-        ``|value/reference - 1|``.
+        For each, or for all, the largest difference from the reference over the
+        reference, ``|value/reference - 1|``.
 
     Returns
     -------
     low, high
-        ``value/(1 + error)`` and ``value/(1 - error)``. From an error of 1 on the value says
-        nothing of how large the reference may be: the upper end is NaN. So are both where the
-        error is NaN.
+        ``value/(1 + error)`` and ``value/(1 - error)``. From an error of 1 on the value
+        says nothing of how large the reference may be: the upper end is NaN. So are
+        both where the error is NaN.
     """
     part = 1 - np.asarray(error, float)
     with np.errstate(divide="ignore"):
@@ -104,11 +149,29 @@ def within(value: Any, error: Any) -> tuple[Any, Any]:
 
 
 def sampled(fraction: float, count: int) -> tuple[float, float]:
-    """Two parts of `count` grains between which a threshold of all lies with 80 %, by the binomial.
+    """Two parts of some grains between which a threshold of all lies with 80 %.
 
-    Where a fraction of all grains has moved, fewer than the first part of `count` that were picked
-    at random have moved with 10 %, and more than the second with 10 %: of 5 grains none to three,
-    where 0.3 of all have. A first part of 0 and a second above 1 are no bounds.
+    By the binomial distribution. Where a fraction of all grains has moved, fewer than
+    the first part of some that were picked at random have moved with 10 %, and more
+    than the second with 10 %: of 5 grains none to three, where 0.3 of all have. A first
+    part of 0 and a second above 1 are no bounds.
+
+    Parameters
+    ----------
+    fraction
+        The fraction of all grains.
+    count
+        Number of the grains that were picked.
+
+    Returns
+    -------
+    low, high : float
+        The two parts.
+
+    Examples
+    --------
+    >>> sampled(0.3, 5)
+    (0.0, 0.8)
     """
     from scipy.special import bdtr
 
@@ -120,14 +183,35 @@ def sampled(fraction: float, count: int) -> tuple[float, float]:
 def of_all(moved: int, count: int) -> tuple[float, float]:
     """Part of all grains that have moved if so many of a sample have, with 80 %.
 
-    The binomial interval of C. J. Clopper and E. S. Pearson, Biometrika 26, 1934: of none of 2
-    grains 0 to 0.68.
+    The binomial interval of C. J. Clopper and E. S. Pearson, Biometrika 26, 1934.
+
+    Parameters
+    ----------
+    moved
+        How many of the sample have moved.
+    count
+        How many the sample has.
+
+    Returns
+    -------
+    low, high : float
+        Ends of the interval of the part.
+
+    Examples
+    --------
+    >>> low, high = of_all(0, 2)
+    >>> low, round(high, 2)
+    (0.0, 0.68)
     """
     from scipy.special import betaincinv
 
-    low = betaincinv(moved, count - moved + 1, OUTSIDE) if moved else 0.0
-    high = betaincinv(moved + 1, count - moved, 1 - OUTSIDE) if moved < count else 1.0
-    return float(low), float(high)
+    low = 0.0
+    if moved > 0:
+        low = float(betaincinv(moved, count - moved + 1, OUTSIDE))
+    high = 1.0
+    if moved < count:
+        high = float(betaincinv(moved + 1, count - moved, 1 - OUTSIDE))
+    return low, high
 
 
 def of_pile(
@@ -137,52 +221,97 @@ def of_pile(
     fluid_density: float,
     ends: tuple[float, float] | None = None,
 ) -> PileThreshold:
-    """tau_c of a pile at a fraction; arguments as in `mean_tau`.
+    """tau_c of a pile at a fraction.
 
-    Its interval is that between two fractions `ends`, by default half a grain around it. It is
-    open below if the first is 0, and above where so many grains had not moved by the last flow.
+    Parameters
+    ----------
+    motion, speed, fluid_density
+        As in `mean_tau`.
+    fraction
+        The fraction n/N.
+    ends
+        Two fractions, between which the interval lies, by default half a grain around
+        it. It is open below if the first is 0, and above where so many grains had not
+        moved by the last flow.
+
+    Returns
+    -------
+    PileThreshold
+        The threshold.
     """
     half = 0.5 / motion.count
     least, most = ends or (max(fraction - half, half), fraction + half)
-    last = len(motion.flow) - 1
-    squares = speed**2
-
-    def stress(level: int, ustar0: float) -> float:
-        mean = _mean(motion, squares, level)
-        if math.isnan(mean):  # before any has moved it is that on all
-            mean = float(squares.mean())
-        return fluid_density * float(ustar0) ** 2 * mean
-
+    tau_low, tau_high = _interval(motion, speed, fluid_density, (least, fraction, most))
     level = first_level(motion, fraction)
-    below = first_level(motion, least)
-    above = first_level(motion, most)
-    upper = last if above is None else above
-    # under a higher flow grains move where its stress is lower: their mean may fall
-    held = [stress(upper, motion.flow[upper])]
-    if below is not None:
-        held.append(stress(below, motion.low[below]))
-    ustar0 = tau = carried_off = against_the_flow = math.nan
-    if level is not None:
-        ustar0 = math.sqrt(motion.low[level] * motion.flow[level])
-        tau = stress(level, ustar0)
-        held.append(tau)
-        carried_off = float(motion.carried_off[level] / motion.moved[level])
-        against_the_flow = _mean(motion, speed < 0, level)
-    tau_low = min(held)
-    if least <= 0 or last == 0:
-        tau_low = math.nan
-    tau_high = max(held)
-    if above is None:
-        tau_high = math.nan
+    if level is None:
+        nan = math.nan
+        return PileThreshold(fraction, nan, nan, tau_low, tau_high, nan, nan)
+    ustar0 = math.sqrt(motion.low[level] * motion.flow[level])
     return PileThreshold(
-        fraction, ustar0, tau, tau_low, tau_high, carried_off, against_the_flow
+        fraction=fraction,
+        ustar0=ustar0,
+        tau=_stress(motion, speed, fluid_density, level, ustar0),
+        tau_low=tau_low,
+        tau_high=tau_high,
+        carried_off=float(motion.carried_off[level] / motion.moved[level]),
+        against_the_flow=_mean(motion, speed < 0, level),
     )
 
 
+def _interval(
+    motion: Motion,
+    speed: FloatArray,
+    fluid_density: float,
+    fractions: tuple[float, float, float],
+) -> tuple[float, float]:
+    """Ends of the interval of tau_c, Pa, from a lower fraction to a higher one."""
+    least, fraction, most = fractions
+    last = len(motion.flow) - 1
+    below = first_level(motion, least)
+    level = first_level(motion, fraction)
+    above = first_level(motion, most)
+    upper = last if above is None else above
+    # under a higher flow grains move where its stress is lower: their mean may fall
+    held = [_stress(motion, speed, fluid_density, upper, motion.flow[upper])]
+    if below is not None:
+        held.append(_stress(motion, speed, fluid_density, below, motion.low[below]))
+    if level is not None:
+        ustar0 = math.sqrt(motion.low[level] * motion.flow[level])
+        held.append(_stress(motion, speed, fluid_density, level, ustar0))
+    is_open_below = least <= 0 or last == 0
+    low = math.nan if is_open_below else min(held)
+    high = math.nan if above is None else max(held)
+    return low, high
+
+
+def _stress(
+    motion: Motion, speed: FloatArray, fluid_density: float, level: int, ustar0: float
+) -> float:
+    """Mean stress at a flow on the grains that have moved by a load step, Pa."""
+    squares = speed**2
+    mean = _mean(motion, squares, level)
+    if math.isnan(mean):  # before any has moved it is that on all
+        mean = float(squares.mean())
+    return fluid_density * float(ustar0) ** 2 * mean
+
+
 def first_level(motion: Motion, fraction: float) -> int | None:
-    """The first load step by whose end a fraction of the grains had moved, if any."""
-    needed = max(math.ceil(fraction * motion.count - 1e-9), 1)
-    reached = np.flatnonzero(motion.fraction * motion.count >= needed - 1e-9)
+    """Find the first load step by whose end a fraction of the grains had moved.
+
+    Parameters
+    ----------
+    motion
+        The motion of the grains.
+    fraction
+        The fraction.
+
+    Returns
+    -------
+    int, or None
+        Number of the load step; None if it was not reached.
+    """
+    needed = max(math.ceil(fraction * motion.count - COUNT_SLACK), 1)
+    reached = np.flatnonzero(motion.fraction * motion.count >= needed - COUNT_SLACK)
     return int(reached[0]) if len(reached) else None
 
 
@@ -193,9 +322,16 @@ def _mean(motion: Motion, values: NDArray[Any], level: int) -> float:
 
 
 class SizeClass(NamedTuple):
-    """Counted grains between two sizes: which of the N, and the geometric mean diameter, d.
+    """Counted grains between two sizes.
 
-    The class around d has the number 0.
+    Attributes
+    ----------
+    number
+        Number of the class; the class around d has 0.
+    size
+        Geometric mean diameter of its grains, d.
+    chosen
+        Which of the grains are in it; shape (N,).
     """
 
     number: int
@@ -204,30 +340,58 @@ class SizeClass(NamedTuple):
 
 
 def classes(sizes: FloatArray) -> Iterator[SizeClass]:
-    """The classes that some counted grains are in, rising; sizes in d, shape (N,)."""
+    """Divide counted grains into size classes.
+
+    Parameters
+    ----------
+    sizes
+        Their sizes, d; shape (N,).
+
+    Yields
+    ------
+    SizeClass
+        The classes that have grains, rising.
+    """
     # a size on the border of two classes is in one of them, whatever its last digit
     number = np.rint(np.round(np.log(sizes) / np.log(STEP), DIGITS)).astype(int)
     for index in np.unique(number).tolist():
         chosen = number == index
-        yield SizeClass(index, float(np.exp(np.log(sizes[chosen]).mean())), chosen)
+        mean = float(np.exp(np.log(sizes[chosen]).mean()))
+        yield SizeClass(index, mean, chosen)
 
 
 def at_size(size: float, sizes: FloatArray, stress: FloatArray) -> float:
-    """The threshold stress of a size between two classes, Pa, by a power law of the size.
+    """The threshold stress of a size between two classes, by a power law of the size.
 
-    `sizes` of the classes rise, `stress` has the threshold stress of each, Pa, both of shape (k,).
-    It is NaN where no class is as small or none as large, and where one of the two classes beside
-    the size has no threshold, or grains that lie loose.
+    Parameters
+    ----------
+    size
+        The size, d.
+    sizes
+        Sizes of the classes, d, rising; shape (k,).
+    stress
+        Threshold stress of each, Pa; shape (k,).
+
+    Returns
+    -------
+    float
+        The stress, Pa. It is NaN where no class is as small or none as large, and where
+        one of the two classes beside the size has no threshold, or grains that lie
+        loose.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> round(at_size(2.0, np.array([1.0, 4.0]), np.array([1.0, 2.0])), 3)
+    1.414
     """
     above = int(np.searchsorted(sizes, size))
-    below = (
-        int(np.searchsorted(sizes, size, side="right")) - 1
-    )  # the same class if one is as large
+    # the same class if one is as large
+    below = int(np.searchsorted(sizes, size, side="right")) - 1
     if below < 0 or above == len(sizes):
         return math.nan
     pair = [below, above]
     if not np.all(stress[pair] > 0):
         return math.nan
-    return float(
-        np.exp(np.interp(np.log(size), np.log(sizes[pair]), np.log(stress[pair])))
-    )
+    logarithm = np.interp(np.log(size), np.log(sizes[pair]), np.log(stress[pair]))
+    return float(np.exp(logarithm))

@@ -1,7 +1,4 @@
-"""The paper: its studies, and the report card of its claims.
-
-Only the pipeline and the public face import it.
-"""
+"""The paper: its studies, and the report card of its claims."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING

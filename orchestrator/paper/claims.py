@@ -34,9 +34,20 @@ MARKS: dict[Verdict, Mark] = {"reproduced": "good", "partly": "care", "not": "ba
 class Claim:
     """A claim of the paper.
 
-    `says` is the paper's words in short, `where` its section or figure, and `verdict` that on the
-    data of the preset ``paper``, which `why` explains. `measure` gives the comparisons that judge
-    the claim; names of the page's figures that show it begin with one of `figures`.
+    Attributes
+    ----------
+    says
+        The paper's words in short.
+    where
+        Section or figure of the paper.
+    measure
+        Gives the comparisons that judge the claim.
+    verdict
+        The verdict on the data of the preset ``paper``.
+    why
+        Why it is this one.
+    figures
+        Beginnings of the names of the page's figures that show the claim.
     """
 
     says: str
@@ -49,7 +60,15 @@ class Claim:
 
 @dataclass(frozen=True)
 class Judged:
-    """A claim with the comparisons of a study, and the verdict by them."""
+    """A claim with what a study finds of it.
+
+    Attributes
+    ----------
+    claim
+        The claim.
+    comparisons
+        The comparisons of the study.
+    """
 
     claim: Claim
     comparisons: tuple[Comparison, ...]
@@ -61,7 +80,7 @@ class Judged:
 
     @property
     def held(self) -> tuple[int, int]:
-        """In how many of the comparisons that count the claim is true, and of how many."""
+        """In how many of the comparisons that count it is true, and of how many."""
         decisive = [one for one in self.comparisons if one.is_decisive]
         true = sum(int(one.true.sum()) for one in decisive)
         return true, sum(len(one.numbers) for one in decisive)
@@ -174,12 +193,12 @@ def card(judged: Sequence[Judged], tables: Tables) -> Card:
         figures.append(Number(count, f"of {of}", meaning, note, decimals=0, mark=mark))
     return Card(
         "Do the paper’s claims hold when its method is run anew?",
-        f"Bravo, Ortiz and Pérez-Aparicio on sediment transport by the discrete element "
-        f"method: {of} claims, {_tested(tables)}.",
+        "Bravo, Ortiz and Pérez-Aparicio on sediment transport by the discrete element"
+        f" method: {of} claims, {_tested(tables)}.",
         tuple(figures),
         "The claims are compared with this study’s own numbers; claim 4 is about the "
-        "published curves for water. “What qualifies this answer” has what was measured "
-        "in air.",
+        "published curves for water. “What qualifies this answer” has what was"
+        " measured in air.",
         _worth(tables, lacking),
     )
 

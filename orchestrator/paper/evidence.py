@@ -15,14 +15,16 @@ from orchestrator.types import BoolArray, FloatArray
 Verdict = Literal["reproduced", "partly", "not", "no data"]
 
 SHARE = 0.95
-"""Part of comparisons from which a statement counts as true; from one less it, false."""
+"""Part of comparisons that must be true where a statement counts as true.
+
+It counts as false if at most the other part is."""
 RULE = (
     f"reproduced: so in at least {SHARE:.0%} of the comparisons of each judged line; "
     f"not: in at most {1 - SHARE:.0%} of each; else partly; no data: if a judged line "
     "has none"
 )
 WAITING_TIME = 5.0
-"""Least waiting time of a held flow, sqrt(d/g'); load steps that wait less are a ramp."""
+"""Least waiting time of a held flow, sqrt(d/g'); shorter load steps are a ramp."""
 REGIMES = {"low": "low regime", "high": "high regime"}
 BRIDGED = "bridged"
 """The force law that has an answer where neither of the paper's has one."""
@@ -117,7 +119,7 @@ class Comparison:
         return text
 
     def _spread(self) -> str:
-        """The median of the values, the least and the largest."""
+        """The median of the values, the least and the largest one."""
         ends = np.quantile(self.numbers, [0.5, 0.0, 1.0]).tolist()
         middle, least, most = (format(end, self.form) for end in ends)
         if least == most:
@@ -147,7 +149,13 @@ def combined(verdicts: Iterable[Verdict]) -> Verdict:
 
 
 class Evidence:
-    """The tables of a study."""
+    """The tables of a study.
+
+    Parameters
+    ----------
+    tables
+        The tables.
+    """
 
     def __init__(self, tables: Tables) -> None:
         self._tables = tables
@@ -160,7 +168,18 @@ class Evidence:
         return table[(table[list(PAPER)] == pd.Series(PAPER)).all(axis=1)]
 
     def joined(self, name: str) -> pd.DataFrame:
-        """A table with the columns of its scenes; it has all columns even without rows."""
+        """Look up a table with the columns of its scenes.
+
+        Parameters
+        ----------
+        name
+            Name of the table.
+
+        Returns
+        -------
+        DataFrame
+            Its rows; it has all columns even without rows.
+        """
         if name not in self._joined:
             # one block: columns are added to more than a hundred others
             self._joined[name] = self._with_scenes(name).copy()
@@ -247,7 +266,7 @@ class Evidence:
 
     @cached_property
     def curves(self) -> list[pd.DataFrame]:
-        """Of each pile the load steps in which some grains had moved, in their order."""
+        """Of each pile the load steps in which some grains had moved, in order."""
         table = self.piles("pile_curve")
         moved = table[table["moved"] > 0].sort_values("load_step")
         by_scene = [rows for _, rows in moved.groupby("scene_id")]
@@ -255,7 +274,18 @@ class Evidence:
 
 
 def commonest(grains: pd.DataFrame) -> pd.DataFrame:
-    """The grains under held flows that have the commonest contact and protocol."""
+    """Choose the grains under held flows of the commonest contact and protocol.
+
+    Parameters
+    ----------
+    grains
+        Single grains, under held flows and ramps.
+
+    Returns
+    -------
+    DataFrame
+        Those grains.
+    """
     held = grains[grains["waiting_time"] >= WAITING_TIME]
     combination = held.groupby(others(held, *GRAIN), dropna=False).ngroup()
     if held.empty:
@@ -264,13 +294,39 @@ def commonest(grains: pd.DataFrame) -> pd.DataFrame:
 
 
 def others(table: pd.DataFrame, *along: str) -> list[str]:
-    """The columns in which two rows agree that differ in some columns alone."""
+    """Name the columns in which two rows agree that differ in some columns alone.
+
+    Parameters
+    ----------
+    table
+        The table.
+    *along
+        The columns in which they differ.
+
+    Returns
+    -------
+    list of str
+        All other columns of their scenes, with those of `BESIDE`.
+    """
     beside = [column for column in BESIDE if column in table and column not in along]
     return [*fields.others(table, *along), *beside]
 
 
 def parts(table: pd.DataFrame, *columns: str) -> Iterator[tuple[Any, pd.DataFrame]]:
-    """The parts of a table that agree in some columns, rising; none of a table without rows."""
+    """Divide a table into parts that agree in some columns.
+
+    Parameters
+    ----------
+    table
+        The table; one without rows has no parts.
+    *columns
+        The columns.
+
+    Yields
+    ------
+    key, part
+        The values of the columns, rising, and the rows that have them.
+    """
     if len(table):
         by: Any = list(columns) if len(columns) > 1 else columns[0]
         yield from table.groupby(by, dropna=False)
@@ -279,10 +335,24 @@ def parts(table: pd.DataFrame, *columns: str) -> Iterator[tuple[Any, pd.DataFram
 def pairs(
     table: pd.DataFrame, along: str, value: str, ignore: Sequence[str] = ()
 ) -> pd.DataFrame:
-    """Neighbours in one column that agree in all other parameters.
+    """Compare neighbours in one column that agree in all other parameters.
 
-    A row for each pair has its ``force_law`` and the ``ratio`` of the value at the higher end to
-    that at the lower; NaN where one of them is missing.
+    Parameters
+    ----------
+    table
+        The table.
+    along
+        The column in which they are neighbours.
+    value
+        The column that is compared.
+    ignore
+        Columns in which they need not agree.
+
+    Returns
+    -------
+    DataFrame
+        A row for each pair, with its ``force_law`` and the ``ratio`` of the value at
+        the higher end to that at the lower; NaN where one of them is missing.
     """
     series = table.groupby(others(table, along, *ignore), dropna=False).ngroup()
     ordered = table.assign(series=series).sort_values(["series", along], kind="stable")

@@ -1,6 +1,5 @@
-"""Comparisons by which the claims of the paper are judged, from the tables of a study."""
+"""Comparisons by which the claims of the paper are judged."""
 
-import warnings
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from typing import Any
@@ -8,7 +7,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-import orchestrator
+from orchestrator.calculator import LEAVES
+from orchestrator.calculator.table import thresholds
 from orchestrator.fidelity.limits import FROZEN_BED
 from orchestrator.paper.evidence import (
     BRIDGED,
@@ -48,9 +48,9 @@ COARSE_M = 5e-4
 STEEP = 0.2
 """Least n/N for wiggles: below it the curve rises too steeply for the load steps."""
 SMOOTH = np.array([-3, 12, 17, 12, -3]) / 35
-"""Weights of five neighbours whose sum is the value of the parabola that fits them."""
+"""Weights of five neighbours: their sum is the value of the parabola through them."""
 WINDOW = 0.06
-"""Part of the face over which the stress is smoothed, to see the effect of its steps."""
+"""Part of the face over which the stress is smoothed: its steps have an effect."""
 LATER = 1.5
 """n/N is read at this many times the stress that moves 30 %."""
 LEAST_M = 5e-5
@@ -72,7 +72,26 @@ PACKINGS = {
 def by_regime(
     table: pd.DataFrame, column: str, name: str, above: float = -np.inf, **others: Any
 ) -> Comparisons:
-    """A column of a table, compared in each regime."""
+    """A column of a table, compared in each regime.
+
+    Parameters
+    ----------
+    table
+        The table.
+    column
+        The column.
+    name
+        What its values are.
+    above
+        The claim is true of values above it.
+    **others
+        Further fields of a `Comparison`.
+
+    Yields
+    ------
+    Comparison
+        One for each regime.
+    """
     for law, regime in REGIMES.items():
         values = table.loc[table["force_law"] == law, column]
         yield Comparison(f"{regime}: {name}", values, above, **others)
@@ -81,7 +100,26 @@ def by_regime(
 def along(
     evidence: Evidence, table: str, along: str, rises: bool, name: str
 ) -> Comparisons:
-    """Whether thresholds of single grains or of piles rise, or fall, along a column."""
+    """Whether thresholds of single grains or of piles rise, or fall, along a column.
+
+    Parameters
+    ----------
+    evidence
+        The tables of a study.
+    table
+        ``"held"`` for single grains, else piles.
+    along
+        The column.
+    rises
+        Whether they rise.
+    name
+        What is compared.
+
+    Yields
+    ------
+    Comparison
+        One for each regime.
+    """
     is_held = table == "held"
     rows = evidence.exact if is_held else evidence.piles("pile_threshold")
     neighbours = pairs(rows, along, "shields_dem" if is_held else "shields")
@@ -90,7 +128,18 @@ def along(
 
 
 def constant(evidence: Evidence) -> Comparisons:
-    """Thresholds of single grains at small Re*, where lift over drag grows with Re*."""
+    """Thresholds of single grains at small Re*, where lift over drag grows with Re*.
+
+    Parameters
+    ----------
+    evidence
+        The tables of a study.
+
+    Yields
+    ------
+    Comparison
+        A comparison that judges a claim, or is shown beside it.
+    """
     grains = evidence.exact.dropna(subset=["shields_dem"])
     flat = grains[(grains["force_law"] == "low") & (grains["alpha_deg"] == 0)]
     law = LAWS["low"]
@@ -118,7 +167,18 @@ def constant(evidence: Evidence) -> Comparisons:
 
 
 def numerical(evidence: Evidence) -> Comparisons:
-    """Thresholds by DEM over the closed form, by how the flow is raised."""
+    """Thresholds by DEM over the closed form, by how the flow is raised.
+
+    Parameters
+    ----------
+    evidence
+        The tables of a study.
+
+    Yields
+    ------
+    Comparison
+        A comparison that judges a claim, or is shown beside it.
+    """
     held = evidence.held
     every = evidence.grains
     ramps = every[every["waiting_time"] < WAITING_TIME]
@@ -137,10 +197,20 @@ def numerical(evidence: Evidence) -> Comparisons:
 
 
 def best_fit(evidence: Evidence) -> Comparisons:
-    """Single grains on a flat bed against the curves for water, and for air."""
-    grains = pd.concat([evidence.exact, evidence.bridged]).dropna(
-        subset=["shields_dem"]
-    )
+    """Single grains on a flat bed against the curves for water, and for air.
+
+    Parameters
+    ----------
+    evidence
+        The tables of a study.
+
+    Yields
+    ------
+    Comparison
+        A comparison that judges a claim, or is shown beside it.
+    """
+    grains = pd.concat([evidence.exact, evidence.bridged])
+    grains = grains.dropna(subset=["shields_dem"])
     flat = grains[grains["alpha_deg"] == 0]
     water = [curve.points(2000) for curve in curves.WATER]
     for law in (*REGIMES, BRIDGED):
@@ -203,7 +273,18 @@ def _log_at(x: FloatArray, y: FloatArray, grid: FloatArray) -> FloatArray:
 
 
 def order(evidence: Evidence) -> Comparisons:
-    """Which grains of a pile move first, and where the motion goes."""
+    """Which grains of a pile move first, and where the motion goes.
+
+    Parameters
+    ----------
+    evidence
+        The tables of a study.
+
+    Yields
+    ------
+    Comparison
+        A comparison that judges a claim, or is shown beside it.
+    """
     for packing, name in PACKINGS.items():
         downward = []
         ranks = []
@@ -234,25 +315,34 @@ def _rank_correlation(place: FloatArray, late: IntArray) -> float:
 
 
 def above_single(evidence: Evidence) -> Comparisons:
-    """Thresholds of piles over those of one grain of the same slope, d and z0."""
+    """Thresholds of piles over those of one grain of the same slope, d and z0.
+
+    Parameters
+    ----------
+    evidence
+        The tables of a study.
+
+    Yields
+    ------
+    Comparison
+        A comparison that judges a claim, or is shown beside it.
+    """
     table = evidence.piles("pile_threshold").assign(single=np.nan)
     for law, rows in table.groupby("force_law"):
-        with warnings.catch_warnings():
-            # the paper's fluids are asked about: no fluid of 1 kg/m3 has 1e-3 m2/s
-            warnings.simplefilter("ignore")
-            exact = orchestrator.threshold(
-                rows["d_m"],
-                density=rows["rho_sol_kg_m3"],
-                fluid_density=rows["rho_f_kg_m3"],
-                viscosity=rows["nu_m2_s"],
-                slope_deg=rows["alpha_deg"],
-                entrainment_angle_deg=rows["beta_deg"],
-                roughness=rows["z0_over_d"] * rows["d_m"],
-                lift_coefficient=rows["alpha_s"],
-                gravity=rows["g_m_s2"],
-                law=str(law),
-            )
-        table.loc[rows.index, "single"] = exact["shields"].to_numpy()
+        points = {
+            "diameter": rows["d_m"],
+            "density": rows["rho_sol_kg_m3"],
+            "fluid_density": rows["rho_f_kg_m3"],
+            "viscosity": rows["nu_m2_s"],
+            "slope_deg": rows["alpha_deg"],
+            "entrainment_angle_deg": rows["beta_deg"],
+            "roughness": rows["z0_over_d"] * rows["d_m"],
+            "lift_coefficient": rows["alpha_s"],
+            "gravity": rows["g_m_s2"],
+        }
+        lists = {name: column.tolist() for name, column in points.items()}
+        exact = thresholds(lists, str(law), LEAVES)
+        table.loc[rows.index, "single"] = exact["shields"][exact["answer"]]
     table = table.assign(ratio=table["shields"] / table["single"])
     for fraction, rows in parts(table, "fraction"):
         name = f"τ over that of one grain by the closed form, n/N = {fraction:.0%}"
@@ -260,7 +350,18 @@ def above_single(evidence: Evidence) -> Comparisons:
 
 
 def wiggles(evidence: Evidence) -> Comparisons:
-    """Roughness of the curves of the fraction, by DEM and by pivots."""
+    """Roughness of the curves of the fraction, by DEM and by pivots.
+
+    Parameters
+    ----------
+    evidence
+        The tables of a study.
+
+    Yields
+    ------
+    Comparison
+        A comparison that judges a claim, or is shown beside it.
+    """
     table = _wiggles(evidence)
     coarse = table[table["d_m"] > COARSE_M]
     fine = table[table["d_m"] <= COARSE_M]
@@ -276,7 +377,7 @@ def wiggles(evidence: Evidence) -> Comparisons:
 
 
 def _wiggles(evidence: Evidence) -> pd.DataFrame:
-    """The wiggles of each pile by `METHODS`, with its d and the part that a grain is."""
+    """The wiggles of each pile by `METHODS`, with its d and the part of a grain."""
     grains = dict(parts(evidence.piles("pile_grain"), "scene_id"))
     rows = []
     for curve in evidence.curves:
@@ -301,7 +402,25 @@ def _smoothed(stress: FloatArray) -> FloatArray:
 
 
 def wiggle(fraction: FloatArray) -> float:
-    """Rms distance of n/N from the parabola through its five neighbours, above `STEEP`."""
+    """Rms distance of n/N from the parabola through its five neighbours.
+
+    Parameters
+    ----------
+    fraction
+        n/N of each load step; those below `STEEP` are left out.
+
+    Returns
+    -------
+    float
+        The distance; NaN for a curve that is too short.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> x = np.linspace(0.2, 1.0, 9)
+    >>> abs(round(wiggle(x**2), 12))
+    0.0
+    """
     fraction = fraction[fraction >= STEEP]
     if len(fraction) < len(SMOOTH):
         return float("nan")
@@ -310,7 +429,7 @@ def wiggle(fraction: FloatArray) -> float:
 
 
 def _pivots(curve: pd.DataFrame, stress: FloatArray) -> FloatArray:
-    """n/N at each load step if grains go at one local u*, after those downstream of them.
+    """n/N at each load step if grains go at one local u*, after those downstream.
 
     That u* is set so that half of the grains have moved at the same flow as by DEM.
     """
@@ -323,7 +442,18 @@ def _pivots(curve: pd.DataFrame, stress: FloatArray) -> FloatArray:
 
 
 def saturation(evidence: Evidence) -> Comparisons:
-    """How the rise of the fraction slows down."""
+    """How the rise of the fraction slows down.
+
+    Parameters
+    ----------
+    evidence
+        The tables of a study.
+
+    Yields
+    ------
+    Comparison
+        A comparison that judges a claim, or is shown beside it.
+    """
     table = _bends(evidence)
     name = "slope of n/N against τ from 50 to 80 % over that from 20 to 50 %"
     yield Comparison(name, table["bend"], -np.inf, 1.0)
@@ -340,7 +470,7 @@ def saturation(evidence: Evidence) -> Comparisons:
 
 
 def _bends(evidence: Evidence) -> pd.DataFrame:
-    """The bend of each pile's curve, and n/N at `LATER` times the stress that moves 30 %."""
+    """Of each pile the bend of its curve, and n/N at `LATER` times the τ of 30 %."""
     rows = []
     for curve in evidence.curves:
         low = _stress_at(curve, 0.2)
@@ -356,12 +486,10 @@ def _bends(evidence: Evidence) -> pd.DataFrame:
 
 
 def _stress_at(curve: pd.DataFrame, fraction: float) -> float:
-    """Shields number at which a fraction had moved, between load steps; NaN if not reached."""
+    """Shields number at which a fraction had moved; NaN if it was not reached."""
     fractions = curve["fraction_moved"]
-    shields = np.interp(
-        fraction, fractions, curve["shields"], left=np.nan, right=np.nan
-    )
-    return float(shields)
+    shields = curve["shields"]
+    return float(np.interp(fraction, fractions, shields, left=np.nan, right=np.nan))
 
 
 def _fraction_at(curve: pd.DataFrame, shields: float) -> float:
@@ -372,7 +500,18 @@ def _fraction_at(curve: pd.DataFrame, shields: float) -> float:
 
 
 def fraction(evidence: Evidence) -> Comparisons:
-    """The fraction at one stress, by slope."""
+    """The fraction at one stress, by slope.
+
+    Parameters
+    ----------
+    evidence
+        The tables of a study.
+
+    Yields
+    ------
+    Comparison
+        A comparison that judges a claim, or is shown beside it.
+    """
     by_scene = {curve["scene_id"].iloc[0]: curve for curve in evidence.curves}
     firsts = pd.DataFrame([curve.iloc[0] for curve in by_scene.values()])
     rows = []
@@ -387,7 +526,18 @@ def fraction(evidence: Evidence) -> Comparisons:
 
 
 def conditioning(evidence: Evidence) -> Comparisons:
-    """The smallest grains, and the stiffness of the contacts."""
+    """The smallest grains, and the stiffness of the contacts.
+
+    Parameters
+    ----------
+    evidence
+        The tables of a study.
+
+    Yields
+    ------
+    Comparison
+        A comparison that judges a claim, or is shown beside it.
+    """
     small = evidence.held[evidence.held["d_m"] < LEAST_M]
     change = (small["ustar_m_s"] / small["ustar_closed_form_m_s"] - 1).abs()
     name = "d below 0.05 mm: change of u* from the closed form to DEM"
@@ -406,7 +556,18 @@ def conditioning(evidence: Evidence) -> Comparisons:
 
 
 def regimes(evidence: Evidence) -> Comparisons:
-    """How many piles of the paper's own range the force laws and the drag law cover."""
+    """How many piles of the paper's own range the force laws and the drag law cover.
+
+    Parameters
+    ----------
+    evidence
+        The tables of a study.
+
+    Yields
+    ------
+    Comparison
+        A comparison that judges a claim, or is shown beside it.
+    """
     piles = evidence.scenes[evidence.scenes["bed"] == "pile"]
     piles = piles[piles["nu_m2_s"] == piles["nu_m2_s"].min()]
     keys = ["alpha_deg", "d_m", "z0_over_d"]
@@ -444,7 +605,18 @@ def _within_drag_law(name: str, table: pd.DataFrame) -> Comparisons:
 
 
 def stress(evidence: Evidence) -> Comparisons:
-    """Eq. 10 against the wall stress, in the thresholds of piles."""
+    """Eq. 10 against the wall stress, in the thresholds of piles.
+
+    Parameters
+    ----------
+    evidence
+        The tables of a study.
+
+    Yields
+    ------
+    Comparison
+        A comparison that judges a claim, or is shown beside it.
+    """
     table = evidence.piles("pile_threshold", "aligned", "wall", "eq10")
     coded = table.assign(code=(table["stress"] == "eq10").astype(float))
     judged = (("u*₀", "ustar0_m_s", NEARLY), ("τ", "shields", np.inf))
@@ -456,7 +628,18 @@ def stress(evidence: Evidence) -> Comparisons:
 
 
 def coupling(evidence: Evidence) -> Comparisons:
-    """The flow of the whole pile, kept until the last grain has gone."""
+    """The flow of the whole pile, kept until the last grain has gone.
+
+    Parameters
+    ----------
+    evidence
+        The tables of a study.
+
+    Yields
+    ------
+    Comparison
+        A comparison that judges a claim, or is shown beside it.
+    """
     table = evidence.joined("pile_threshold")
     table = table[(table["force_law"] == table["regime"]) & table["frozen_bed"].notna()]
     for part, rows in parts(table, "fraction"):

@@ -1,8 +1,9 @@
-"""Density and viscosity of water, sea water and air at 1013.25 hPa by their temperature.
+"""Density and viscosity of water, sea water and air at 1013.25 hPa.
 
-Kell, J. Chem. Eng. Data 20, 97 (1975); Patek et al., J. Phys. Chem. Ref. Data 38, 21 (2009), which
-is IAPWS SR6-08; Millero and Poisson, Deep-Sea Res. 28A, 625 (1981); Sharqawy et al., Desalin. Water
-Treat. 16, 354 (2010), Eq. 22; U.S. Standard Atmosphere (1976).
+Kell, J. Chem. Eng. Data 20, 97 (1975); Patek et al., J. Phys. Chem. Ref. Data 38, 21
+(2009), which is IAPWS SR6-08; Millero and Poisson, Deep-Sea Res. 28A, 625 (1981);
+Sharqawy et al., Desalin. Water Treat. 16, 354 (2010), Eq. 22; U.S. Standard Atmosphere
+(1976).
 """
 
 import difflib
@@ -12,16 +13,42 @@ from typing import Any
 from orchestrator.errors import InputError
 
 PAPER = (1.0, 1e-5)
-"""The paper's fluid, the default: density, kg/m3, and viscosity, m2/s. It is no air of 15 deg C."""
+"""The paper's fluid, the default: density, kg/m3, and viscosity, m2/s.
+
+It is no air of 15 deg C."""
 STANDARD_DEG_C = 15.0
-"""Temperature of a fluid that is named without one: of the standard atmosphere, and of ITTC."""
-SALINITY = 35.0  # of sea water, g/kg
+"""Temperature of a fluid that is named without one, as in the standard atmosphere."""
+SALINITY = 35.0
+"""Salinity of sea water, g/kg."""
 ZERO_C = 273.15
-TEMPERATURE = "temperature_deg_c"  # as a table ``[fluid]`` calls it
+"""0 deg C, K."""
+PRESSURE = 101_325
+"""Pressure of the standard atmosphere, Pa."""
+GAS_CONSTANT_OF_AIR = 287.053
+"""Gas constant of dry air, J/(kg K)."""
+TEMPERATURE = "temperature_deg_c"
+"""The field of a temperature in a table ``[fluid]``."""
 
 
 def water(t: float) -> tuple[float, float]:
-    """Density (kg/m3) and viscosity (Pa s) of water at t deg C: Kell (1975), IAPWS SR6-08."""
+    """Density and viscosity of water: Kell (1975), IAPWS SR6-08.
+
+    Parameters
+    ----------
+    t
+        Temperature, deg C.
+
+    Returns
+    -------
+    density, viscosity : float
+        Density, kg/m3, and dynamic viscosity, Pa s.
+
+    Examples
+    --------
+    >>> density, viscosity = water(20.0)
+    >>> round(density, 2), round(viscosity, 7)
+    (998.2, 0.0010016)
+    """
     density = 999.83952 + 16.945176 * t - 7.9870401e-3 * t**2 - 46.170461e-6 * t**3
     density += 105.56302e-9 * t**4 - 280.54253e-12 * t**5
     terms = ((280.68, 1.9), (511.45, 7.7), (61.131, 19.6), (0.45903, 40.0))
@@ -30,29 +57,61 @@ def water(t: float) -> tuple[float, float]:
 
 
 def sea_water(t: float) -> tuple[float, float]:
-    """The same of sea water: Millero and Poisson (1981), UNESCO's; Sharqawy et al. (2010)."""
+    """Density and viscosity of sea water.
+
+    Millero and Poisson (1981), which is UNESCO's; Sharqawy et al. (2010).
+
+    Parameters
+    ----------
+    t
+        Temperature, deg C.
+
+    Returns
+    -------
+    density, viscosity : float
+        Density, kg/m3, and dynamic viscosity, Pa s.
+
+    Examples
+    --------
+    >>> density, viscosity = sea_water(15.0)
+    >>> round(density, 2)
+    1025.97
+    """
     density, viscosity = water(t)
-    salt = (
-        0.824493
-        - 4.0899e-3 * t
-        + 7.6438e-5 * t**2
-        - 8.2467e-7 * t**3
-        + 5.3875e-9 * t**4
-    )
+    salt = 0.824493 - 4.0899e-3 * t + 7.6438e-5 * t**2
+    salt += -8.2467e-7 * t**3 + 5.3875e-9 * t**4
     density += salt * SALINITY + 4.8314e-4 * SALINITY**2
     density += (-5.72466e-3 + 1.0227e-4 * t - 1.6546e-6 * t**2) * SALINITY**1.5
     s = SALINITY / 1000
-    first, second = (
-        1.541 + 1.998e-2 * t - 9.52e-5 * t**2,
-        7.974 - 7.561e-2 * t + 4.724e-4 * t**2,
-    )
+    first = 1.541 + 1.998e-2 * t - 9.52e-5 * t**2
+    second = 7.974 - 7.561e-2 * t + 4.724e-4 * t**2
     return density, viscosity * (1 + first * s + second * s**2)
 
 
 def air(t: float) -> tuple[float, float]:
-    """The same of dry air: an ideal gas, Sutherland's formula (U.S. Standard Atmosphere 1976)."""
+    """Density and viscosity of dry air: an ideal gas, Sutherland's formula.
+
+    U.S. Standard Atmosphere (1976).
+
+    Parameters
+    ----------
+    t
+        Temperature, deg C.
+
+    Returns
+    -------
+    density, viscosity : float
+        Density, kg/m3, and dynamic viscosity, Pa s.
+
+    Examples
+    --------
+    >>> density, viscosity = air(15.0)
+    >>> round(density, 3), round(viscosity, 8)
+    (1.225, 1.789e-05)
+    """
     kelvin = t + ZERO_C
-    return 101_325 / (287.053 * kelvin), 1.458e-6 * kelvin**1.5 / (kelvin + 110.4)
+    density = PRESSURE / (GAS_CONSTANT_OF_AIR * kelvin)
+    return density, 1.458e-6 * kelvin**1.5 / (kelvin + 110.4)
 
 
 FLUIDS = {
@@ -60,7 +119,7 @@ FLUIDS = {
     "seawater": (sea_water, 0.0, 40.0),
     "air": (air, -80, 100),
 }
-"""By name the properties, and the temperatures between which the formulas hold, deg C."""
+"""By name the properties, and the temperatures, deg C, where the formulas hold."""
 
 
 def numbers_of(table: Mapping[str, Any]) -> dict[str, Any]:
@@ -69,56 +128,70 @@ def numbers_of(table: Mapping[str, Any]) -> dict[str, Any]:
     Parameters
     ----------
     table
-        A `kind` with its temperature, deg C, or a density (kg/m3) and a viscosity (m2/s).
+        A `kind` with its temperature, deg C, or a density (kg/m3) and a viscosity
+        (m2/s).
 
     Returns
     -------
-    The table with density and viscosity. Those of a kind have five digits, so that who
-    writes them by hand asks for the same scene.
+    dict
+        The table with density and viscosity. Those of a kind have five digits, so that
+        who writes them by hand asks for the same scene.
 
     Raises
     ------
     InputError
-        For a kind that has no formulas, a temperature beyond them, and for what is given
-        twice.
+        For a kind that has no formulas, a temperature beyond them, and for what is
+        given twice.
 
     Examples
     --------
     >>> numbers_of({"kind": "water"})
     {'density': 999.1, 'viscosity': 1.1386e-06}
     """
-    rest = {
-        key: value for key, value in table.items() if key not in ("kind", TEMPERATURE)
-    }
+    rest = dict(table)
+    rest.pop("kind", None)
+    rest.pop(TEMPERATURE, None)
     if len(rest) == len(table):
         return rest
     kind = table.get("kind")
-    if kind not in [*FLUIDS]:
-        what = f"no formulas of {kind!r} are here"
-        if kind is None:
-            what = "a temperature needs it"
-        near = difflib.get_close_matches(str(kind), FLUIDS, 1)
-        names = f"did you mean {near[0]}?" if near else f"choose {', '.join(FLUIDS)}"
-        remedy = f"{names}; of others give density and viscosity"
-        raise InputError(what, "fluid.kind", remedy)
-    properties, low, high = FLUIDS[kind]
+    _check_kind(kind)
     temperature = table.get(TEMPERATURE, STANDARD_DEG_C)
-    # to Python a truth is a number
-    is_number = isinstance(temperature, int | float) and not isinstance(
-        temperature, bool
-    )
-    if not is_number or not low <= temperature <= high:
-        what = f"{temperature!r} is no temperature at which the formulas of {kind} hold"
-        remedy = f"{low:g} ... {high:g} deg C"
-        if is_number and low <= temperature - ZERO_C <= high:
-            celsius = f"{temperature - ZERO_C:.4g} deg C"
-            remedy = f"did you mean {temperature:g} K, {celsius}? There is {remedy}"
-        raise InputError(what, f"fluid.{TEMPERATURE}", remedy)
+    _check_temperature(temperature, str(kind))
     for name in ("density", "viscosity"):
         if name in rest:
-            raise InputError(
-                f"{kind} has its own", f"fluid.{name}", "leave out one of the two"
-            )
+            what = f"{kind} has its own"
+            raise InputError(what, f"fluid.{name}", "leave out one of the two")
+    properties, _, _ = FLUIDS[str(kind)]
     density, viscosity = properties(float(temperature))
-    numbers = {"density": density, "viscosity": viscosity / density}
-    return rest | {name: float(f"{value:.5g}") for name, value in numbers.items()}
+    rest["density"] = float(f"{density:.5g}")
+    rest["viscosity"] = float(f"{viscosity / density:.5g}")
+    return rest
+
+
+def _check_kind(kind: object) -> None:
+    """Refuse a fluid that has no formulas."""
+    if kind in [*FLUIDS]:
+        return
+    what = f"no formulas of {kind!r} are here"
+    if kind is None:
+        what = "a temperature needs it"
+    near = difflib.get_close_matches(str(kind), FLUIDS, 1)
+    names = f"did you mean {near[0]}?" if near else f"choose {', '.join(FLUIDS)}"
+    remedy = f"{names}; of others give density and viscosity"
+    raise InputError(what, "fluid.kind", remedy)
+
+
+def _check_temperature(temperature: Any, kind: str) -> None:
+    """Refuse a temperature at which the formulas of a fluid do not hold."""
+    _, low, high = FLUIDS[kind]
+    # to Python a truth is a number
+    is_number = isinstance(temperature, int | float)
+    is_number = is_number and not isinstance(temperature, bool)
+    if is_number and low <= temperature <= high:
+        return
+    what = f"{temperature!r} is no temperature at which the formulas of {kind} hold"
+    remedy = f"{low:g} ... {high:g} deg C"
+    if is_number and low <= temperature - ZERO_C <= high:
+        celsius = f"{temperature - ZERO_C:.4g} deg C"
+        remedy = f"did you mean {temperature:g} K, {celsius}? There is {remedy}"
+    raise InputError(what, f"fluid.{TEMPERATURE}", remedy)

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from orchestrator.runs.files import Folder
 
 PAGE = "report.html"
-FIGURES = "figures"
 
 
 def write(

@@ -22,7 +22,6 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from orchestrator.report import FIGURES
 from orchestrator.runs.files import Folder
 
 RC: dict[Any, Any] = {
@@ -67,6 +66,8 @@ SHADES = {
     "d_m": ("turbo", 0.05, 0.95),
 }
 """Colour maps of quantities that rise in steps, for more values than `DIAMETERS` has."""
+FIGURES = "figures"
+"""The folder of the figures, in a directory of results."""
 DIAMETERS = (
     "#0072b2",
     "#d55e00",

@@ -1,11 +1,11 @@
-"""A case directory: its identity, its files, how far it came. It knows nothing of any solver."""
+"""A case directory: its identity, its files, how far it came, whatever the solver."""
 
 import contextlib
 import os
 import re
 import stat
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from fnmatch import fnmatchcase
 from functools import cache, cached_property
 from hashlib import sha256
@@ -30,39 +30,71 @@ CHECKSUMS = "results.sha256"
 LOG = "log.Allrun"
 STATE = (IDENTITY, DONE, FAILED, CHECKSUMS, LOG)
 GENERATED = (
-    *("[1-9]", "[1-9][0-9]", "[1-9][0-9][0-9]", "[1-9][0-9][0-9][0-9]"),
-    *("log.*", "postProcessing", "polyMesh", "settling.csv", "samples.csv", "*.dump"),
-    *("load_steps.csv", "bed_flow.csv", "column_flow.csv", "processor[0-9]*"),
+    "[1-9]",
+    "[1-9][0-9]",
+    "[1-9][0-9][0-9]",
+    "[1-9][0-9][0-9][0-9]",
+    "log.*",
+    "postProcessing",
+    "polyMesh",
+    "settling.csv",
+    "samples.csv",
+    "*.dump",
+    "load_steps.csv",
+    "bed_flow.csv",
+    "column_flow.csv",
+    "processor[0-9]*",
 )
-"""Files that a run by hand leaves in the template's own folder; no part of the template."""
+"""Files that a run by hand leaves in a template's own folder; no part of it."""
 
 
 def templates() -> Path:
-    """The folder of the solvers' templates: beside the package, or inside it in a wheel."""
+    """Find the folder of the solvers' templates.
+
+    Returns
+    -------
+    Path
+        It lies beside the package, or inside it in a wheel.
+    """
     inside = PACKAGE / "templates"
     return inside if inside.is_dir() else PACKAGE.parent / "templates"
 
 
 @cache
 def template_files(name: str) -> tuple[tuple[str, int, bytes], ...]:
-    """Path, mode and content of each file of a template, read once."""
+    """Read the files of a template, once.
+
+    Parameters
+    ----------
+    name
+        Its folder below `templates`.
+
+    Returns
+    -------
+    tuple
+        Path in the template, mode and content of each file.
+    """
     root = templates() / name
-    return tuple(
-        ("/".join(parts), stat.S_IMODE(path.stat().st_mode), path.read_bytes())
-        for path in sorted(path for path in root.rglob("*") if path.is_file())
-        if (parts := path.relative_to(root).parts)
-        if not any(
-            fnmatchcase(part, pattern) for part in parts for pattern in GENERATED
-        )
-    )
+    found = []
+    for path in sorted(path for path in root.rglob("*") if path.is_file()):
+        parts = path.relative_to(root).parts
+        if not any(map(_is_generated, parts)):
+            mode = stat.S_IMODE(path.stat().st_mode)
+            found.append(("/".join(parts), mode, path.read_bytes()))
+    return tuple(found)
+
+
+def _is_generated(part: str) -> bool:
+    """Whether a run by hand leaves files or folders of this name."""
+    return any(fnmatchcase(part, pattern) for pattern in GENERATED)
 
 
 @cache
 def _template_digest(name: str) -> str:
     """One digest of every file of a template, names included."""
-    digests = {
-        path: sha256(content).hexdigest() for path, _, content in template_files(name)
-    }
+    digests = {}
+    for path, _, content in template_files(name):
+        digests[path] = sha256(content).hexdigest()
     return digest_text(canonical_json(digests))
 
 
@@ -75,16 +107,18 @@ def code_digest() -> str:
     str
         SHA-256 of the names and contents of the Python files of `MAKERS`.
     """
-    paths = [path for part in MAKERS for path in (PACKAGE / part).rglob("*.py")]
+    paths: list[Path] = []
+    for part in MAKERS:
+        paths += (PACKAGE / part).rglob("*.py")
     digests = files.digest_files(paths, root=PACKAGE)
     return digest_text(canonical_json(digests))
 
 
 class Case(ABC):
-    """One run of a solver: what it depends on, how its inputs are written, what its end means.
+    """One run of a solver: what it depends on, its inputs, and what its end means.
 
-    A subclass is a frozen value. Its `parameters` and its template are its identity, so two scenes
-    that need the same run name the same directory.
+    A subclass is a frozen value. Its `parameters` and its template are its identity, so
+    two scenes that need the same run name the same directory.
     """
 
     kind: ClassVar[str]
@@ -100,12 +134,13 @@ class Case(ABC):
     bulky: ClassVar[tuple[str, ...]] = ()
     """Large files that the run leaves and no table is made of: `prune` drops them.
 
-    Those that are no results may differ in their last digits from processor to processor.
+    Those that are no results may differ in their last digits from processor to
+    processor.
     """
     needs_bulky: ClassVar[bool] = False
-    """Whether its inputs are made of the bulky files, too, of the cases that it needs."""
+    """Whether its inputs are also made of bulky files of the cases that it needs."""
     made: ClassVar[tuple[str, ...]] = ()
-    """Patterns of other files that a run writes or leaves; files that fit none are not its own."""
+    """Patterns of other files that a run writes or leaves: its own files fit one."""
 
     @property
     @abstractmethod
@@ -115,7 +150,7 @@ class Case(ABC):
     @property
     @abstractmethod
     def cost_s(self) -> float:
-        """Expected time of one core, s: for ordering and for the time left, nothing else."""
+        """Expected time of one core, s: for ordering and for the time left only."""
 
     @property
     def ranks(self) -> int:
@@ -128,20 +163,56 @@ class Case(ABC):
         return ()
 
     def share(self, directory: Path) -> float:
-        """Share of its work that a running case has done, 0 to 1; 0 where that is not known."""
+        """Share of its work that a running case has done.
+
+        Parameters
+        ----------
+        directory
+            The case.
+
+        Returns
+        -------
+        float
+            The share, 0 to 1; 0 where it is not known.
+        """
         return 0.0
 
     @abstractmethod
     def write(self, directory: Path, cases: Path) -> None:
-        """Write parameter files, meshes and tables into a fresh copy of the template."""
+        """Write parameter files, meshes and tables.
+
+        Parameters
+        ----------
+        directory
+            The case, a fresh copy of the template.
+        cases
+            The directory of all cases.
+        """
 
     @abstractmethod
     def collect(self, directory: Path) -> None:
-        """Derive the tables; SolverError if results cannot be trusted, whatever the exit code."""
+        """Derive the tables.
+
+        Parameters
+        ----------
+        directory
+            The case.
+
+        Raises
+        ------
+        SolverError
+            If the results cannot be trusted, whatever the exit code.
+        """
 
     @abstractmethod
     def versions(self) -> dict[str, str]:
-        """The programs that run the case, with their versions."""
+        """The programs that run the case.
+
+        Returns
+        -------
+        dict of str to str
+            The version of each.
+        """
 
     @cached_property
     def id(self) -> str:
@@ -162,33 +233,33 @@ class Case(ABC):
 
 
 def prepare(case: Case, cases: Path) -> Path:
-    """Make the case's directory afresh, inputs and identity, and return it.
+    """Make the case's directory afresh, with inputs and identity.
 
-    The files that a former run left there are removed. Other files, also inputs that a user has
-    changed, are kept aside: a solver might read them.
+    The files that a former run left there are removed. Other files, also inputs that a
+    user has changed, are kept aside: a solver might read them.
+
+    Parameters
+    ----------
+    case
+        The case.
+    cases
+        The directory of all cases.
+
+    Returns
+    -------
+    Path
+        Its directory.
     """
     cases.mkdir(parents=True, exist_ok=True)
-    old = cases / case.name
-    before = read_json(old / IDENTITY).get("inputs_sha256")
-    patterns = (*STATE, *case.results, *case.derived, *case.bulky, *case.made)
-    names = {path for path, _, _ in template_files(case.template)}
-
-    def is_ours(name: str) -> bool:
-        if isinstance(before, dict) and name in before and not _fits(name, case.made):
-            return bool(before[name] == files.digest_file(old / name))
-        final = re.sub(r"(^|/)\.([^/]+)\.tmp$", r"\1\2", name)
-        return final in names or _fits(final, patterns)
-
+    is_ours = _whose(case, cases / case.name)
     directory = Folder(cases.parent).clear(f"{cases.name}/{case.name}", is_ours)
     directory.mkdir()
     inputs = inputs_written(case, directory, cases)
     identity = {
-        **{
-            "id": case.id,
-            "kind": case.kind,
-            "recipe": case.recipe,
-            "template": case.template,
-        },
+        "id": case.id,
+        "kind": case.kind,
+        "recipe": case.recipe,
+        "template": case.template,
         "template_sha256": _template_digest(case.template),
         "parameters": case.parameters,
         "needs": [need.name for need in case.needs],
@@ -226,11 +297,36 @@ def inputs_written(case: Case, directory: Path, cases: Path) -> dict[str, str]:
     return files.digest_files(written, root=directory)
 
 
-def finish(case: Case, directory: Path, **times: float) -> None:
-    """Write the marker, last of all files: digests of the results and tables, and the times, s.
+def _whose(case: Case, directory: Path) -> Callable[[str], bool]:
+    """A test whether a file in the directory of a former run is that run's own."""
+    inputs = read_json(directory / IDENTITY).get("inputs_sha256")
+    patterns = (*STATE, *case.results, *case.derived, *case.bulky, *case.made)
+    names = {path for path, _, _ in template_files(case.template)}
 
-    It alone must survive a crash: what it names is compared with it. The times are `solver_s`,
-    `cpu_s` (of a processor) and `wall_s` (with Python's work).
+    def is_ours(name: str) -> bool:
+        if isinstance(inputs, dict) and name in inputs and not _fits(name, case.made):
+            return bool(inputs[name] == files.digest_file(directory / name))
+        final = re.sub(r"(^|/)\.([^/]+)\.tmp$", r"\1\2", name)
+        return final in names or _fits(final, patterns)
+
+    return is_ours
+
+
+def finish(case: Case, directory: Path, **times: float) -> None:
+    """Write the marker, last of all files.
+
+    It has the digests of the results and tables. It alone must survive a crash: what it
+    names is compared with it.
+
+    Parameters
+    ----------
+    case
+        The case.
+    directory
+        Its directory.
+    **times
+        Times, s: ``solver_s``, ``cpu_s`` of a processor, and ``wall_s`` with Python's
+        work.
     """
     results = _digests(directory, _matching(directory, case.results))
     derived = _digests(directory, _matching(directory, case.derived))
@@ -253,45 +349,89 @@ def finish(case: Case, directory: Path, **times: float) -> None:
 
 
 def fail(directory: Path, error: SolverError) -> None:
-    """Leave a note of how and why a case failed; the next study run tries it again."""
+    """Leave a note of how and why a case failed; the next study run tries it again.
+
+    Parameters
+    ----------
+    directory
+        Its directory.
+    error
+        The failure.
+    """
     if directory.is_dir():
         note = {"ended": error.ended, "cause": str(error)}
         files.write_durably(directory / FAILED, files.text_of(note))
 
 
 def failure(directory: Path) -> tuple[str, str]:
-    """In which way the case in a directory failed, and why; empty if it is not known to have."""
+    """In which way the case in a directory failed, and why.
+
+    Parameters
+    ----------
+    directory
+        Its directory.
+
+    Returns
+    -------
+    ended, cause : str
+        Both are empty if it is not known to have failed.
+    """
     about = read_json(directory / FAILED)
     return str(about.get("ended", "")), str(about.get("cause", ""))
 
 
 def done_state(case: Case, cases: Path) -> dict[str, Any] | None:
-    """The marker of a finished case, or None where anything about it cannot be trusted."""
+    """The marker of a finished case.
+
+    Parameters
+    ----------
+    case
+        The case.
+    cases
+        The directory of all cases.
+
+    Returns
+    -------
+    dict, or None
+        The marker; None where anything about the case cannot be trusted.
+    """
     return marker_of(cases / case.name, case.id)
 
 
 def marker_of(directory: Path, identity: str) -> dict[str, Any] | None:
-    """The marker of the finished case of an id, or None where anything cannot be trusted.
+    """The marker of the finished case of an id.
 
     A bulky file may be missing: `prune` drops it, and no table is made of it.
+
+    Parameters
+    ----------
+    directory
+        The directory of the case.
+    identity
+        The id of the case.
+
+    Returns
+    -------
+    dict, or None
+        The marker; None where anything about the case cannot be trusted.
     """
-    about, state = read_json(directory / IDENTITY), read_json(directory / DONE)
+    about = read_json(directory / IDENTITY)
+    state = read_json(directory / DONE)
     if not about.get("id") == state.get("id") == identity:
         return None
-    made, stamps = (
-        {**state["results_sha256"], **state["derived_sha256"]},
-        state["stamps"],
-    )
+    made = {**state["results_sha256"], **state["derived_sha256"]}
     digests = {**made, **state.get("others_sha256", {})}
+    bulky = state.get("bulky", ())
+    stamps = state["stamps"]
     try:
         marked = (directory / DONE).stat().st_mtime_ns
         for name, digest in digests.items():
             path = directory / name
-            if name in state.get("bulky", ()) and not os.path.lexists(path):
+            if name in bulky and not os.path.lexists(path):
                 continue
-            # Digests of a thousand piles are those of 7 GB: they are compared only if size or time
-            # have changed. A file written in the same tick of the clock as the marker may have
-            # changed since without a trace, so its digest decides.
+            # Digests of a thousand piles are those of 7 GB: they are compared only if
+            # size or time have changed. A file written in the same tick of the clock as
+            # the marker may have changed since without a trace, so its digest decides.
             size, changed = _stamp(path)
             untouched = [size, changed] == stamps.get(name) and changed < marked
             if not untouched and files.digest_file(path) != digest:
@@ -302,18 +442,41 @@ def marker_of(directory: Path, identity: str) -> dict[str, Any] | None:
 
 
 def is_whole(case: Case, cases: Path) -> bool:
-    """Whether a case is done and has all of its files: none was pruned, or a rerun made it anew."""
-    names = read_json(cases / case.name / DONE).get("stamps", [""])
-    return all((cases / case.name / name).is_file() for name in names)
+    """Whether a case is done and has all of its files.
+
+    Parameters
+    ----------
+    case
+        The case.
+    cases
+        The directory of all cases.
+
+    Returns
+    -------
+    bool
+        Whether no file was pruned, or a rerun made all anew.
+    """
+    directory = cases / case.name
+    names = read_json(directory / DONE).get("stamps", [""])
+    return all((directory / name).is_file() for name in names)
 
 
 def prune(case: Case, cases: Path) -> None:
-    """Drop the bulky files of a case that is done: those that its run left, no others.
+    """Drop the bulky files that the run of a finished case left, no others.
 
-    Their digests stay in the marker and in `CHECKSUMS`: a rerun by hand is still compared with the
-    run that the tables were made of. No link is followed. A disk without any room is no obstacle.
+    Their digests stay in the marker and in `CHECKSUMS`: a rerun by hand is still
+    compared with the run that the tables were made of. No link is followed. A disk
+    without any room is no obstacle.
+
+    Parameters
+    ----------
+    case
+        The case.
+    cases
+        The directory of all cases.
     """
-    directory, state = cases / case.name, done_state(case, cases) or {}
+    directory = cases / case.name
+    state = done_state(case, cases) or {}
     for name in _matching(directory, state.get("bulky", ())):
         (directory / name).unlink()
         with contextlib.suppress(OSError):  # it is not empty
@@ -321,18 +484,40 @@ def prune(case: Case, cases: Path) -> None:
 
 
 def names_in(cases: Path) -> list[str]:
-    """Names of the directories of cases, whichever study asked for them."""
+    """Name the directories of cases, whichever study asked for them.
+
+    Parameters
+    ----------
+    cases
+        The directory of all cases.
+
+    Returns
+    -------
+    list of str
+        The names, sorted.
+    """
     return sorted(path.name for path in cases.glob("*-*") if NAME.fullmatch(path.name))
 
 
 def programs(cases: Path, names: Iterable[str]) -> dict[str, str]:
-    """The programs, with versions, that some of the cases were made with."""
-    given = (
-        read_json(cases / name / IDENTITY).get("programs", {}) for name in sorted(names)
-    )
-    return {
-        program: version for versions in given for program, version in versions.items()
-    }
+    """List the programs that some of the cases were made with.
+
+    Parameters
+    ----------
+    cases
+        The directory of all cases.
+    names
+        Names of the cases.
+
+    Returns
+    -------
+    dict of str to str
+        The version of each program.
+    """
+    versions: dict[str, str] = {}
+    for name in sorted(names):
+        versions |= read_json(cases / name / IDENTITY).get("programs", {})
+    return versions
 
 
 def _digests(directory: Path, names: Iterable[str]) -> dict[str, str]:
@@ -348,22 +533,20 @@ def _stamp(path: Path) -> tuple[int, int]:
 
 def _matching(directory: Path, patterns: Iterable[str]) -> list[str]:
     """Names of the files in a directory that fit a pattern; no link is followed."""
-    walked = (
-        os.path.join(path, name)
-        for path, _, names in os.walk(directory)
-        for name in names
-    )
-    paths = (
-        path for path in walked if os.path.isfile(path) and not os.path.islink(path)
-    )
-    names = sorted(os.path.relpath(path, directory) for path in paths)
-    return [name for name in names if _fits(name, patterns)]
+    found = []
+    for folder, _, names in os.walk(directory):
+        for file in names:
+            path = os.path.join(folder, file)
+            if os.path.isfile(path) and not os.path.islink(path):
+                found.append(os.path.relpath(path, directory))
+    return [name for name in sorted(found) if _fits(name, patterns)]
 
 
 def _fits(name: str, patterns: Iterable[str]) -> bool:
     """Whether each part of a path fits that of a pattern."""
     parts = name.split("/")
-    split = (pattern.split("/") for pattern in patterns)
-    return any(
-        len(each) == len(parts) and all(map(fnmatchcase, parts, each)) for each in split
-    )
+    for pattern in patterns:
+        wanted = pattern.split("/")
+        if len(wanted) == len(parts) and all(map(fnmatchcase, parts, wanted)):
+            return True
+    return False

@@ -1,10 +1,10 @@
 """Whether a finished case is what the code as it is now would make.
 
 The name of a case is the digest of what it depends on, and of a `recipe` that is raised
-when the code makes other inputs of the same. Where that was forgotten, such as by somebody
-who tries another force law, the old results would be taken for the new ones. So a case
-that other code has made is compared: its inputs are written anew, and its tables are made
-anew of its results.
+when the code makes other inputs of the same. Where that was forgotten, such as by
+somebody who tries another force law, the old results would be taken for the new ones.
+So a case that other code has made is compared: its inputs are written anew, and its
+tables are made anew of its results.
 """
 
 import contextlib
@@ -40,8 +40,8 @@ def is_as_made_now(case: Case, cases: Path) -> bool:
     -------
     bool
         True if the same code made it, or if the inputs that this code writes, and the
-        tables that it makes of the results, are the same byte for byte. That is noted in
-        the case.
+        tables that it makes of the results, are the same byte for byte. That is noted
+        in the case.
     """
     directory = cases / case.name
     about = read_json(directory / IDENTITY)
@@ -61,7 +61,7 @@ def is_as_made_now(case: Case, cases: Path) -> bool:
 
 
 def _is_made_alike(case: Case, cases: Path, beside: Path) -> bool:
-    """Whether a case has the inputs and tables that are made of it in an empty folder."""
+    """Whether a case has the inputs and tables that are made of it anew."""
     directory = cases / case.name
     folder = beside / case.name
     folder.mkdir()

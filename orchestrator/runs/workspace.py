@@ -1,4 +1,4 @@
-"""A directory of results: whose it is, who holds it, how far its study came, what it can drop."""
+"""A directory of results: whose it is, who holds it, how far its study came."""
 
 import contextlib
 import csv
@@ -30,7 +30,15 @@ LOCK = ".lock"
 
 
 class Kind(NamedTuple):
-    """A kind of contents, and the JSON file of a directory that states their kind and name."""
+    """A kind of contents of a directory.
+
+    Attributes
+    ----------
+    word
+        Its name for people.
+    marker
+        The JSON file that states the kind and the name of the contents.
+    """
 
     word: str
     marker: str
@@ -48,16 +56,38 @@ STATE = "report.json"
 
 @contextlib.contextmanager
 def claimed(root: Path, kind: Kind, name: str, *, new: bool = True) -> Iterator[Folder]:
-    """Make a directory for contents of a kind and a name, and hold it while the block runs.
+    """Make a directory for contents of a kind and a name, and hold it for a block.
 
-    It may also be empty, or hold these contents already. Without a marker it gets one if `new`.
-    InputError is raised if it holds something else, cannot be written, or has a link where this
-    program writes; OrchestratorError if another process holds it, or the shell's limits are low.
+    It may also be empty, or hold these contents already.
+
+    Parameters
+    ----------
+    root
+        The directory.
+    kind, name
+        Kind and name of the contents.
+    new
+        Whether a directory without a marker gets one.
+
+    Yields
+    ------
+    Folder
+        The directory.
+
+    Raises
+    ------
+    InputError
+        If it holds something else, cannot be written, or has a link where this program
+        writes.
+    OrchestratorError
+        If another process holds it, or the shell's limits are low.
     """
-    if shortage := process.shortage():
+    shortage = process.shortage()
+    if shortage:
         raise OrchestratorError(shortage)
+    folder = Folder(root)
     # a process that is ending may hold the lock for a moment
-    folder, lock = Folder(root), FileLock(root / LOCK, timeout=1.0)
+    lock = FileLock(root / LOCK, timeout=1.0)
     try:
         root.mkdir(parents=True, exist_ok=True)
         _check(folder, kind, name)
@@ -65,21 +95,17 @@ def claimed(root: Path, kind: Kind, name: str, *, new: bool = True) -> Iterator[
     except Timeout:
         holder = (root / LOCK).read_text(errors="replace").strip() or "another process"
         remedy = "wait for its end, or choose another directory with --out"
-        raise OrchestratorError(
-            f"it is in use by {holder}", str(root), remedy
-        ) from None
+        what = f"it is in use by {holder}"
+        raise OrchestratorError(what, str(root), remedy) from None
     except OSError as error:
         what = f"the output directory cannot be used: {error.strerror or error}"
-        raise InputError(
-            what, str(error.filename or root), "choose another one: --out"
-        ) from None
+        where = str(error.filename or root)
+        raise InputError(what, where, "choose another one: --out") from None
     try:
-        with contextlib.suppress(
-            OSError
-        ):  # a full disk holds no note, but gives the lock
-            (root / LOCK).write_text(
-                f"process {os.getpid()} on {socket.gethostname()}\n"
-            )
+        holder = f"process {os.getpid()} on {socket.gethostname()}\n"
+        # a full disk holds no note, but gives the lock
+        with contextlib.suppress(OSError):
+            (root / LOCK).write_text(holder)
         _check(folder, kind, name)  # another process may have been first
         if new and not read_marker(root, kind):
             folder.note(kind.marker, files.text_of({"kind": kind.word, "name": name}))
@@ -91,16 +117,31 @@ def claimed(root: Path, kind: Kind, name: str, *, new: bool = True) -> Iterator[
 
 
 def read_marker(root: Path, kind: Kind) -> dict[str, Any]:
-    """Content of the marker of a kind; empty where there is none, or it is not this program's."""
+    """Read the marker of a kind.
+
+    Parameters
+    ----------
+    root
+        The directory.
+    kind
+        The kind.
+
+    Returns
+    -------
+    dict
+        Its content; empty where there is none, or it is not this program's.
+    """
     value = read_json(root / kind.marker)
     return value if {"kind", "name"} <= value.keys() else {}
 
 
 def _check(folder: Folder, kind: Kind, name: str) -> None:
     """See that a directory holds nothing but what is claimed, and no links."""
-    root, remedy = folder.root, "choose an empty or a new one: --out"
-    for marker in filter(None, (read_marker(root, other) for other in KINDS)):
-        if (marker["kind"], marker["name"]) != (kind.word, name):
+    root = folder.root
+    remedy = "choose an empty or a new one: --out"
+    for other in KINDS:
+        marker = read_marker(root, other)
+        if marker and (marker["kind"], marker["name"]) != (kind.word, name):
             holds = f"the directory holds the {marker['kind']} {marker['name']}"
             raise InputError(f"{holds}, not the {kind.word} {name}", str(root), remedy)
     # a study whose marker is lost still has its cases
@@ -117,18 +158,37 @@ def _check(folder: Folder, kind: Kind, name: str) -> None:
 
 
 class Workspace(Folder):
-    """The directory of a study: of its `cases`, its tables, its `page`; `drawn` is `STATE`."""
+    """The directory of a study.
+
+    Parameters
+    ----------
+    root
+        The directory.
+
+    Attributes
+    ----------
+    cases
+        The directory of its cases.
+    page
+        The file of its page.
+    drawn
+        The marker `STATE`.
+    """
 
     def __init__(self, root: Path) -> None:
         super().__init__(root)
-        self.cases, self.page, self.drawn = (
-            root / "cases",
-            root / "report.html",
-            root / STATE,
-        )
+        self.cases = root / "cases"
+        self.page = root / "report.html"
+        self.drawn = root / STATE
 
     def is_held(self) -> bool:
-        """Whether a running process holds the study; nothing is written."""
+        """Whether a running process holds the study.
+
+        Returns
+        -------
+        bool
+            Whether one does; nothing is written.
+        """
         try:
             with files.opened(self.root / LOCK) as stream:
                 fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -137,80 +197,166 @@ class Workspace(Folder):
         return False
 
     def describe(self, kind: Kind, name: str, cases: list[str], **about: Any) -> None:
-        """Write which study this is, of which cases, and more about it; only the holder may."""
-        whose = {
+        """Write which study this is; only the holder may.
+
+        Parameters
+        ----------
+        kind, name
+            Kind and name of the contents.
+        cases
+            Names of its cases.
+        **about
+            More about it.
+        """
+        value = {
             "orchestrator": __version__,
             "kind": kind.word,
             "name": name,
             "cases": cases,
+            **about,
         }
-        if read_marker(self.root, kind) != (value := whose | about):
+        if read_marker(self.root, kind) != value:
             self.note(kind.marker, files.text_of(value))
 
     def description(self) -> dict[str, Any]:
-        """Read what `describe` wrote; InputError if the directory holds no study."""
+        """Read what `describe` wrote.
+
+        Returns
+        -------
+        dict
+            The description.
+
+        Raises
+        ------
+        InputError
+            If the directory holds no study.
+        """
         about = read_json(self.root / STUDY.marker)
-        names = about["cases"] if isinstance(about.get("cases"), list) else [None]
-        texts = (about.get("name"), about.get("study", ""), *names)
-        if all(isinstance(text, str) for text in texts):
-            return about
+        names = about.get("cases")
+        if isinstance(names, list):
+            texts = (about.get("name"), about.get("study", ""), *names)
+            if all(isinstance(text, str) for text in texts):
+                return about
         remedy = "name the directory that a study was written to"
         raise InputError("there is no study in this directory", str(self.root), remedy)
 
     def drawn_of(self, ids: Mapping[str, str]) -> dict[str, Any]:
-        """All that a page is made of: the question, the ids of the cases by name, code, files."""
+        """List all that a page is made of.
+
+        Parameters
+        ----------
+        ids
+            The ids of the cases by name.
+
+        Returns
+        -------
+        dict
+            Digests of the question, the code and the files, and the ids.
+        """
         about = self.description()
-        question = digest_text(
-            canonical_json([about.get("study"), about.get("tolerance")])
-        )
-        made_of = {"question": question, "cases": dict(ids), "code": _code_digest()}
-        return {**made_of, "sha256": self.written()}
+        question = canonical_json([about.get("study"), about.get("tolerance")])
+        return {
+            "question": digest_text(question),
+            "cases": dict(ids),
+            "code": _code_digest(),
+            "sha256": self.written(),
+        }
 
     def answer(self, ids: Mapping[str, str]) -> str | None:
-        """The answer on the page of these cases; None where it is not finished, or has changed."""
+        """Look up the answer on the page of some cases.
+
+        Parameters
+        ----------
+        ids
+            The ids of the cases by name.
+
+        Returns
+        -------
+        str, or None
+            The answer; None where it is not finished, or has changed.
+        """
         marker = read_json(self.drawn)
-        is_drawn = marker and {**marker, **self.drawn_of(ids)} == marker
-        return str(marker.get("answer", "")) if is_drawn and self.is_whole() else None
+        if not marker or {**marker, **self.drawn_of(ids)} != marker:
+            return None
+        if not self.is_whole():
+            return None
+        return str(marker.get("answer", ""))
 
     def left(self, asked: Container[str]) -> tuple[str, ...]:
-        """The cases that are there without being asked for: an earlier study file did."""
+        """List the cases of an earlier study file.
+
+        Parameters
+        ----------
+        asked
+            Names of the cases that are asked for now.
+
+        Returns
+        -------
+        tuple of str
+            Names of the others that are there.
+        """
         return tuple(name for name in names_in(self.cases) if name not in asked)
 
     def check_cases_of_tables(self, done: Container[str]) -> None:
-        """Refuse (OrchestratorError) to replace tables whose cases are not all done."""
+        """Refuse to replace tables whose cases are not all done.
+
+        Parameters
+        ----------
+        done
+            Names of the cases that are done.
+
+        Raises
+        ------
+        OrchestratorError
+            If a case of the tables is not.
+        """
         table = self.root / "timings" / "timings.csv"
-        text = (
-            table.read_text(encoding="utf-8", errors="replace")
-            if table.is_file()
-            else ""
-        )
+        if not table.is_file():
+            return
+        text = table.read_text(encoding="utf-8", errors="replace")
         names = [row.get("case", "") for row in csv.DictReader(text.splitlines())]
-        if lost := [name for name in names if name not in done]:
+        lost = [name for name in names if name not in done]
+        if lost:
             share = f"{len(lost)} of the {len(names)} cases that they were made of"
-            what = f"the tables stay as they are: {share} are not here as this version makes them"
-            remedy = "`orchestrator study` runs them again; to draw the others, move tables away"
+            what = f"{share} are not here as this version makes them"
+            what = f"the tables stay as they are: {what}"
+            remedy = "to draw the others, move tables away"
+            remedy = f"`orchestrator study` runs them again; {remedy}"
             raise OrchestratorError(what, str(self.root), remedy)
 
 
 @cache
 def _code_digest() -> str:
-    """Digest of the content of all files of the package and of the templates, with names."""
+    """Digest of all files of the package and of the templates, with their names."""
     digests = {}
     for root in (case_states.PACKAGE, case_states.templates()):
         for folder, _, names in os.walk(root):
-            for path in (
-                Path(folder, name) for name in names if not name.endswith(".pyc")
-            ):
-                digests[f"{root.name}/{path.relative_to(root)}"] = files.digest_file(
-                    path
-                )
+            for name in names:
+                path = Path(folder, name)
+                if path.suffix == ".pyc":
+                    continue
+                key = f"{root.name}/{path.relative_to(root)}"
+                digests[key] = files.digest_file(path)
     return digest_text(canonical_json(digests))
 
 
 def files_of(root: Path) -> list[str]:
-    """Names of the files that the study in a directory was made from; empty if unknown."""
+    """Name the files that the study in a directory was made from.
+
+    Parameters
+    ----------
+    root
+        The directory.
+
+    Returns
+    -------
+    list of str
+        The names; empty if they are not known.
+    """
     source = read_json(root / STUDY.marker).get("source")
-    digests = source.get("sha256") if isinstance(source, dict) else None
+    if not isinstance(source, dict):
+        return []
+    digests = source.get("sha256")
     return [*digests] if isinstance(digests, dict) else []
 
 
@@ -219,8 +365,8 @@ def finished(
 ) -> tuple[str, Path] | None:
     """The answer and the page of a study that is finished and has not changed.
 
-    The study file is not read as a study, so no library of numbers is imported: it is told
-    from the bytes that the study in the directory was made from.
+    The study file is not read as a study, so no library of numbers is imported: it is
+    told from the bytes that the study in the directory was made from.
 
     Parameters
     ----------
@@ -233,8 +379,9 @@ def finished(
 
     Returns
     -------
-    None where the source is another one, or a case, a table, a figure or this package may
-    have changed since.
+    tuple, or None
+        The answer and the file of the page; None where the source is another one, or a
+        case, a table, a figure or this package may have changed since.
     """
     space = Workspace(root)
     about = read_json(root / STUDY.marker)
@@ -255,23 +402,43 @@ def finished(
 
 
 def status(directory: Path) -> tuple[str, bool]:
-    """How far a study came, for people, and whether a case has failed; from its directory alone."""
+    """Tell how far a study came, from its directory alone.
+
+    Parameters
+    ----------
+    directory
+        The directory.
+
+    Returns
+    -------
+    text : str
+        How far it came, for people.
+    has_failed : bool
+        Whether a case has failed.
+    """
     space = Workspace(directory.absolute())
-    about, is_running = space.description(), space.is_held()
+    about = space.description()
+    is_running = space.is_held()
     begun = [name for name in about["cases"] if (space.cases / name).is_dir()]
     undone = [name for name in begun if not read_json(space.cases / name / DONE)]
-    causes = {
-        name: cause for name in undone if (cause := failure(space.cases / name)[1])
-    }
-    word, (sizes, *left) = "running" if is_running else "unfinished", _sizes(space)
-    lines = [
-        f"study {about['name']}: {len(begun) - len(undone)} done, "
-        f"{len(undone) - len(causes)} {word}, {len(about['cases']) - len(begun)} not begun, "
+    causes = {}
+    for name in undone:
+        _, cause = failure(space.cases / name)
+        if cause:
+            causes[name] = cause
+    unfinished = [name for name in undone if name not in causes]
+    word = "running" if is_running else "unfinished"
+    counts = [
+        f"{len(begun) - len(undone)} done",
+        f"{len(unfinished)} {word}",
+        f"{len(about['cases']) - len(begun)} not begun",
         f"{len(causes)} failed",
-        *(f"  {word}: {name}" for name in undone if name not in causes),
-        *(f"  failed: {name}: {cause}" for name, cause in causes.items()),
-        *(f"size: {sizes}", *left),
     ]
+    sizes, *left = _sizes(space)
+    lines = [f"study {about['name']}: {', '.join(counts)}"]
+    lines += [f"  {word}: {name}" for name in unfinished]
+    lines += [f"  failed: {name}: {cause}" for name, cause in causes.items()]
+    lines += [f"size: {sizes}", *left]
     if space.drawn.is_file() and space.page.is_file():
         lines.append(f"page: {space.page}")
     elif not is_running:
@@ -281,10 +448,23 @@ def status(directory: Path) -> tuple[str, bool]:
 
 
 def prune(space: Workspace, done: Mapping[str, Case], shown: Container[str]) -> str:
-    """Drop the bulky files of the finished cases, but for those that the page shows, by name.
+    """Drop the bulky files of the finished cases, but for those that the page shows.
 
-    The inputs, and all that tables and page are made of, stay. The workspace is held by the caller,
-    who gets a summary for people.
+    The inputs, and all that tables and page are made of, stay.
+
+    Parameters
+    ----------
+    space
+        The directory of the study, which the caller holds.
+    done
+        The finished cases by their names.
+    shown
+        Names of the cases that the page shows.
+
+    Returns
+    -------
+    str
+        A summary for people.
     """
     before, *_ = _sizes(space)
     pruned = [case for name, case in done.items() if name not in shown]
@@ -308,14 +488,17 @@ def _sizes(space: Workspace) -> list[str]:
     kinds: Counter[str] = Counter()
     for name, count in cases.items():
         kinds[f"{name.partition('-')[0]} cases"] += count
-    beside = (path for path in space.root.iterdir() if path != space.cases)
+    beside = [path for path in space.root.iterdir() if path != space.cases]
     kinds["tables, figures and page"] = sum(map(files.size_of, beside))
-    named = ", ".join(
-        f"{decimal(count)} {kind}" for kind, count in kinds.most_common() if count
-    )
-    lines = [f"{decimal(kinds.total())} ({named})"]
-    if left := space.left(space.description()["cases"]):
-        total, names = decimal(sum(cases[name] for name in left)), ", ".join(left[:5])
+    named = []
+    for kind, count in kinds.most_common():
+        if count:
+            named.append(f"{decimal(count)} {kind}")
+    lines = [f"{decimal(kinds.total())} ({', '.join(named)})"]
+    left = space.left(space.description()["cases"])
+    if left:
+        total = decimal(sum(cases[name] for name in left))
+        names = ", ".join(left[:5])
         what = f"{len(left)} cases of an earlier study file, {total}, such as {names}"
         lines.append(f"not asked for: {what}; they stay until you remove them")
     return lines

@@ -1,0 +1,108 @@
+"""The rooms of the house: a package imports from those below it, and never in a circle.
+
+The order of the rooms is that of the table in docs/architecture.md, low to high.
+"""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import orchestrator
+
+PACKAGE = Path(orchestrator.__file__).parent
+PAGE = PACKAGE.parent / "docs" / "architecture.md"
+ENDS = {"orchestrator", "orchestrator.__main__"}
+"""The face of the package, which imports its functions when they are called."""
+
+
+def _modules() -> dict[str, Path]:
+    """The file of each module of the package."""
+    found = {}
+    for path in PACKAGE.rglob("*.py"):
+        parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+        name = ".".join(part for part in parts if part != "__init__")
+        found[name] = path
+    return found
+
+
+MODULES = _modules()
+
+
+def _rooms() -> list[str]:
+    """The rooms of the table in the document, low to high."""
+    _, table = PAGE.read_text("utf-8").split("## Packages, low to high")
+    table, *_ = table.split("\n## ")
+    rows = re.findall(r"^\| (`.*?) \|", table, re.MULTILINE)
+    rooms = []
+    for row in rows:
+        rooms += re.findall(r"`(\w+)(?:/|\.py)`", row)
+    return rooms
+
+
+def _imported(path: Path) -> Iterator[str]:
+    """The modules of the package that a file imports, also within its functions."""
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (one.name for one in node.names if one.name in MODULES)
+        if not isinstance(node, ast.ImportFrom) or node.module not in MODULES:
+            continue
+        for one in node.names:
+            module = f"{node.module}.{one.name}"
+            yield module if module in MODULES else node.module
+
+
+def _room(module: str) -> str:
+    """The room of a module."""
+    return module.split(".")[1]
+
+
+def _arrows() -> list[tuple[str, str]]:
+    """Which module imports which other one."""
+    arrows = []
+    for name, path in MODULES.items():
+        if name in ENDS:
+            continue
+        for other in set(_imported(path)) - ENDS:
+            arrows.append((name, other))
+    return sorted(arrows)
+
+
+def test_every_module_has_its_room_in_the_document() -> None:
+    rooms = _rooms()
+    assert len(rooms) == len(set(rooms))
+    assert {_room(name) for name in MODULES if name not in ENDS} == set(rooms)
+
+
+def test_a_room_imports_from_those_below_it() -> None:
+    rooms = _rooms()
+    upward = []
+    for name, other in _arrows():
+        if rooms.index(_room(other)) > rooms.index(_room(name)):
+            upward.append(f"{name} imports {other}")
+    assert upward == []
+
+
+def _reached(start: str, graph: dict[str, set[str]]) -> set[str]:
+    """The modules that a module imports, directly or through others."""
+    reached: set[str] = set()
+    todo = [start]
+    while todo:
+        for other in graph.get(todo.pop(), ()):
+            if other not in reached:
+                reached.add(other)
+                todo.append(other)
+    return reached
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    graph: dict[str, set[str]] = {}
+    for name, other in _arrows():
+        graph.setdefault(name, set()).add(other)
+    reached = {name: _reached(name, graph) for name in graph}
+    circles = []
+    for name in graph:
+        circle = {other for other in reached[name] if name in reached.get(other, ())}
+        if circle and circle not in circles:
+            circles.append(circle)
+    assert circles == []
