@@ -39,8 +39,8 @@ STEEP = ("steep flumes", "steep flumes, large elements")
 """Sets of steep beds, which an interval of grains that go on holds as well."""
 WIND = ("wind, field", "wind tunnel, curve")
 """Sets in air."""
-IN_AIR = (0.5, 30.0)
-"""Range of Re* of the intervals in air."""
+IN_AIR = (0.35, 52.0)
+"""Range of Re* of the intervals in air: within 2 of those of the rows, 0.7 to 26."""
 DECADES = (0.1, 1.0, 10.0, 100.0, 1000.0, 1e4)
 NAMES = ["kind", "reynolds_low", "reynolds_high", "low", "high", "rows", "held"]
 """Columns of the table."""

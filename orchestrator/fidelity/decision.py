@@ -8,7 +8,7 @@ other.
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 from orchestrator.fidelity import spread
@@ -17,6 +17,7 @@ from orchestrator.fidelity.fidelities import FIDELITIES, LOCAL, Fidelity, fideli
 from orchestrator.fidelity.known import UNKNOWN, Known, known
 from orchestrator.grains.loads import LONGEST_PACKED, Geometry, has_rows_along
 from orchestrator.grains.pile import Pile
+from orchestrator.study.criterion import GOES_ON, goes_on
 from orchestrator.study.fields import FIELDS, default_of
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
@@ -28,6 +29,8 @@ LEAST_HELD = (
 EXACT = "the closed form is exact for a single grain in a held flow"
 LONG_BED = f"more than {LONGEST_PACKED:g} grains long"
 ALONG = f"{LONG_BED}: closed form along the bed, checked where motion starts"
+HOPS = "grains that go on: leaving and hopping have closed forms"
+ENDLESS = "the rows of the bed have no end: closed form along the bed"
 CHOSEN = FIDELITIES[:-1]
 """The fidelities that a choice may take: errors are measured against the last one."""
 KEPT = ("method.flow.speed", "method.flow.viscosity")
@@ -89,6 +92,8 @@ class Decision:
     @property
     def is_along(self) -> bool:
         """Whether the closed form along the bed answers because the bed is long."""
+        if self.scene.threshold.criterion == GOES_ON:
+            return False
         return self.fidelity is LOCAL and self.asked.method.kind == "auto"
 
     @property
@@ -121,6 +126,55 @@ def decide(scene: Scene, tolerance: float | None) -> Decision:
     Decision
         The scene that answers, its fidelity, what is known of it, and why.
     """
+    if goes_on(scene):
+        return _going_on(scene, tolerance)
+    return _leaving(scene, tolerance)
+
+
+def _going_on(scene: Scene, tolerance: float | None) -> Decision:
+    """The decision on a scene whose grains must go on.
+
+    A single grain is answered by the closed form, a bed whose rows have no end by the
+    closed form along its line, and all others as those whose grains must leave.
+    """
+    resolved = changed(scene, {"threshold.criterion": GOES_ON})
+    if scene.method.kind != "auto":
+        decision = _leaving(resolved, tolerance)
+    elif not isinstance(scene.bed, PileBed):
+        answer = changed(resolved, {"method.kind": "pivot"})
+        return Decision(scene, answer, None, UNKNOWN, HOPS)
+    elif has_endless_rows(scene):
+        answer = changed(resolved, {"method.kind": "local"})
+        return Decision(scene, answer, LOCAL, known(LOCAL, answer), ENDLESS)
+    else:
+        decision = _leaving(resolved, tolerance)
+    return replace(decision, asked=scene)
+
+
+def has_endless_rows(scene: Scene) -> bool:
+    """Whether a pile is a lattice whose rows end at no edge, and none asks for grains.
+
+    Parameters
+    ----------
+    scene
+        A pile.
+
+    Returns
+    -------
+    bool
+        Whether the closed form along its line answers it.
+    """
+    if not has_rows_along(scene) or scene.forces.sheltering != "none":
+        return False
+    assert isinstance(scene.bed, PileBed)
+    if scene.bed.is_wedge:
+        return False
+    of_grains = [name for name in NUMBERS if name.startswith("method.grains.")]
+    return all(value_of(scene, name) == NUMBERS[name] for name in of_grains)
+
+
+def _leaving(scene: Scene, tolerance: float | None) -> Decision:
+    """The decision on a scene whose grains are counted as they leave."""
     if not isinstance(scene.bed, PileBed):
         return _of_grain(scene, tolerance)
     why_as_written = _why_as_written(scene, tolerance)

@@ -81,6 +81,8 @@ def known(fidelity: Fidelity, scene: Scene) -> Known:
     """
     if unmeasured(scene):
         return UNKNOWN
+    if fidelity is LOCAL and scene.threshold.criterion == "goes on":
+        return _of_flow(scene)
     flow = fidelity.flow_over(scene)
     grains = fidelity.grains
     if fidelity in (OWN_NUMBERS, LOCAL):
@@ -89,6 +91,22 @@ def known(fidelity: Fidelity, scene: Scene) -> Known:
     return _of_classes(
         flow, grains, scene_class(FLOW, scene), scene_class(GRAINS, scene)
     )
+
+
+def _of_flow(scene: Scene) -> Known:
+    """Known error of the closed form along the bed line of a pile whose grains go on.
+
+    Places along the line are exact; over a level bed so is the flow.
+    """
+    name = scene_class(FLOW, scene)
+    if name == LEVEL_BED:
+        return Known(0.0, 0.0)
+    found = measured().get((FLOW, _no_finer(FLOW, scene).name, name))
+    if found is None:
+        return UNKNOWN
+    errors, uncertainties = found
+    worst = int(np.argmax(np.hypot(errors, uncertainties)))
+    return Known(float(errors[worst]), float(uncertainties[worst]))
 
 
 def _no_finer(part: str, scene: Scene) -> Rung:

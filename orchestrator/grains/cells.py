@@ -40,13 +40,13 @@ SPACING = 3.0
 """Spacing of the cells across the flow, in diameters of the largest grain: grains of
 two cells never meet."""
 UNUSED: dict[str, Any] = {
-    "threshold": {"fractions"},
+    "threshold": {"fractions", "criterion"},
     "method": {"grains": {"final_fraction"}},
 }
 """Fields of the protocol that mean nothing to one grain."""
 DIFFERENT: dict[str, Any] = {
     "grain": {"diameter", "density", "sizes"},
-    "threshold": {"fractions"},
+    "threshold": {"fractions", "criterion"},
     "method": {"grains": {"final_fraction"}},
 }
 """Fields that change the forces of a cell, and not its contacts."""

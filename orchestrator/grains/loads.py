@@ -34,6 +34,7 @@ from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import LIFT_OFF, root, thresholds_of
 from orchestrator.runs.files import state_of
 from orchestrator.study.closed_form import closed_form, single_grain
+from orchestrator.study.criterion import GOES_ON, going_on, peak_of
 from orchestrator.study.declare import UnfitError
 from orchestrator.study.parts import PileBed, Range
 from orchestrator.study.scene import Scene
@@ -627,8 +628,12 @@ class Geometry:
         """
         if self.scene.is_poured or self.bed.is_wedge:
             return 1.0
+        is_local = self.scene.method.kind == "local"
+        if is_local and self.scene.threshold.criterion == GOES_ON:
+            # places along the line are of single exposed grains
+            return 1.0
         loads = self.loads(cases)
-        if self.scene.method.kind != "local":
+        if not is_local:
             return loads.row_hold()
         alone = loads.alone()
         place = int(np.argmin(np.where(alone > 0, alone, np.inf)))
@@ -758,6 +763,27 @@ class Loads:
         x, z = self.geometry.tangents[counted].T
         slopes = np.degrees(np.arctan2(z, x))
         return np.asarray(np.where(self.ratio[counted] < 0, -slopes, slopes))
+
+    def going_on(self) -> tuple[FloatArray, FloatArray]:
+        """Find the flows from which counted grains go on hopping, and their gust.
+
+        Returns
+        -------
+        flows, over
+            Undisturbed friction velocities of the mean flow, m/s, and the friction
+            velocity of the gust in which a grain leaves over that of the mean flow,
+            shape (N,). A grain that cannot hop has no gust, and goes on when it leaves.
+        """
+        scene = self.geometry.scene
+        slopes = self._slopes_deg
+        found = going_on(scene, slopes, np.zeros(len(slopes)))
+        can_hop = np.isfinite(found.goes_on)
+        excess = (scene.grain.density / scene.fluid.density - 1) * scene.fluid.gravity
+        shields = np.where(can_hop, found.goes_on, 0.0)
+        ustar = np.sqrt(shields * excess * scene.grain.diameter)
+        # the loads have the scene's own gusts already
+        over = np.where(can_hop, np.sqrt(peak_of(scene) / scene.gust), 1.0)
+        return self._undisturbed(ustar), over
 
     def _undisturbed(self, local: FloatArray) -> FloatArray:
         """Undisturbed friction velocity to local ones of counted grains, m/s, (N,)."""

@@ -125,6 +125,31 @@ class Motion:
         mode = np.select([carried, moves], modes, 0)
         return cls(flow, level, np.zeros_like(level), carried, mode, exact=True)
 
+    @property
+    def flows(self) -> FloatArray:
+        """Flow at which each grain moved, shape (N,); infinite for never."""
+        middle = np.sqrt(self.low * self.flow)
+        return np.where(self.level > 0, middle[self.level], np.inf)
+
+    def until(self, further: FloatArray, over: FloatArray) -> "Motion":
+        """Make the motion of grains that must go on, too, from that of their leaving.
+
+        Parameters
+        ----------
+        further
+            Flows from which they go on, shape (N,).
+        over
+            Flow of the gust in which they leave, over the mean flow, shape (N,).
+
+        Returns
+        -------
+        Motion
+            The motion at the larger of both flows.
+        """
+        flows = np.maximum(self.flows / over, further)
+        lifting = np.where(self.carried, flows, np.inf)
+        return Motion.of_flows(flows, lifting)
+
     @classmethod
     def chained(cls, runs: "Sequence[tuple[BoolArray, Motion]]") -> "Motion":
         """Join the motion in runs that go on from one another.

@@ -31,6 +31,7 @@ from orchestrator.grains.threshold import PileThreshold, of_grains, of_pile
 from orchestrator.physics.gusts import gust_stresses
 from orchestrator.runs.case import Case
 from orchestrator.solvers import liggghts
+from orchestrator.study.criterion import GOES_ON
 from orchestrator.study.parts import Gusts
 from orchestrator.study.scene import BEYOND_ASKED, Scene
 from orchestrator.types import BoolArray, FloatArray
@@ -135,7 +136,9 @@ class WornFlow(Case):
     @property
     def parameters(self) -> dict[str, Any]:
         """The scene, but for what only the reading of the results depends on."""
-        return self.scene.model_dump(mode="json", exclude={"threshold": {"fractions"}})
+        return self.scene.model_dump(
+            mode="json", exclude={"threshold": {"fractions", "criterion"}}
+        )
 
     @property
     def cost_s(self) -> float:
@@ -310,7 +313,9 @@ class PileCase(GrainCase):
     @property
     def parameters(self) -> dict[str, Any]:
         """The scene, but for what only the reading of the results depends on."""
-        asked = self.scene.model_dump(mode="json", exclude={"threshold": {"fractions"}})
+        asked = self.scene.model_dump(
+            mode="json", exclude={"threshold": {"fractions", "criterion"}}
+        )
         asked["method"]["grains"]["final_fraction"] = self.scene.last_fraction
         if self.scene.threshold.update:
             asked["threshold"]["goal"] = goal_part(self.scene, self.flow)
@@ -730,7 +735,20 @@ class Pile(Geometry):
 
     def motion(self, cases: Path) -> Motion:
         """Motion of the counted grains; `cases` is the directory of the finished runs."""
-        return self.method.motion(cases)
+        motion = self.method.motion(cases)
+        if not self.goes_on:
+            return motion
+        return motion.until(*self.loads(cases).going_on())
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether its grains must go on, not only leave their pockets."""
+        return self.scene.threshold.criterion == GOES_ON
+
+    def hops_decide(self, cases: Path) -> BoolArray:
+        """Which counted grains hopping on holds longer than their pockets, (N,)."""
+        further, over = self.loads(cases).going_on()
+        return np.asarray(self.method.motion(cases).flows / over < further)
 
     def thresholds(
         self, cases: Path, fractions: Iterable[float]

@@ -198,7 +198,7 @@ def kind_of(row: Mapping[str, Any]) -> str:
     if not _is_as_tested(row):
         return ""
     words = [row["force_law"], f"z0 d/{row['d_m'] / row['z0_m']:.3g}"]
-    if row.get("bed", "grain") == "grain":
+    if row.get("bed", "grain") == "grain" or _is_along(row):
         words += ["grain", f"beta {row['beta_deg']:g}"]
         if row.get("criterion") == GOES_ON:
             words.append(GOES_ON)
@@ -222,6 +222,11 @@ def kind_of(row: Mapping[str, Any]) -> str:
     if isinstance(gusts, str):
         words.append(f"gusts {gusts}")
     return ", ".join(words)
+
+
+def _is_along(row: Mapping[str, Any]) -> bool:
+    """Whether grains that go on are single exposed ones along a bed line."""
+    return row.get("method") == "local" and row.get("criterion") == GOES_ON
 
 
 def _is_as_tested(row: Mapping[str, Any]) -> bool:

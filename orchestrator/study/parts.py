@@ -423,6 +423,12 @@ class Threshold(Part):
         le=0.5,
     )
     """displacement along the bed from which a grain counts as moved"""
+    criterion: Literal["auto", "leaves", "goes on"] = field("auto", since=True)
+    """what a grain must do; left open, with the method left open, too, and in another fluid than
+    the paper's, it must go on
+    - auto: by fluid, forces and method
+    - leaves: leave its pocket in the flow, as in the paper
+    - goes on: leave it in a gust of 2.28 times the mean stress, and hop on after it"""
     fractions: Annotated[tuple[Fraction, ...], List] = _pile(
         (0.1, 0.3, 0.5, 0.7), symbol="n/N", column="-", min_length=1
     )

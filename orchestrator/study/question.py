@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from orchestrator.digits import SLACK
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import LAWS
-from orchestrator.physics.threshold import weight
+from orchestrator.physics.threshold import LAWS_OF, PAPER, weight
 from orchestrator.study.declare import Part, UnfitError
 from orchestrator.study.parts import (
     Flow,
@@ -158,10 +158,37 @@ def _check(question: Question) -> None:
         what = "each update is a solve of the flow"
         raise UnfitError("threshold.update", what, f"0, or at least {LEAST_UPDATE:g}")
     _check_top(question.flow)
+    _check_criterion(question)
     if isinstance(question.bed, PileBed):
         _check_pile(question, question.bed)
     else:
         _check_single_grain(question)
+
+
+def why_not_going_on(question: Question) -> str:
+    """Say why grains that go on are not known for a question; empty where they are."""
+    law = question.forces.law
+    if law in (PAPER, *LAWS_OF["transition"]):
+        return f"the law {law} is of grains that leave their pockets"
+    if question.grain.sizes is not None:
+        return "hops of a mixture are not known"
+    if question.bed.relative_size != 1:
+        return "hops over a bed of other grains are not known"
+    if question.grain.cohesion > 0:
+        return "hops with cohesion are not known"
+    if question.forces.sheltering == "balanced":
+        return "grains that share the stress are counted as they leave"
+    if question.threshold.update > 0:
+        return "on a bed that changes grains are counted as they leave"
+    return ""
+
+
+def _check_criterion(question: Question) -> None:
+    if question.threshold.criterion != "goes on":
+        return
+    what = why_not_going_on(question)
+    if what:
+        raise UnfitError("threshold.criterion", what, 'choose "leaves"')
 
 
 def _check_sizes(mixture: Sizes, diameter: float) -> None:

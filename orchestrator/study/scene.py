@@ -33,6 +33,7 @@ a second point at 0.05 of the first cell moves thresholds by 1 to 2 %, at 0.0002
 BEYOND_ASKED = 0.05
 """Part of the grains beyond the largest fraction asked for that a run of DEM goes on: half a grain
 of ten."""
+LEFT_OPEN_METHOD = 'leave it out, or method.kind = "pivot"'
 CLOSED = ("pivot", "local")
 """Methods without contacts: nothing that moves changes the bed."""
 LEFT_OPEN = 'method.kind = "auto", which takes one that does'
@@ -141,6 +142,9 @@ def _check_kind(scene: Scene) -> None:
         raise UnfitError("forces.law", what, LEFT_OPEN)
     if kind != "dem":
         return
+    if isinstance(scene.bed, GrainBed) and scene.threshold.criterion == "goes on":
+        what = "DEM of single grains knows no hops"
+        raise UnfitError("threshold.criterion", what, LEFT_OPEN_METHOD)
     if scene.grain.cohesion > 0:
         raise UnfitError("grain.cohesion", "DEM knows none", LEFT_OPEN)
     if isinstance(scene.bed, GrainBed) and scene.flow.gusts is not None:

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from orchestrator.physics import saltation
+from orchestrator.physics.beside import GOES_ON
 from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.physics.threshold import thresholds_of
 from orchestrator.physics.velocity import measurable_speeds
@@ -158,7 +160,28 @@ def _level_ustar(rows: pd.DataFrame) -> FloatArray:
         )
         at = [each.friction_velocity for each in thresholds_of(str(law), grains)]
         found[is_of_law] = np.array(at, float)
-    return found
+    if "criterion" not in rows:
+        return found
+    is_going_on = (rows["criterion"] == GOES_ON).to_numpy()
+    return np.where(is_going_on, _going_on(rows, found), found)
+
+
+def _going_on(rows: pd.DataFrame, leaving: FloatArray) -> FloatArray:
+    """The same of grains that go on, from the one that turns them over."""
+    density = rows["rho_f_kg_m3"].to_numpy(float)
+    per_shields = _weight(rows) / density
+    grains = saltation.Grains.of(
+        rows["d_m"],
+        density=rows["rho_sol_kg_m3"],
+        fluid_density=density,
+        viscosity=rows["nu_m2_s"],
+        roughness=rows["z0_m"],
+        gravity=rows["g_m_s2"],
+    )
+    further = saltation.tabulated(grains).initiation(saltation.PEAK)
+    steady = leaving**2 / per_shields
+    found = saltation.motion(steady, further, saltation.hops(grains))
+    return np.asarray(np.sqrt(found.shields * per_shields))
 
 
 def _is_flat(rows: pd.DataFrame) -> Any:

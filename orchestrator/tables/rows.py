@@ -22,6 +22,7 @@ from orchestrator.physics.velocity import measurable_speeds, outer_roughness
 from orchestrator.plan import Plan
 from orchestrator.study import fields
 from orchestrator.study.closed_form import closed_form, law_holds
+from orchestrator.study.criterion import GOES_ON, LEAVES, GoingOn, of_single_grain
 from orchestrator.study.declare import UnfitError
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study, changed
@@ -41,6 +42,15 @@ SMOOTHED = {
     2.0: "first_twice_smoothing_m_s",
 }
 """Columns of the flow at which motion starts, by the factor of `smoothing.compared`."""
+ALONE: Row = {
+    "criterion": LEAVES,
+    "shields_leaves": nan,
+    "shields_goes_on": nan,
+    "shields_goes_on_high": nan,
+    "shields_cessation": nan,
+    "decides": LEAVES,
+}
+"""Columns of the criterion of a single grain that only leaves its pocket."""
 FEW_GRAINS = 10
 """Grains of a size class below which the interval of its threshold is wide."""
 WAY_UP = (
@@ -168,11 +178,19 @@ def single_grain(
         exact = closed_form(scene)
         ustar = float(exact.friction_velocity)
         shields = float(exact.shields)
+        of_criterion = {**ALONE}
+        if scene.threshold.criterion == GOES_ON:
+            both = of_single_grain(scene)
+            of_criterion = _criteria(both)
+            ratio = float(both.shields[0]) / shields
+            shields = float(both.shields[0])
+            ustar *= ratio**0.5
+        reynolds = ustar * scene.grain.diameter / scene.fluid.viscosity
         row = {
             "scene_id": asked,
             **point(scene),
-            "reynolds": float(exact.reynolds) * found.value,
-            "reynolds_closed_form": float(exact.reynolds),
+            "reynolds": reynolds * found.value,
+            "reynolds_closed_form": reynolds,
             "shields_closed_form": shields,
             "shields_dem": shields * found.value**2,
             "shields_dem_low": shields * found.low**2,
@@ -184,10 +202,23 @@ def single_grain(
             **_speeds(scene, ustar if np.isnan(found.value) else ustar * found.value),
             "drag_over_weight": float(exact.drag) / scene.weight,
             "fell_upstream": found.fell_upstream,
+            **of_criterion,
         }
         if found.case:
             row["case"] = found.case
         yield row
+
+
+def _criteria(both: GoingOn) -> Row:
+    """The columns of a single grain that goes on."""
+    return {
+        "criterion": GOES_ON,
+        "shields_leaves": float(both.leaves[0]),
+        "shields_goes_on": float(both.goes_on[0]),
+        "shields_goes_on_high": float(both.at_most[0]),
+        "shields_cessation": float(both.cessation[0]),
+        "decides": GOES_ON if both.hops_decide[0] else LEAVES,
+    }
 
 
 def _single_grains_by_dem(
@@ -360,6 +391,7 @@ class Answer:
         self.smoothed: dict[float, float] = {}
         for factor, other in (smoothed or {}).items():
             _, self.smoothed[factor] = other.first(other.motion(cases))
+        self.cases = cases
         self.motion = pile.motion(cases)
         self.speed = pile.speed(cases)
         self.row_hold = pile.row_hold(cases)
@@ -449,6 +481,9 @@ def pile_grain(answer: Answer) -> Row:
         "mode": np.array(MODES)[motion.mode],
         "ustar0_m_s": threshold.of_grains(motion).value,
     }
+    if pile.goes_on:
+        by_hops = pile.hops_decide(answer.cases)
+        columns["decides"] = np.where(by_hops, GOES_ON, LEAVES)
     if pile.pouring:
         columns["size_over_d"] = packing.sizes[counted]
         columns["pivot_deg"] = pile.pivot_angles_deg
@@ -546,9 +581,19 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
             "share_carried_off": found.carried_off,
             "share_against_flow": found.against_the_flow,
             "row_hold": answer.row_hold,
+            **_decided(answer),
             **_smoothing(answer),
             "case": pile.runs[-1].name if pile.runs else None,
         }
+
+
+def _decided(answer: Answer) -> Row:
+    """The column of which criterion held most of the counted grains longer."""
+    if not answer.pile.goes_on:
+        return {"criterion": LEAVES, "decides": LEAVES}
+    by_hops = answer.pile.hops_decide(answer.cases)
+    decides = GOES_ON if by_hops.mean() > 0.5 else LEAVES
+    return {"criterion": GOES_ON, "decides": decides}
 
 
 def _needed(fraction: float, count: int) -> int:

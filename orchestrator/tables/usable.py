@@ -8,7 +8,7 @@ import pandas as pd
 
 from orchestrator.flow.case import SPEED_HEIGHT
 from orchestrator.grains.threshold import within
-from orchestrator.physics.beside import beside
+from orchestrator.physics.beside import GOES_ON, beside
 from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import standing_out, why_not
 from orchestrator.physics.velocity import (
@@ -129,21 +129,22 @@ def with_usable(
         rows.loc[part.index, "law"] = _beyond_law(str(name), part, ustar[part.index])
     rows["standing_out"] = standing_out(rows["relative_size"], rows["beta_deg"])
     rows["flow_reynolds"] = _flow_reynolds(rows)
+    rows["shields"] = rows.get("shields", rows.get("shields_closed_form"))
+    measured = beside(rows)
+    rows["tested_rows"] = measured["tested_rows"]
     against = contradicted or {}
     texts = []
     for row in rows.to_dict("records"):
-        reasons = list(_reasons(row, tolerance))
+        reasons = [*_reasons(row, tolerance), *_untested(row)]
         key = (row["scene_id"], row.get("fraction", np.nan))
         if key in against:
             reasons.append(against[key])
         texts.append("; ".join(reasons))
-    rows["shields"] = rows.get("shields", rows.get("shields_closed_form"))
-    of_measured = beside(rows)
-    rows = rows.assign(**of_measured)
+    rows = rows.assign(**measured)
     made = {
         "usable": [not text for text in texts],
         "why_not": texts,
-        **of_measured,
+        **measured,
         **quoted(rows),
     }
     return pd.concat([table, pd.DataFrame(made, index=table.index)], axis=1)
@@ -200,6 +201,15 @@ def _beyond_law(name: str, rows: pd.DataFrame, ustar: "pd.Series[float]") -> lis
             if texts[row]:
                 texts[row] += remedy
     return texts
+
+
+def _untested(row: Mapping[Any, Any]) -> Iterator[str]:
+    """Why no interval holds the threshold of grains that go on, in closed form."""
+    is_closed = "share_carried_off" not in row or row.get("method") == "local"
+    if not is_closed or row.get("criterion") != GOES_ON or np.isnan(row["reynolds"]):
+        return
+    if not row["tested_rows"]:
+        yield f"nothing was measured near such grains at Re* {row['reynolds']:.3g}"
 
 
 def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:

@@ -1,0 +1,147 @@
+"""The criterion of motion: where grains must go on, and what is refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import orchestrator
+from orchestrator.calculator.table import thresholds
+from orchestrator.errors import InputError
+from orchestrator.fidelity.decision import decide
+from orchestrator.grains.motion import Motion
+from orchestrator.grains.pile import PileCase
+from orchestrator.study import study
+from orchestrator.study.criterion import goes_on
+from orchestrator.study.scene import Scene
+from orchestrator.study.study import changed
+
+SAND = "[grain]\ndensity = 2650.0\ndiameter = 3.5e-4\n"
+WATER = '[fluid]\nkind = "water"\n'
+PILE = "[bed]\nkind = 'pile'\nslope_deg = 15.0\n"
+CURVED = "[bed]\nkind = 'dune'\nslope_deg = 10.0\nwindward = 'curved'\n"
+
+
+def _scene(text: str) -> Scene:
+    scene, *_ = study.parse(text, name="one", where="one").scenes
+    return scene
+
+
+@pytest.mark.parametrize(
+    ("text", "does"),
+    [
+        (SAND, False),  # the paper's fluid
+        (SAND + WATER, True),
+        (SAND + '[fluid]\nkind = "air"\n', True),
+        (SAND + "[fluid]\ndensity = 1.2\nviscosity = 1.5e-5\n", True),
+        (SAND + WATER + '[method]\nkind = "pivot"\n', False),
+        (SAND + WATER + '[threshold]\ncriterion = "leaves"\n', False),
+        (SAND + '[threshold]\ncriterion = "goes on"\n', True),
+        (SAND + WATER + '[forces]\nlaw = "paper"\n', False),
+        (SAND + "cohesion = 1e-5\n" + WATER, False),
+        (SAND + WATER + "[flow]\ngusts = { intensity = 0.4, events = 9 }\n", False),
+    ],
+)
+def test_fluid_forces_and_method_decide_where_nothing_is_asked(
+    text: str, does: bool
+) -> None:
+    assert goes_on(_scene(text)) is does
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ('[forces]\nlaw = "low"\n', "the law low is of grains that leave"),
+        ('[method]\nkind = "dem"\n', 'method.kind = "pivot"'),
+        ("[bed]\nrelative_size = 2.0\n", "over a bed of other grains"),
+    ],
+)
+def test_a_criterion_that_a_scene_cannot_have_is_refused(text: str, word: str) -> None:
+    asked = SAND + '[threshold]\ncriterion = "goes on"\n' + text
+    with pytest.raises(InputError, match=r"threshold.criterion") as refused:
+        _scene(asked)
+    assert word in str(refused.value)
+
+
+def test_what_answers_a_bed_whose_grains_go_on() -> None:
+    of_bed = {
+        "": "pivot",
+        PILE: "pivot",
+        CURVED: "local",
+        "[bed]\nkind = 'flat'\n": "local",
+    }
+    for bed, method in of_bed.items():
+        answer = decide(_scene(SAND + WATER + bed), None)
+        assert answer.scene.method.kind == method
+        assert answer.scene.threshold.criterion == "goes on"
+        assert answer.asked.threshold.criterion == "auto"
+        # in the paper's fluid as before
+        before = decide(_scene(SAND + bed), None)
+        assert before.scene.threshold.criterion == "auto"
+        assert before.scene.method.kind != "local"
+    # grains where they are asked for
+    asked = SAND + WATER + CURVED + "[method.grains]\nmobile_layers = 3\n"
+    assert decide(_scene(asked), None).scene.method.kind == "dem"
+
+
+def test_a_run_of_dem_does_not_depend_on_the_criterion() -> None:
+    scene = _scene(SAND + WATER + PILE + '[method]\nkind = "dem"\n')
+    other = changed(scene, {"threshold.criterion": "goes on"})
+    assert scene.id != other.id
+    assert PileCase(scene).parameters == PileCase(other).parameters
+
+
+def test_a_grain_moves_at_the_larger_of_both_flows() -> None:
+    leaving = Motion.of_flows(np.array([1.0, 3.0, 2.0, np.inf]))
+    further = np.array([2.0, 1.0, 5.0, 1.0])
+    over = np.array([2.0, 2.0, 1.0, 2.0])
+    assert leaving.until(further, over).flows.tolist() == [2.0, 1.5, 5.0, np.inf]
+
+
+def test_sand_on_a_level_bed_is_answered_as_one_grain_and_usable(
+    tmp_path: Path,
+) -> None:
+    """Fine sand in water had no answer: "the row has no end"."""
+    sizes = [1.2e-4, 2e-4, 3.5e-4, 1e-3]
+    text = f"""
+        grain.density = 2650.0
+        [axes]
+        "grain.diameter" = {sizes}
+        "fluid.kind" = ["water", "air"]
+        [[group]]
+        name = "level"
+        bed = {{ kind = "flat" }}
+        [[group]]
+        name = "grain"
+        bed = {{ kind = "grain" }}
+    """
+    file = tmp_path / "level.toml"
+    file.write_text(text, encoding="utf-8")
+    results = orchestrator.run(file, out=tmp_path / "out")
+    beds = results.tables["pile_threshold"]
+    grains = results.tables["single_grain"]
+    assert beds["usable"].all()
+    assert grains["usable"].all()
+    assert {*beds["decides"]} == {"leaves", "goes on"}
+    for fluid in ("water", "air"):
+        at_once = _by_calculator(fluid, sizes)
+        gas = fluid == "air"
+        for table, column in ((beds, "shields"), (grains, "shields_closed_form")):
+            rows = table[(table["nu_m2_s"] > 5e-6) == gas].sort_values("d_m")
+            found = rows.groupby("d_m")[column].first().to_numpy()
+            assert found == pytest.approx(at_once, rel=1e-6)
+
+
+def _by_calculator(fluid: str, sizes: list[float]) -> np.ndarray:
+    numbers = {"water": (999.1, 1.1386e-6), "air": (1.225, 1.4607e-5)}[fluid]
+    density, viscosity = numbers
+    count = len(sizes)
+    table = thresholds(
+        {
+            "diameter": sizes,
+            "density": [2650.0] * count,
+            "fluid_density": [density] * count,
+            "viscosity": [viscosity] * count,
+        }
+    )
+    return np.asarray(table["shields"][table["answer"]])
