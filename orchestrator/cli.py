@@ -22,6 +22,13 @@ from orchestrator.study.units import number, whole_number
 
 if TYPE_CHECKING:
     from orchestrator.pipeline import Finished
+    from orchestrator.study.surfaces import SurfaceStudy
+
+OF_SURFACES = {
+    "study": "orchestrator.experiments.surface",
+    "erosion": "orchestrator.experiments.surface_erosion",
+}
+"""Commands on beds in three dimensions, and the modules of their experiments."""
 
 
 COMMANDS = {
@@ -184,6 +191,10 @@ def _study(options: Namespace) -> int:
     from orchestrator import pipeline, plan
     from orchestrator.study.study import load
 
+    if options.command in OF_SURFACES:
+        surfaces = import_module("orchestrator.study.surfaces").load(options.source)
+        if surfaces is not None:
+            return _surface(options, surfaces)
     workers = options.workers
     studies = []
     if "source" in options:
@@ -204,6 +215,26 @@ def _study(options: Namespace) -> int:
         print(*plan.expected(experiment.planned, cases, workers), sep="\n")
         return 0
     return _end(experiment.run(out, workers=workers))
+
+
+def _surface(options: Namespace, study: "SurfaceStudy") -> int:
+    """Run a study, or the experiment on erosion, of beds in three dimensions."""
+    from orchestrator import plan
+
+    for name in ("cluster", "tolerance"):
+        if getattr(options, name, None) is not None:
+            what = "a bed in three dimensions has none"
+            raise InputError(what, f"--{name}", "leave it out")
+    for question in study.questions:
+        warnings.warn(question, stacklevel=1)
+    module = import_module(OF_SURFACES[options.command])
+    out = options.out or Path("results") / study.name
+    experiment = module.experiment(study, out)
+    if options.plan:
+        cases = out.absolute() / "cases"
+        print(*plan.expected(experiment.planned, cases, options.workers), sep="\n")
+        return 0
+    return _end(experiment.run(out, workers=options.workers))
 
 
 def finished(options: Namespace) -> tuple[str, Path] | None:

@@ -45,6 +45,8 @@ LONGEST, HIGHEST = 2e4, 500.0
 """Extent and height of a surface above which it is likelier in millimetres, m."""
 OF_GROUND = 0.01
 """Height over that of the form from which a place is a part of it, not of the ground."""
+NOISE = 4.0
+"""Standard deviations of the rim's heights within which a place is ground, too."""
 STEPS_OF_SHAPE = 160
 """Steps of the raster of a shape over the width of its base."""
 SLIP_DEG = 33.0
@@ -73,8 +75,10 @@ class Surface:
         What was done to the heights, in words.
     tags
         Tags of the GeoTIFF that say where on the Earth it is; empty without any.
+    noise
+        Standard deviation of the heights of the rim, m.
     digest
-        SHA-256 of the axes and of the heights above the ground.
+        SHA-256 of the axes, of the heights above the ground and of the smoothing.
     """
 
     name: str = field(compare=False)
@@ -82,9 +86,10 @@ class Surface:
     y: FloatArray = field(compare=False, repr=False)
     z: FloatArray = field(compare=False, repr=False)
     level: float = field(compare=False)
-    spread: float
+    spread: float = field(compare=False)
     said: tuple[str, ...] = field(compare=False)
     tags: Tags = field(compare=False, repr=False)
+    noise: float = field(compare=False)
     digest: str
 
     def __str__(self) -> str:
@@ -105,7 +110,14 @@ class Surface:
     @cached_property
     def is_form(self) -> BoolArray:
         """Whether each node is a part of the form, not of the ground, of shape (ny, nx)."""
-        return np.asarray(np.abs(self.z - self.level) > OF_GROUND * self.relief)
+        from scipy.ndimage import binary_opening
+
+        off = np.abs(self.z - self.level)
+        is_form = off > max(OF_GROUND * self.relief, NOISE * self.noise)
+        if not self.noise:
+            return np.asarray(is_form)
+        # single nodes of the ground are beyond any noise
+        return np.asarray(binary_opening(is_form, np.ones((3, 3), bool)))
 
     @cached_property
     def centre(self) -> tuple[float, float]:
@@ -160,6 +172,31 @@ class Surface:
             self._coefficients, [row, column], order=3, prefilter=False
         )
         return np.asarray(found.reshape(east.shape))
+
+    def spread_over(self, cells: float) -> "Surface":
+        """The same heights, to be smoothed over another length.
+
+        Parameters
+        ----------
+        cells
+            Standard deviation of the smoothing, in cells of the flow's mesh.
+
+        Returns
+        -------
+        Surface
+            The surface.
+        """
+        return surface_of(
+            self.name,
+            self.x,
+            self.y,
+            self.z,
+            self.level,
+            cells,
+            self.said,
+            self.tags,
+            self.noise,
+        )
 
     def smoothed(self, cell_m: float) -> "Surface":
         """Smooth the heights to the cells of a mesh.
@@ -217,13 +254,17 @@ def surface_of(
     spread: float,
     said: tuple[str, ...] = (),
     tags: Tags | None = None,
+    noise: float = 0.0,
 ) -> Surface:
     """Make a surface of its heights, with its digest; the parameters are its attributes."""
     relief = float(z.max() - level)
-    digest = sha256()
+    of_rim = float(on_grid(noise, relief, 6))
+    digest = sha256(f"{spread:g} {of_rim!r}".encode())
     for part in (x - x[0], y - y[0], z - level):
         digest.update(on_grid(part, relief).astype("<f8").tobytes())
-    return Surface(name, x, y, z, level, spread, said, tags or {}, digest.hexdigest())
+    return Surface(
+        name, x, y, z, level, spread, said, tags or {}, noise, digest.hexdigest()
+    )
 
 
 @dataclass(frozen=True)
@@ -284,7 +325,10 @@ def checked(raster: Raster, where: str) -> Surface:
     said = _check_rim(raster, rim, relief, where)
     if is_outside.any():
         count = int(is_outside.sum())
-        said = (*said, f"{count} cells without a height around it are level ground")
+        said = (
+            *said,
+            f"continued as level ground over {count} cells without a height around it",
+        )
     width = TAPER * float(np.abs(rim).max())
     tapered = above * _taper(raster, is_outside, width)
     surface = surface_of(
@@ -296,9 +340,18 @@ def checked(raster: Raster, where: str) -> Surface:
         SPREAD_OF_RASTER,
         said,
         raster.tags,
+        _noise(raster.z[is_rim] - level),
     )
     _check_slopes(surface, where)
     return surface
+
+
+def _noise(rim: FloatArray) -> float:
+    """Standard deviation of the heights of a rim, by their median size, m.
+
+    Ramps to the form's sides, which a rim may have, do not count in it.
+    """
+    return float(np.median(np.abs(rim))) / 0.6745
 
 
 def _place(raster: Raster, row: int, column: int) -> str:
@@ -398,7 +451,7 @@ def _check_rim(
         remedy = "take more of the level ground around the form, or subtract its tilt"
         raise InputError(what, where, remedy)
     if off > FLAT_RIM * relief:
-        return (f"the rim, up to {off:.3g} m off, is tapered to level ground",)
+        return (f"tapered to level ground at its rim, which is up to {off:.3g} m off",)
     return ()
 
 

@@ -91,12 +91,15 @@ class Surface(NamedTuple):
         Friction velocity of the undisturbed flow over the wind at 10 m.
     threshold
         u*_t, m/s.
+    line
+        Faces along the middle, which the figure has in place of all.
     """
 
     name: str
     faces: pd.DataFrame
     ustar0_over_wind: float
     threshold: float
+    line: pd.DataFrame | None = None
 
     def potential(self, winds: ArrayLike) -> FloatArray:
         """Mean erosion potential of the surface.
@@ -352,7 +355,7 @@ def experiment(study: Study, out: Path) -> Experiment:
     """
     winds = study.erosion.fastest_mile
     where = study.file or study.name
-    least, source = _threshold(study.erosion.threshold, where)
+    least, source = given_threshold(study.erosion.threshold, where)
     flows = {scene: FlowModel(scene) for scene in piles(study)}
     for scene in flows:
         limits.check(scene, where, grains=False)
@@ -377,8 +380,28 @@ def experiment(study: Study, out: Path) -> Experiment:
     )
 
 
-def _threshold(asked: str | float | None, where: str) -> tuple[float | None, str]:
-    """u*_t that a study asks for, m/s, None for that of each grain, and its source."""
+def given_threshold(asked: str | float | None, where: str) -> tuple[float | None, str]:
+    """Find the threshold that a study asks for.
+
+    Parameters
+    ----------
+    asked
+        A number, m/s, a material of AP-42, or None for that of each grain.
+    where
+        The study file, for messages.
+
+    Returns
+    -------
+    least
+        u*_t, m/s; None for that of each grain.
+    source
+        Where it is from, in words.
+
+    Raises
+    ------
+    InputError
+        If it is neither a number that a wind can reach nor a material of AP-42.
+    """
     if asked is None:
         return None, " (closed form)"
     source = ""
@@ -544,13 +567,15 @@ def _draw(axes: Sequence[Axes], pile: Pile, winds: Sequence[float]) -> None:
         colour = COLOURS[number % len(COLOURS)]
         _draw_shares(middle, surface, colour, "-")
         right.plot(axis, surface.potential(axis), color=colour)
-        places = surface.faces["x_m"]
-        left.plot(places, surface.faces["ratio"], ".", ms=2.5, color=colour)
+        line = surface.faces if surface.line is None else surface.line
+        left.plot(line["x_m"], line["ratio"], ".", ms=2.5, color=colour)
     for surface, line_style in zip(pile.by_epa, LINES, strict=False):
         _draw_shares(middle, surface, GREY, line_style)
         right.plot(axis, surface.potential(axis), color=GREY, ls=line_style)
     bed = left.twinx()
-    x, z = pile.surfaces[0].faces[["x_m", "z_m"]].to_numpy().T
+    first = pile.surfaces[0]
+    line = first.faces if first.line is None else first.line
+    x, z = line[["x_m", "z_m"]].to_numpy().T
     bed.fill_between(x, z, color=style.BED, lw=0)
     bed.set(ylim=(0, 4 * (z.max() or 1)), yticks=[])
     middle.set(xlim=(0, 100), ylim=(0, None), xlabel="share of the surface above, %")

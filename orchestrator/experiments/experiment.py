@@ -102,6 +102,8 @@ class Experiment:
         Names of the runs whose failures count; None for all.
     source
         The study file that it is on; None for scenes of its own.
+    files
+        Makes files beside the page, by their paths; None for no file.
     """
 
     name: str
@@ -112,6 +114,7 @@ class Experiment:
     verdicts: Container[str] = ()
     failing: Container[str] | None = None
     source: Source | None = None
+    files: Callable[[Runs], Mapping[str, bytes]] | None = None
 
     def run(self, out: Path, *, workers: int) -> Finished:
         """Run what is missing, and write tables and page.
@@ -169,9 +172,12 @@ class Experiment:
                 what = "`orchestrator status` names the causes"
                 what = f"no reference ran to its end: {what}"
                 raise OrchestratorError(what, str(space.root))
+            made = self.files(runs) if self.files else {}
             with folder.renewed():
                 for key, table in tables.items():
                     folder.put(f"tables/{key}.csv", csv(table))
+                for path, content in made.items():
+                    folder.put(path, content)
                 solvers = case.programs(cases, self.planned.cases)
                 page.write(self.title, sections, folder, space.page.name, solvers)
         return sections

@@ -459,6 +459,9 @@ def _name_shape(bed: Table, where: str) -> None:
     if kind in [*SHAPES] and bed.get("shape", kind) == kind:
         bed["kind"] = "pile"
         bed["shape"] = kind
+    elif kind == "surface":
+        what = "a bed in three dimensions is answered by study and erosion alone"
+        raise InputError(what, f"{where}: bed.kind", "see docs/surface.md")
     elif kind not in ("grain", "pile"):
         remedy = f"write grain, pile, or a shape: {', '.join(SHAPES)}"
         raise InputError(f"{kind!r} is no bed", f"{where}: bed.kind", remedy)

@@ -200,14 +200,14 @@ def test_cells_without_a_height_around_the_form_are_ground() -> None:
     found = checked(of, WHERE)
     assert np.isfinite(found.z).all()
     assert found.relief == pytest.approx(6.0, rel=0.01)
-    assert "cells without a height around it are level ground" in found.said[-1]
+    assert "continued as level ground over" in found.said[-1]
 
 
 def test_a_rim_that_is_nearly_level_is_tapered_and_said() -> None:
     of = hill()
     tilt = 0.6 * (of.x - of.x.mean()) / np.ptp(of.x)
     found = checked(with_heights(of, of.z + tilt), WHERE)
-    assert "is tapered to level ground" in found.said[0]
+    assert "tapered to level ground at its rim" in found.said[0]
     edges = [found.z[0], found.z[-1], found.z[:, 0], found.z[:, -1]]
     assert np.concatenate(edges) == pytest.approx(found.level, abs=1e-9)
 

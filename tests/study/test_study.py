@@ -317,8 +317,9 @@ def test_a_level_bed_has_no_height(bed: str) -> None:
 
 SOLVERS = """
 import sys
-from orchestrator.study import study
-assert all(study.load(name).scenes for name in study.presets())
+from orchestrator.study import study, surfaces
+for name in study.presets():
+    assert (surfaces.load(name) or study.load(name)).scenes
 print(*set(sys.modules) & {"orchestrator.flow", "orchestrator.solvers", "gmsh", "pyvista"})
 """
 

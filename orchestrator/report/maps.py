@@ -1,0 +1,290 @@
+"""Maps of a bed in three dimensions: stress, the wind at which parts move, hours."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.colors import Normalize, TwoSlopeNorm
+from matplotlib.figure import Figure as Canvas
+
+from orchestrator.report import style
+from orchestrator.types import BoolArray, FloatArray
+
+CONTOURS = 6
+"""Contours of height on a map."""
+COLUMNS = 3
+"""Maps beside each other, at most."""
+MOST_MAPS = 9
+"""Maps of a figure, at most."""
+PANEL = 2.5
+"""Height of a map, inches."""
+MARGIN = 0.12
+"""Room around the form on a map, over its extent."""
+NICE = (1.0, 2.0, 5.0)
+"""Round numbers."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The raster of the maps of a bed, in the axes of its file.
+
+    Attributes
+    ----------
+    x, y
+        Its axes, m, rising, of shapes (nx,) and (ny,).
+    height
+        Heights above the ground, m, of shape (ny, nx).
+    is_form
+        Where the maps have values.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    height: FloatArray
+    is_form: BoolArray
+
+    def of_faces(
+        self, faces: pd.DataFrame, columns: Sequence[str]
+    ) -> dict[str, FloatArray]:
+        """Put values of faces on the raster.
+
+        They are linear between the middles of the faces. Of a wind the inverse is,
+        since the wind is infinite where there is no stress.
+
+        Parameters
+        ----------
+        faces
+            Faces with the columns ``x_m`` and ``y_m``.
+        columns
+            The columns of the values.
+
+        Returns
+        -------
+        dict
+            By column the map, NaN outside the form, of shape (ny, nx).
+        """
+        from scipy.interpolate import LinearNDInterpolator
+
+        middle = np.array([self.x.mean(), self.y.mean()])
+        near = np.hypot(np.ptp(self.x), np.ptp(self.y))
+        places = faces[["x_m", "y_m"]].to_numpy(float) - middle
+        is_near = np.hypot(*places.T) < near
+        values = faces[[*columns]].to_numpy(float)[is_near]
+        is_wind = np.array([column.startswith("wind") for column in columns])
+        with np.errstate(divide="ignore"):
+            given = np.where(is_wind, 1 / values, values)
+            of_places = LinearNDInterpolator(places[is_near], given)
+            found = of_places(*np.meshgrid(self.x - middle[0], self.y - middle[1]))
+            found = np.where(is_wind, 1 / found, found)
+        found[~self.is_form] = np.nan
+        return {column: found[..., n] for n, column in enumerate(columns)}
+
+
+@dataclass(frozen=True)
+class Map:
+    """A map of a figure.
+
+    Attributes
+    ----------
+    title
+        Its title.
+    values
+        Its values on the grid.
+    from_deg
+        Where the wind comes from, degrees; None for no arrow.
+    mark
+        Where motion starts, x and y, m; None for no mark.
+    """
+
+    title: str
+    values: FloatArray
+    from_deg: float | None = None
+    mark: tuple[float, float] | None = None
+
+
+def figure(
+    grid: Grid,
+    maps: Sequence[Map],
+    label: str,
+    *,
+    colours: str = "viridis_r",
+    middle: float | None = None,
+) -> Canvas:
+    """Draw maps of one quantity, with one scale of colours.
+
+    Parameters
+    ----------
+    grid
+        The raster.
+    maps
+        The maps, of which the first `MOST_MAPS` are drawn.
+    label
+        The quantity with its unit.
+    colours
+        A colour map of matplotlib.
+    middle
+        Value at the middle of the colours; None for that of the range.
+
+    Returns
+    -------
+    Canvas
+        The figure.
+    """
+    drawn = maps[:MOST_MAPS]
+    columns = min(len(drawn), COLUMNS)
+    lines = -(-len(drawn) // columns)
+    height = PANEL if columns > 1 else 1.6 * PANEL
+    canvas = style.canvas(lines * height + 0.5)
+    panels = canvas.subplots(lines, columns, squeeze=False, sharex=True, sharey=True)
+    norm = _norm([each.values for each in drawn], middle)
+    every = panels.ravel().tolist()
+    for ax in every[len(drawn) :]:
+        ax.remove()
+    axes = every[: len(drawn)]
+    for ax, each in zip(axes, drawn, strict=True):
+        ax.set_facecolor("0.95")
+        image = ax.pcolormesh(
+            grid.x,
+            grid.y,
+            each.values,
+            cmap=colours,
+            norm=norm,
+            shading="nearest",
+            rasterized=True,
+            gid="map",
+        )
+        _ground(ax, grid)
+        ax.set_title(each.title, loc="left")
+        if each.from_deg is not None:
+            _wind(ax, each.from_deg)
+        if each.mark:
+            ax.plot(*each.mark, "o", mfc="none", color="crimson", ms=6, gid="start")
+    _frame(axes, columns, grid)
+    canvas.colorbar(image, ax=axes, label=label, shrink=0.8, pad=0.02)
+    return canvas
+
+
+def _norm(values: Sequence[FloatArray], middle: float | None) -> Normalize:
+    """The scale of some maps, from all but their highest hundredth."""
+    finite = np.concatenate([each[np.isfinite(each)] for each in values])
+    if not len(finite):
+        return Normalize(0.0, 1.0)
+    low, high = float(finite.min()), float(np.quantile(finite, 0.99))
+    if middle is None or not low < middle < high:
+        return Normalize(low, max(high, low * (1 + 1e-6) + 1e-12))
+    return TwoSlopeNorm(middle, low, high)
+
+
+def _ground(ax: Axes, grid: Grid) -> None:
+    """Contours of height, of round numbers."""
+    highest = float(grid.height.max())
+    step = nice(highest / CONTOURS)
+    levels = np.arange(step, highest, step)
+    look: style.Look = {"colors": "0.15", "linewidths": 0.5, "alpha": 0.7}
+    lines = ax.contour(grid.x, grid.y, grid.height, levels, **look)
+    ax.clabel(lines, levels[1::2], fmt="%g", fontsize=5.5)
+
+
+def nice(length: float) -> float:
+    """The largest of 1, 2 and 5 times a power of ten that is not above a length.
+
+    Examples
+    --------
+    >>> [nice(length) for length in (0.7, 23.0, 5.0)]
+    [0.5, 20.0, 5.0]
+    """
+    power = 10.0 ** np.floor(np.log10(length) + 1e-9)
+    fits = [part * power for part in NICE if part * power <= length * (1 + 1e-9)]
+    return float(f"{max(fits):.6g}")
+
+
+def _wind(ax: Axes, from_deg: float) -> None:
+    """An arrow along the wind, in the upper left corner."""
+    angle = np.radians(from_deg)
+    half = 0.09 * np.array([-np.sin(angle), -np.cos(angle)])
+    middle = np.array([0.13, 0.87])
+    _arrow(ax, tuple(middle - half), tuple(middle + half))
+
+
+def _arrow(ax: Axes, start: tuple[float, ...], end: tuple[float, ...]) -> None:
+    """An arrow between two places in parts of the panel."""
+    ax.annotate(
+        "",
+        xy=(end[0], end[1]),
+        xytext=(start[0], start[1]),
+        xycoords="axes fraction",
+        textcoords="axes fraction",
+        arrowprops={"arrowstyle": "-|>", "color": "black", "lw": 1.0},
+        gid="arrow",
+    )
+
+
+def _frame(axes: Sequence[Axes], columns: int, grid: Grid) -> None:
+    """Limits and labels of the maps; a scale and the north on the first of them."""
+    rows, places = np.nonzero(grid.is_form)
+    east, north = grid.x[places], grid.y[rows]
+    room = MARGIN * max(float(np.ptp(east)), float(np.ptp(north)))
+    first = axes[0]
+    first.set_xlim(float(east.min()) - room, float(east.max()) + room)
+    first.set_ylim(float(north.min()) - room, float(north.max()) + 2 * room)
+    last = columns * ((len(axes) - 1) // columns)
+    for number, ax in enumerate(axes):
+        ax.set_aspect("equal")
+        ax.ticklabel_format(useOffset=False, style="plain")
+        ax.tick_params(axis="x", rotation=30)
+        if number % columns == 0:
+            ax.set_ylabel("y, m (north)")
+        if number >= last:
+            ax.set_xlabel("x, m (east)")
+    _scale(first)
+
+
+def _scale(ax: Axes) -> None:
+    """A bar of round length below, and the north above it, in the right corner."""
+    low, high = ax.get_xlim()
+    bottom, top = ax.get_ylim()
+    length = nice((high - low) / 4)
+    right = high - 0.05 * (high - low)
+    level = bottom + 0.06 * (top - bottom)
+    ax.plot([right - length, right], [level, level], color="black", lw=2, gid="scale")
+    words: style.Look = {"fontsize": 6.5, "ha": "center", "va": "bottom"}
+    ax.text(
+        right - length / 2, level + 0.015 * (top - bottom), f"{length:g} m", **words
+    )
+    _arrow(ax, (0.93, 0.8), (0.93, 0.93))
+    ax.text(0.93, 0.935, "N", transform=ax.transAxes, **words)
+
+
+def shares(
+    curves: Sequence[tuple[str, FloatArray, FloatArray, str]], winds: FloatArray
+) -> Canvas:
+    """Draw the share of a surface that is above threshold against the wind.
+
+    Parameters
+    ----------
+    curves
+        For each its label, its shares at the winds, those of grains that leave without
+        a gust or an empty array, and its colour.
+    winds
+        The winds, m/s.
+
+    Returns
+    -------
+    Canvas
+        The figure.
+    """
+    canvas, (ax,) = style.grid(
+        [""], 2.6, "wind at 10 m over flat ground, m/s", "share that moves, %", 1
+    )
+    colours = []
+    for label, moving, leaving, colour in curves:
+        ax.plot(winds, 100 * moving, color=colour, label="moves")
+        if len(leaving):
+            words = "grains leave their pockets without a gust"
+            ax.plot(winds, 100 * leaving, color=colour, ls="--", label=words)
+        colours.append(style.entry(label, colour))
+    ax.set(xlim=(0, float(winds[-1])), ylim=(0, 100))
+    style.legends(canvas, colours, style.samples([ax]))
+    return canvas

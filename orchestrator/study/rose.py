@@ -1,0 +1,140 @@
+"""Wind roses: the share of time of each direction and speed."""
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+
+from orchestrator.errors import InputError
+from orchestrator.runs.files import digest_text
+from orchestrator.study.units import number
+
+COLUMNS = ("from_deg", "speed_m_s", "share")
+OFF = 0.01
+"""Largest difference of the sum of the shares from 1."""
+FASTEST = 150.0
+"""Largest speed, m/s."""
+FURTHEST_DEG = 30.0
+"""Largest angle between a direction of a rose and the flow that answers it."""
+
+
+@dataclass(frozen=True)
+class Rose:
+    """A wind rose; two with one digest are one.
+
+    Attributes
+    ----------
+    name
+        The name of its file.
+    rows
+        Direction where the wind comes from, degrees from 0 to 360, speed at 10 m, m/s,
+        and share of time; the shares add up to 1.
+    digest
+        SHA-256 of the rows.
+    """
+
+    name: str = field(compare=False)
+    rows: tuple[tuple[float, float, float], ...] = field(compare=False, repr=False)
+    digest: str
+
+    def __str__(self) -> str:
+        return f"{self.name} ({self.digest[:12]})"
+
+    def table(self, solved: Sequence[float], where: str) -> pd.DataFrame:
+        """List the rose with the direction of the flow that answers each row.
+
+        Parameters
+        ----------
+        solved
+            Directions of the flows, degrees.
+        where
+            The field that names the rose, for messages.
+
+        Returns
+        -------
+        DataFrame
+            The columns `COLUMNS` and `solved_deg`.
+
+        Raises
+        ------
+        InputError
+            If no flow is near a direction in which the wind blows.
+        """
+        table = pd.DataFrame(self.rows, columns=[*COLUMNS])
+        directions = table["from_deg"].to_numpy(float)
+        flows = np.asarray(solved, float)
+        off = np.abs((directions[:, None] - flows + 180) % 360 - 180)
+        nearest = off.argmin(axis=1)
+        table["solved_deg"] = flows[nearest]
+        blows = (table["share"] > 0) & (table["speed_m_s"] > 0)
+        off_deg = np.where(blows, off.min(axis=1), 0.0)
+        worst = int(off_deg.argmax())
+        if off_deg[worst] > FURTHEST_DEG:
+            what = f"no flow is within {FURTHEST_DEG:g} deg of {directions[worst]:g}"
+            remedy = 'list more directions: "flow.from_deg" = [0, 45, 90, ...]'
+            raise InputError(what, where, remedy)
+        return table
+
+
+def read_rose(text: str, name: str, where: str) -> Rose:
+    """Read a wind rose.
+
+    Parameters
+    ----------
+    text
+        CSV with the columns ``from_deg``, ``speed_m_s`` and ``share``, whose shares add
+        up to 1, or to 100 as percentages.
+    name
+        The name of the file.
+    where
+        The file and the field that names it, for messages.
+
+    Returns
+    -------
+    Rose
+        The rose, its shares divided by their sum.
+
+    Raises
+    ------
+    InputError
+        With the line and the remedy.
+    """
+    reader = csv.DictReader(io.StringIO(text))
+    header = [cell.strip() for cell in reader.fieldnames or ()]
+    remedy = f"the first line is {','.join(COLUMNS)}, then numbers"
+    if any(header.count(column) != 1 for column in COLUMNS):
+        what = f"no columns {', '.join(COLUMNS)} in {','.join(header)!r}"
+        raise InputError(what, f"{where}: line 1", remedy)
+    reader.fieldnames = header
+    rows = []
+    for row in reader:
+        place = f"{where}: line {reader.line_num}"
+        try:
+            direction, speed, share = [number(row[name] or "") for name in COLUMNS]
+        except ValueError as error:
+            raise InputError(str(error), place, remedy) from None
+        _check(direction, speed, share, place)
+        rows.append((direction % 360, speed, share))
+    total = sum(share for _, _, share in rows)
+    whole = 100.0 if total > 50 else 1.0
+    if not abs(total / whole - 1) <= OFF:
+        what = f"its shares add up to {total:.6g}, not to 1 or 100"
+        remedy = "add the calms, with a speed of 0, or divide the shares by their sum"
+        raise InputError(what, where, remedy)
+    normed = tuple((direction, speed, s / total) for direction, speed, s in rows)
+    return Rose(name, normed, digest_text(repr(normed)))
+
+
+def _check(direction: float, speed: float, share: float, place: str) -> None:
+    """Refuse a row with a value that no rose has."""
+    if not -360 <= direction <= 360:
+        what = f"from_deg {direction:g}"
+        raise InputError(what, place, "degrees from north over east, 0 to 360")
+    if not 0 <= speed <= FASTEST:
+        what = f"speed_m_s {speed:g}"
+        raise InputError(what, place, "wind at 10 m in m/s, from 0")
+    if not share >= 0:
+        raise InputError(f"share {share:g}", place, "a part of the time, from 0")

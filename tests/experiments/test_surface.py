@@ -1,0 +1,154 @@
+"""From a surface to its maps: a real flow over a coarse cone, and what is made of it."""
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from PIL import Image
+
+from orchestrator.bed import raster
+from orchestrator.bed.surface import cone
+from orchestrator.cli import main
+from orchestrator.experiments import erosion
+from orchestrator.grains import onset
+from orchestrator.study import surfaces
+
+FILE = """
+title = "A cone in wind from the west"
+[fluid]
+kind = "air"
+[grain]
+diameter = 5e-4
+density = 2650.0
+[bed]
+kind = "surface"
+shape = "cone"
+height = 10.0
+slope_deg = 26.0
+[method.flow]
+roughness = 0.005
+[erosion]
+wind = "year.csv"
+"""
+ROSE = "from_deg,speed_m_s,share\n270,4,0.4\n270,9,0.4\n270,16,0.2\n"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The results of a cone, whose flow OpenFOAM has solved."""
+    root = tmp_path_factory.mktemp("cone")
+    (root / "cone.toml").write_text(FILE)
+    (root / "year.csv").write_text(ROSE)
+    out = root / "out"
+    assert main(["study", str(root / "cone.toml"), "--out", str(out)]) == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def faces(folder: Path) -> pd.DataFrame:
+    """The faces of the form."""
+    every = pd.read_csv(folder / "tables" / "faces-1-270.csv")
+    return every[every["z_m"] > 0.1]
+
+
+def test_the_stress_of_a_cone_is_that_of_flow_around_a_hill(
+    faces: pd.DataFrame,
+) -> None:
+    area = faces["area_m2"].sum()
+    radius = 10.0 / np.tan(np.radians(26.0))
+    slant = np.hypot(radius, 10.0)
+    # smoothing widens the foot, and the lowest hundredth is the ground's
+    assert area == pytest.approx(np.pi * radius * slant, rel=0.05)
+    top = faces.nlargest(20, "z_m")
+    lee = faces[(faces["along_m"] > 0.3 * radius) & (faces["across_m"].abs() < 3)]
+    assert 1.5 < top["ustar_over_ustar0"].mean() < 3.0
+    assert lee["ustar_over_ustar0"].mean() < 1.0
+    # both flanks are alike
+    left = faces[faces["across_m"] > 0]
+    right = faces[faces["across_m"] < 0]
+    mean = np.average(left["ustar_over_ustar0"], weights=left["area_m2"])
+    other = np.average(right["ustar_over_ustar0"], weights=right["area_m2"])
+    assert mean == pytest.approx(other, rel=0.01)
+
+
+def test_each_face_moves_by_the_closed_form(folder: Path, faces: pd.DataFrame) -> None:
+    study = surfaces.load(folder.parent / "cone.toml")
+    assert study is not None
+    (scene,) = study.scenes
+    row = faces.iloc[len(faces) // 3]
+    slope, heading = np.array([row["slope_deg"]]), np.array([row["heading_deg"]])
+    local = onset.leaves(scene.grain_in_pocket, "bridged", slope, heading)[0]
+    wind = onset.wind_of(local / row["ustar_over_ustar0"], 0.005)
+    assert row["wind_leaves_m_s"] == pytest.approx(float(wind), rel=1e-6)
+    # air is a natural fluid: motion is that of grains that go on
+    assert row["wind_m_s"] == row["wind_goes_on_m_s"]
+
+
+def test_motion_starts_where_the_answer_says(
+    folder: Path, faces: pd.DataFrame, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (row,) = pd.read_csv(folder / "tables" / "directions.csv").to_dict("records")
+    first = faces.iloc[int(faces["wind_m_s"].to_numpy(float).argmin())]
+    assert row["x_m"] == pytest.approx(first["x_m"])
+    assert row["y_m"] == pytest.approx(first["y_m"])
+    below = faces.loc[faces["wind_m_s"] <= row["starts, m/s"] + 1e-6, "area_m2"]
+    assert below.sum() >= 0.01 * faces["area_m2"].sum()
+    file = folder.parent / "cone.toml"
+    assert main(["study", str(file), "--out", str(folder)]) == 0
+    said = capsys.readouterr().out
+    assert f"in a wind of {row['starts, m/s']:.3g} m/s at 10 m from 270°" in said
+    assert "smoothed over" in said
+
+
+def test_the_hours_of_the_map_are_those_of_the_rose(folder: Path) -> None:
+    hours = folder / "maps" / "1-hours_a_year.tif"
+    winds = folder / "maps" / "1-wind_m_s-270.tif"
+    with Image.open(hours) as image, Image.open(winds) as other:
+        values, wind = np.array(image, float), np.array(other, float)
+    is_form = np.isfinite(wind)
+    by_hand = 8760 * np.select([wind <= 4, wind <= 9, wind <= 16], [1.0, 0.6, 0.2], 0.0)
+    assert values[is_form] == pytest.approx(by_hand[is_form], rel=1e-6)
+    assert np.isnan(values[~is_form]).all()
+
+
+def test_maps_lie_where_the_surface_lies(folder: Path) -> None:
+    import pyvista
+
+    body: Any = pyvista.read(folder / "maps" / "1.vtk")
+    height = body["height_m"]
+    assert height.max() == pytest.approx(body.points[:, 2].max(), rel=1e-6)
+    assert np.nanmax(body["ustar_over_ustar0-270"]) > 1.5
+    heap = cone(10.0, 26.0)
+    by_x = heap.steps[0]
+    with Image.open(folder / "maps" / "1-ustar_over_ustar0-270.tif") as image:
+        tags: Any = image.tag_v2  # type: ignore[attr-defined]
+        step = tags[raster.SCALE][0]
+        east, north = tags[raster.TIE_POINT][3:5]
+        values = np.array(image, float)[::-1]
+    # cells are nodes of the surface, and the form lies about its middle
+    assert step / by_x == pytest.approx(round(step / by_x))
+    columns = np.nonzero(np.isfinite(values))[1]
+    middle = east + step * (columns.mean() + 0.5)
+    assert middle == pytest.approx(0.0, abs=by_x)
+    assert north - step * len(values) == pytest.approx(-north, abs=step)
+
+
+def test_erosion_of_a_cone_stands_beside_that_of_ap42(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = folder.parent / "cone.toml"
+    shutil.copytree(folder / "cases", tmp_path / "out" / "cases")
+    assert main(["erosion", str(file), "--out", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr().out
+    assert "with a wind from 270°" in said
+    rows = pd.read_csv(tmp_path / "out" / "tables" / "erosion.csv")
+    own = rows[rows["surface"] == "wind from 270°"]
+    parts = own[own["part"] != "all"]
+    assert parts["share, %"].sum() == pytest.approx(100.0)
+    classes = [name for name in map(str, rows) if name.endswith("), %")]
+    whole = own[own["part"] == "all"]
+    assert len(classes) == len(erosion.CLASSES)
+    assert whole[classes].to_numpy(float).sum() == pytest.approx(100.0)

@@ -1,0 +1,141 @@
+"""Tests of study files on beds in three dimensions."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator.bed.raster import geotiff
+from orchestrator.bed.surface import cone
+from orchestrator.errors import InputError
+from orchestrator.study import surfaces
+
+FILE = """
+[fluid]
+kind = "air"
+[grain]
+diameter = 1e-3
+[bed]
+kind = "surface"
+shape = "cone"
+height = 10
+slope_deg = 30
+[axes]
+"flow.from_deg" = [0, 90.0]
+"""
+
+
+def load(folder: Path, text: str) -> surfaces.SurfaceStudy:
+    path = folder / "pile.toml"
+    path.write_text(text)
+    found = surfaces.load(path)
+    assert found is not None
+    return found
+
+
+def test_a_file_is_a_scene_for_each_direction(tmp_path: Path) -> None:
+    study = load(tmp_path, FILE)
+    assert [scene.flow.from_deg for scene in study.scenes] == [0.0, 90.0]
+    assert study.scenes[0].heights == cone(10.0, 30.0)
+    # z0 is d/30 of its grains, and the fluid is air of 15 degrees
+    assert study.scenes[0].solve_roughness == pytest.approx(1e-3 / 30)
+    assert study.scenes[0].fluid.density == pytest.approx(1.225, abs=0.01)
+    assert study.scenes[0].law == "bridged"
+
+
+def test_a_raster_and_a_rose_are_read_beside_the_file(tmp_path: Path) -> None:
+    heap = cone(10.0, 30.0)
+    (tmp_path / "heap.tif").write_bytes(geotiff(heap.x, heap.y, heap.z, {}))
+    (tmp_path / "year.csv").write_text("from_deg,speed_m_s,share\n0,5,1\n")
+    text = FILE.replace('shape = "cone"\nheight = 10\nslope_deg = 30', "{}")
+    text += '[erosion]\nwind = "year.csv"\n'
+    study = load(tmp_path, text.format('surface = "heap.tif"'))
+    assert study.rose is not None
+    assert study.scenes[0].heights.z == pytest.approx(heap.z, abs=1e-5)
+    assert study.scenes[0].heights.said == ()
+    names = {"pile.toml", "heap.tif", "year.csv"}
+    assert set(study.source.digests) == names
+
+
+def test_smoothing_of_more_cells_is_another_surface(tmp_path: Path) -> None:
+    text = FILE.replace("height = 10\n", "height = 10\nsmoothing_cells = 1.5\n")
+    more = load(tmp_path, text).scenes[0].heights
+    usual = load(tmp_path, FILE).scenes[0].heights
+    assert more.digest != usual.digest
+    assert more.smoothed(1.0).relief < usual.smoothed(1.0).relief
+
+
+@pytest.mark.parametrize("name", ["cone", "oval", "barchan"])
+def test_the_presets_are_studies(name: str) -> None:
+    study = surfaces.load(name)
+    assert study is not None
+    assert study.scenes[0].bed.shape == name
+    assert study.questions == ()
+
+
+@pytest.mark.parametrize("name", ["stockpile", "first-look"])
+def test_other_studies_are_none_of_surfaces(name: str) -> None:
+    assert surfaces.load(name) is None
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("height = 10", "", "bed.height: a cone needs it"),
+        ('shape = "cone"', 'shape = "pyramid"', "bed.shape: 'pyramid' is not accepted"),
+        ('shape = "cone"', "", "bed.surface: give either a file or a shape"),
+        ("height = 10", "height = 10\nlength = 3", "bed.length: a cone has none"),
+        ('"flow.from_deg"', '"flow.to_deg"', "axes.flow.to_deg: no field of a surface"),
+        ("[0, 90.0]", "[0, 400]", "flow.from_deg: 400.0 is not accepted"),
+        ("diameter = 1e-3", "", "grain.diameter: is missing"),
+        (
+            "diameter = 1e-3",
+            'diameter = "1 mm"',
+            "grain.diameter: '1 mm' is not accepted",
+        ),
+        (
+            "diameter = 1e-3",
+            "diameter = 1e-3\ndensity = 1.0",
+            "grain.density: not above the fluid's",
+        ),
+        (
+            "height = 10",
+            'height = 10\npacking = "aligned"',
+            "bed.packing: a surface has no grains that are packed",
+        ),
+        ("height = 10", "height = 10\nhight = 3", "bed.hight: unknown key"),
+        ("height = 10", "height = 10\nroughness = 2.0", "method.flow.roughness: 2 m"),
+        (
+            "[axes]",
+            '[method]\nkind = "dem"\n[axes]',
+            "method: a surface has",
+        ),
+        (
+            "[axes]",
+            '[forces]\nlaw = "paper"\n[axes]',
+            "forces.law: 'paper' is no law of a surface",
+        ),
+        (
+            "[axes]",
+            '[erosion]\nwind = "none.csv"\n[axes]',
+            "erosion.wind: .*none.csv: not a readable text file",
+        ),
+    ],
+)
+def test_wrong_fields_are_refused_with_their_names(
+    tmp_path: Path, old: str, new: str, message: str
+) -> None:
+    assert old in FILE
+    with pytest.raises(InputError, match=message) as caught:
+        load(tmp_path, FILE.replace(old, new))
+    assert str(caught.value).startswith(str(tmp_path / "pile.toml"))
+    assert caught.value.remedy
+
+
+def test_a_hole_in_a_raster_names_file_and_field(tmp_path: Path) -> None:
+    heap = cone(10.0, 30.0)
+    heap.z[80, 80] = np.nan
+    (tmp_path / "heap.tif").write_bytes(geotiff(heap.x, heap.y, heap.z, {}))
+    shape = 'shape = "cone"\nheight = 10\nslope_deg = 30'
+    with pytest.raises(InputError, match=r"bed.surface: .*heap.tif: a hole at x = "):
+        load(tmp_path, FILE.replace(shape, 'surface = "heap.tif"'))
