@@ -16,6 +16,7 @@ from orchestrator.benchmark.pack import Pack
 from orchestrator.errors import printable
 from orchestrator.physics import curves
 from orchestrator.report import page, style
+from orchestrator.report.card import Card, Mark, Number, Worth
 from orchestrator.report.page import Section
 from orchestrator.report.style import DIAMETERS, PANELS, WATER, Figure, Look
 from orchestrator.runs.files import Folder
@@ -110,7 +111,7 @@ def write(
         beds = _beds(numbers, theirs) + _shields(chosen, numbers)
         said = "\n\n".join(judge.in_words(theirs))
         sections = [
-            Section("", said, (), (judge.summary(theirs),)),
+            Section("", said, (), (judge.summary(theirs),), card=_card(theirs)),
             Section("What failed", tables=(judge.failures(theirs),)),
             Section("Beds", THRESHOLDS, beds, (thresholds(numbers),)),
             Section("Time and error", ERRORS, _speed(verdicts), (scenes,), LIMITS),
@@ -132,6 +133,36 @@ def _beds(numbers: pd.DataFrame, theirs: pd.DataFrame) -> list[Figure]:
         if kind in answered:
             figures.append(_panels(numbers, answered[kind], quantity, name, title))
     return figures
+
+
+def _card(theirs: pd.DataFrame) -> Card:
+    """The answer card: how many scenes passed, failed and were declined."""
+    of = len(theirs)
+    passed, failed, declined = theirs[["passed", "failed", "declined"]].sum().tolist()
+    names = list(theirs["solver"].unique())
+    told: tuple[tuple[int, str, str, Mark], ...] = (
+        (passed, "scenes passed", "within the tolerance of each", "good"),
+        (declined, "scenes declined", "no answer was given", "care"),
+        (failed, "scenes failed", "the list below says which and why", "bad"),
+    )
+    numbers = []
+    for count, meaning, note, mark in told:
+        number = Number(count, f"of {of}", meaning, note, decimals=0, mark=mark)
+        numbers.append(number)
+    worth = Worth("good", "passed", "No scene is beyond its tolerance.")
+    if failed:
+        worth = Worth("bad", "failed", "Read first what failed.")
+    elif declined:
+        worth = Worth("care", "passed, with gaps", "Some scenes were not answered.")
+    who = printable(", ".join(names))
+    return Card(
+        f"Does {who} give the expected answers?",
+        f"{of} scenes of the benchmark; expected are exact answers, or our own runs.",
+        tuple(numbers),
+        "Nothing is measured here: levels 1 and 2 are exact answers, levels 3 to 5 our "
+        "own runs.",
+        worth,
+    )
 
 
 def _looks(table: pd.DataFrame) -> dict[str, Look]:

@@ -22,6 +22,7 @@ from orchestrator.fidelity.spread import FROZEN
 from orchestrator.grains.pile import Pile
 from orchestrator.physics.laws import LAWS
 from orchestrator.report import style
+from orchestrator.report.card import Card, Number, Worth
 from orchestrator.report.page import Section
 from orchestrator.report.results import FRACTION
 from orchestrator.report.style import Figure
@@ -564,7 +565,8 @@ def _of_scene(
     ustar0 = _interval(largest, "ustar0", at.ustar0)
     name = str(shared["scene"].iloc[0])
     chart = Figure(figure, ALONE, SCENE_TEXT, (), tornado(largest))
-    section = Section("", _in_words(name, fraction, theta, ustar0), [chart])
+    told = _in_words(name, fraction, theta, ustar0)
+    section = Section("", told, [chart], card=_card(name, fraction, theta, ustar0))
     return _row(name, theta, ustar0), section
 
 
@@ -591,6 +593,40 @@ def _row(name: str, theta: _Interval, ustar0: _Interval) -> dict[str, str]:
         "u*₀, m/s: interval": ustar0.ends,
         "u*₀, m/s: most by": ustar0.most,
     }
+
+
+def _card(name: str, fraction: float, theta: _Interval, ustar0: _Interval) -> Card:
+    """The answer card: the numbers of a bed with all choices together."""
+    part = f"{fraction:.0%}".replace("%", " %")
+    of_what = "all choices that the models share, together"
+    numbers = []
+    for of, unit, meaning in (
+        (ustar0, "m/s", "friction velocity: the pull of the flow, written as a speed"),
+        (
+            theta,
+            "",
+            "Shields number: the stress over the weight of one layer of grains",
+        ),
+    ):
+        numbers.append(
+            Number(
+                of.value,
+                unit,
+                meaning,
+                f"most by {of.most}",
+                low=of.value * (1 - of.low),
+                high=of.value * (1 + of.high),
+                interval_of=of_what,
+                decimals=3,
+            )
+        )
+    return Card(
+        f"How far do the choices of the model move the flow that moves {part}?",
+        f"{name}.",
+        tuple(numbers),
+        "Nothing is measured here: each choice is changed alone.",
+        Worth("good", "usable", "Quote the interval beside a threshold of such a bed."),
+    )
 
 
 def _in_words(

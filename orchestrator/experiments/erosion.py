@@ -28,6 +28,7 @@ from orchestrator.flow.stress import WallStress
 from orchestrator.physics.threshold import thresholds_of
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.report import labels, style
+from orchestrator.report.card import Card, Number, Worth
 from orchestrator.report.flows import USTAR
 from orchestrator.report.page import Section
 from orchestrator.report.style import Figure
@@ -429,7 +430,7 @@ def _results(found: Sequence[Pile], winds: Sequence[float], source: str) -> Resu
     figure = Figure("erosion", "Stress and loss", caption, (), drawing)
     told = "\n\n".join([*sentences(found, winds, source), words["sure"]])
     sections = [
-        Section("", told, [figure]),
+        Section("", told, [figure], card=_card(found, winds, source)),
         Section("Parts", words["rows"], (), [table], words["limits"].split("\n\n")),
         Section("The tables of AP-42", words["sources"], (), [AREAS, MATERIALS]),
     ]
@@ -529,6 +530,48 @@ def sentences(
                 change = f" ({left / lost - 1:+.0%})"
             told += f" With {_named(other)}: {left:.3g} g/m²{change}."
         yield told
+
+
+def _card(found: Sequence[Pile], winds: Sequence[float], source: str) -> Card:
+    """The answer card: what a wind takes from the first pile, and with a fence."""
+    pile = found[0]
+    first, *others = pile.surfaces
+    epa = [surface.total(winds) for surface in pile.by_epa]
+    numbers = [
+        Number(
+            first.total(winds),
+            "g/m²",
+            "of dust by the solved flow",
+            f"mean over the surface; the threshold friction velocity is "
+            f"{first.threshold:.3g} m/s{source}",
+        ),
+        Number(
+            min(epa),
+            "g/m²",
+            "of dust by AP-42",
+            "the range of its patterns of the wind over piles",
+            last=max(epa),
+        ),
+    ]
+    if others:
+        least = min(others, key=lambda surface: surface.total(winds))
+        numbers.append(
+            Number(
+                least.total(winds), "g/m²", f"with {_named(least)}, the least of all"
+            )
+        )
+    speeds = ", ".join(map("{:g}".format, winds))
+    return Card(
+        f"How much dust does a wind of {speeds} m/s take from this pile?",
+        f"{pile.name}; {len(found)} piles are compared below.",
+        tuple(numbers),
+        "No loss was measured on such a pile; the law of the loss is that of AP-42.",
+        Worth(
+            "care",
+            "usable, to compare",
+            "Compare piles and fences; the loss itself is that of an emission factor.",
+        ),
+    )
 
 
 def _named(surface: Surface) -> str:

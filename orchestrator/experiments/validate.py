@@ -28,6 +28,7 @@ from orchestrator.physics.measured import kirchner_pivot
 from orchestrator.physics.threshold import LAWS_OF, PAPER, Threshold, weight
 from orchestrator.physics.threshold import threshold as threshold_of
 from orchestrator.report import style
+from orchestrator.report.card import Card, Number, Worth
 from orchestrator.report.page import Section
 from orchestrator.report.style import Figure
 from orchestrator.study.fidelities import Fields
@@ -531,7 +532,7 @@ def _sections(rows: pd.DataFrame, scored: pd.DataFrame) -> list[Section]:
     is_from_memory = (rows["sure"] != READ) & (rows["model"] == MODELS[-1].name)
     memory = rows.loc[is_from_memory, ["set", "source", "measured", "value", "ratio"]]
     return [
-        Section("", _nearest_in_words(nearest)),
+        Section("", _nearest_in_words(nearest), card=_card(nearest)),
         Section(title, SETS_TEXT, (chart,), [nearest.reset_index(), wide]),
         Section("Thresholds", THRESHOLDS_TEXT, (points,), [scored]),
         Section("From memory", MEMORY_TEXT, (), [memory]),
@@ -544,6 +545,50 @@ def _median_factors(scored: pd.DataFrame) -> "pd.Series[float]":
     differ = scored.groupby("set")["factor"].transform("nunique") > 1
     median = scored[differ].groupby("model", sort=False)["factor"].median()
     return median.rename("median of the sets in which they differ")
+
+
+def _card(median: "pd.Series[float]") -> Card:
+    """The answer card: the nearest model, the usual one, and how many are near."""
+    least = float(median.min())
+    near = int((median <= ENOUGH).sum())
+    usual = float(median.iloc[0])
+    numbers = (
+        Number(
+            least,
+            "times",
+            "off the measurements: the nearest model",
+            f"in the median of their sets; it is “{median.idxmin()}”",
+            decimals=2,
+        ),
+        Number(
+            usual,
+            "times",
+            f"off the measurements: “{median.index[0]}”",
+            "the first of the list",
+            decimals=2,
+        ),
+        Number(
+            near,
+            f"of {len(median)}",
+            f"models within a factor of {ENOUGH:g}",
+            "that is asked of a default",
+            decimals=0,
+        ),
+    )
+    worth = Worth("good", "usable", "The nearest model is within what is asked.")
+    if least > ENOUGH:
+        worth = Worth(
+            "care",
+            "usable, with a correction",
+            "No model is within what is asked; the default is kept.",
+        )
+    return Card(
+        "Which model is nearest to measured thresholds?",
+        f"{len(median)} models beside flumes, wind tunnels and field sites.",
+        numbers,
+        "Each set and its source stands below; a factor of 1 is the measurement.",
+        worth,
+    )
 
 
 def _nearest_in_words(median: "pd.Series[float]") -> str:

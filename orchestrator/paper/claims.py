@@ -30,6 +30,21 @@ MARKS: dict[Verdict, Mark] = {"reproduced": "good", "partly": "care", "not": "ba
 """Verdicts, and their marks; one that was not judged has none."""
 
 
+NUMBERS = {
+    "closed-form-horizontal": "Paper, Fig. 5",
+    "dem-horizontal": "Paper, Figs. 5 and 6",
+    "closed-form-slope": "Paper, Fig. 7",
+    "dem-slope": "Paper, Figs. 7 and 8",
+    "mesh": "Paper, Fig. 11",
+    "bed-": "Paper, Fig. 13",
+    "fractions-reynolds-alpha15": "Paper, Fig. 14, left",
+    "fractions-alpha15": "Paper, Fig. 14, right",
+    "extended-shields-d10": "Paper, Fig. 15",
+    "extended-shields-d30": "Paper, Fig. 16",
+}
+"""Numbers of the paper's figures, by the beginning of the names of ours."""
+
+
 @dataclass(frozen=True)
 class Claim:
     """A claim of the paper.
@@ -155,7 +170,14 @@ def guest(judged: Sequence[Judged], tables: Tables, file: str) -> Guest:
         return Markup(text)
 
     files = {file: frame(judged).to_csv(index=False)}
-    return Guest("claims", section, files, card(judged, tables), sheet(judged, file))
+    return Guest(
+        "claims",
+        section,
+        files,
+        card(judged, tables),
+        sheet(judged, file),
+        NUMBERS,
+    )
 
 
 def card(judged: Sequence[Judged], tables: Tables) -> Card:

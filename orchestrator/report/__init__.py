@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.runs import terminal
@@ -46,7 +47,10 @@ def write(
     """
     from orchestrator.report import page, words
 
-    figures, faults = _drawn(results, folder, every)
+    numbers: dict[str, str] = {}
+    for guest in guests:
+        numbers |= guest.numbers
+    figures, faults = _drawn(results, folder, every, numbers)
     for guest in guests:
         for name, text in guest.files.items():
             folder.put(name, text)
@@ -87,7 +91,7 @@ def _heads(
 
 
 def _drawn(
-    results: "Results", folder: "Folder", every: bool
+    results: "Results", folder: "Folder", every: bool, numbers: Mapping[str, str]
 ) -> "tuple[list[Figure], list[str]]":
     """The figures of a study, leading ones first, and a line for each that failed."""
     from orchestrator.report import along, bed, flows, piles, poured, shields, style
@@ -100,6 +104,7 @@ def _drawn(
         shields.singles,
         shields.piles,
         piles.fractions,
+        piles.fractions_by_reynolds,
         piles.wear,
         shields.accuracy,
         poured.draw,
@@ -113,6 +118,7 @@ def _drawn(
         for draw in drawing:
             try:
                 for figure in draw(results):
+                    figure = _numbered(figure, numbers)
                     is_folded = bool(figure.fold and figure.drawing)
                     if every or not is_folded:
                         figure = style.saved(figure, folder)
@@ -125,6 +131,15 @@ def _drawn(
             terminal.check()
     figures.sort(key=lambda figure: not figure.leads)
     return figures, faults
+
+
+def _numbered(figure: "Figure", numbers: Mapping[str, str]) -> "Figure":
+    """A figure with the number that others gave it, which is drawn then."""
+    is_further = ", more panels" in figure.title
+    for name, number in numbers.items():
+        if figure.name.startswith(name) and not is_further:
+            return replace(figure, number=number, fold=False)
+    return figure
 
 
 def drawn_from(results: "Results") -> "list[Case]":

@@ -3,7 +3,7 @@
 import base64
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from hashlib import sha256
 from importlib import metadata
@@ -209,6 +209,9 @@ class Guest:
         The answer card, in place of the study's own.
     sheet
         The table below it.
+    numbers
+        Numbers that others gave to figures, by the beginning of their names; such
+        figures are drawn even where the page of another study folds them away.
     """
 
     name: str
@@ -216,6 +219,7 @@ class Guest:
     files: Mapping[str, str]
     card: "Card | None" = None
     sheet: "Sheet | None" = None
+    numbers: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -232,6 +236,8 @@ class Section:
         What it shows.
     limits
         What a reader should not conclude.
+    card
+        The answer card of the page.
     """
 
     title: str
@@ -239,6 +245,7 @@ class Section:
     figures: Sequence["Figure"] = ()
     tables: Sequence[pd.DataFrame] = ()
     limits: Sequence[str] = ()
+    card: "Card | None" = None
 
 
 def versions(solvers: Mapping[str, str]) -> pd.DataFrame:
@@ -269,7 +276,6 @@ def write(
     folder: Folder,
     name: str,
     solvers: Mapping[str, str],
-    card: "Card | None" = None,
 ) -> None:
     """Write the page of an experiment, with its figures as PNG and SVG beside it.
 
@@ -285,8 +291,6 @@ def write(
         File name of the page.
     solvers
         Versions of the solvers, by name.
-    card
-        Its answer card.
     """
     from orchestrator.report import style  # it imports matplotlib
 
@@ -297,7 +301,7 @@ def write(
     text = fill(
         "document.html.j2",
         title=title,
-        card=card,
+        card=next((part.card for part in sections if part.card), None),
         sections=drawn,
         programs=versions(solvers),
         links={},

@@ -1,6 +1,7 @@
 """Figures of piles: the fractions of grains that moved, and beds that change."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 
 import pandas as pd
@@ -22,7 +23,7 @@ APART: Look = {"ls": "", "marker": "o", "ms": 4, "label": "first 5 % apart"}
 
 
 def fractions(results: Results) -> Iterator[Figure]:
-    """Draw Fig. 14: n/N against the Shields number.
+    """Draw the right half of Fig. 14: n/N against the Shields number.
 
     Parameters
     ----------
@@ -34,6 +35,30 @@ def fractions(results: Results) -> Iterator[Figure]:
     Figure
         The figures of each slope; those of the least slope first, which are not folded.
     """
+    title = "Fraction of moving grains"
+    yield from _fractions(results, "shields", "fractions", title)
+
+
+def fractions_by_reynolds(results: Results) -> Iterator[Figure]:
+    """Draw the left half of Fig. 14: n/N against Re*.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Yields
+    ------
+    Figure
+        The figures of each slope, which are all folded.
+    """
+    title = "Fraction of moving grains against Re*"
+    for figure in _fractions(results, "reynolds", "fractions-reynolds", title):
+        yield replace(figure, fold=True)
+
+
+def _fractions(results: Results, along: str, name: str, title: str) -> Iterator[Figure]:
+    """The figures of n/N along a column of the curves."""
     curves = _curves(results)
     scenes = results.scenes[results.scenes["scene_id"].isin(curves)]
     piles = results.beds("pile")
@@ -42,20 +67,20 @@ def fractions(results: Results) -> Iterator[Figure]:
     by = "nu_m2_s" if has_one_size and piles["nu_m2_s"].nunique() > 1 else "d_m"
     # of the piles alone: single grains have more diameters than there are colours
     colours = style.palette(by, sorted(set(piles[by])))
+    x = labels.TAU_AXIS if along == "shields" else labels.RE_AXIS
     for (alpha,), of_slope in split(scenes, "alpha_deg"):
         choices, rows = shields.parted(
             of_slope, "alpha_deg", "z0_over_d", "force_law", by
         )
-        keys = ["z0_over_d", *choices]
         is_first = alpha == scenes["alpha_deg"].min()
         slope = labels.plain("alpha_deg", alpha)
-        for sheet in shields.sheets(rows, keys, 2.3, labels.TAU_AXIS, "n/N"):
+        for sheet in shields.sheets(rows, ["z0_over_d", *choices], 2.3, x, "n/N"):
             yield Figure(
-                name=f"fractions-alpha{alpha:g}{sheet.name}",
-                title=f"Fraction of moving grains, {slope}{sheet.title}",
+                name=f"{name}-alpha{alpha:g}{sheet.name}",
+                title=f"{title}, {slope}{sheet.title}",
                 caption=caption("fractions", about=shields.about(sheet.rows)),
                 cases=case_names(sheet.rows),
-                drawing=partial(_draw_fractions, sheet, curves, by, colours),
+                drawing=partial(_draw_fractions, sheet, curves, by, colours, along),
                 fold=bool(sheet.name) or not is_first,
             )
 
@@ -74,17 +99,18 @@ def _draw_fractions(
     curves: Mapping[str, pd.DataFrame],
     by: str,
     colours: dict[float, str],
+    along: str,
 ) -> Canvas:
-    """Draw the curves of a sheet, in colours by a column."""
+    """Draw the curves of a sheet along a column, in colours by another."""
     _, axes = sheet.panels()
     for ax, rows in zip(axes, sheet.parts, strict=True):
         for _, pile in rows.iterrows():
             colour = colours[float(pile[by])]
-            _draw_curve(ax, pile, curves[pile["scene_id"]], colour)
+            _draw_curve(ax, pile, curves[pile["scene_id"]], colour, along)
     # the last grains of a pile may wait for a hundred times the stress of the others
     points = pd.concat([curves[scene_id] for scene_id in sheet.rows["scene_id"]])
     last = max(SHOWN_UP_TO, points["fraction_moved"].min())
-    early = points["shields"][points["fraction_moved"] <= last]
+    early = points[along][points["fraction_moved"] <= last]
     # the panels share the axes
     axes[0].set(
         xscale="log",
@@ -96,7 +122,9 @@ def _draw_fractions(
     return shields.legends(sheet, by, colours)
 
 
-def _draw_curve(ax: Axes, pile: pd.Series, points: pd.DataFrame, colour: str) -> None:
+def _draw_curve(
+    ax: Axes, pile: pd.Series, points: pd.DataFrame, colour: str, along: str
+) -> None:
     """Draw the curve of one pile, hollow where its force law does not hold."""
     look: Look = {
         "marker": str(pile[shields.SHAPE]),
@@ -111,7 +139,7 @@ def _draw_curve(ax: Axes, pile: pd.Series, points: pd.DataFrame, colour: str) ->
     if not pile["law_holds"]:
         look["mfc"] = "white"
         look["label"] = "hollow: the force law does not hold"
-    ax.plot(points["shields"], points["fraction_moved"], **look)
+    ax.plot(points[along], points["fraction_moved"], **look)
 
 
 def wear(results: Results) -> Iterator[Figure]:

@@ -12,6 +12,8 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 
 from orchestrator.physics import curves
+from orchestrator.physics.beside import FIELD
+from orchestrator.physics.fluids import PAPER
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import MEASURED_SOURCE
 from orchestrator.report import labels, style, theory
@@ -54,6 +56,8 @@ SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "force_law")
 """Columns that figures, panels, axes, colours and markers tell apart."""
 SERIES = ("nu_m2_s", "force_law", "regime", SHAPE)
 """Columns in which piles agree that a line joins."""
+FIELD_REYNOLDS = (8.8, 13.5)
+"""Re* of the sites of `FIELD`."""
 GAP = np.full((1, 2), np.nan)
 BEYOND = 1e6  # a place above every frame, over the lower end of a bar
 """A point that interrupts a line."""
@@ -329,12 +333,32 @@ def draw_published(
         for name, points in theory.air_lines(scenes, alpha).items():
             if is_sloped and name != SLOPED:
                 continue
-            label = f"air: {name} × slope factor" if is_sloped else f"air: {name}"
+            # the caption names the curves, in the order of their dashes
+            label = (
+                f"air: {name} × slope factor" if is_sloped else "air: published curves"
+            )
             colour = colours[alpha] if colours else style.AIR
             look: Look = {"color": colour, "ls": AIR_STYLES[name], "lw": 0.8}
             ax.plot(*points, label=label, zorder=1.5, **look)
-    if not (is_sloped and theory.in_gas(scenes).all()):
+    is_air = theory.in_gas(scenes).all()
+    is_of_paper = (scenes["rho_f_kg_m3"] == PAPER[0]).any()
+    if is_air and not is_sloped:
+        _draw_field(ax, xlim)
+    # the paper sets its own gas beside water
+    if not is_air or (is_of_paper and not is_sloped):
         _draw_water(ax, xlim)
+
+
+def _draw_field(ax: Axes, xlim: tuple[float, float]) -> None:
+    """Shields numbers of the sites in the field, over the Re* that they have."""
+    low, high = FIELD_REYNOLDS
+    if high < xlim[0] or low > xlim[1]:
+        return
+    look: Look = {"color": "black", "lw": 1.6, "zorder": 2.2}
+    label = f"air: measured at {len(FIELD)} sites in the field"
+    gaps = [(low, theta, high, theta, np.nan, np.nan) for theta in FIELD]
+    points = np.array(gaps).reshape(-1, 2)
+    ax.plot(*points.T, gid="field", label=label, **look)
 
 
 def _draw_water(ax: Axes, xlim: tuple[float, float]) -> None:
@@ -406,7 +430,10 @@ def draw(results: Results) -> Iterator[Figure]:
         draw_line(ax, line, line.name, *theory.look(line.law), width)
         laws_so_far.append(line.law)
     prepare(sheet, xlim)
-    canvas = legends(sheet, "alpha_deg", {})
+    canvas, axes = sheet.panels()
+    of_laws = [one for one in style.samples(axes) if one.get_gid() == RESULT[0]]
+    others = [one for one in style.samples(axes) if one.get_gid() != RESULT[0]]
+    style.legends(canvas, of_laws, others)
     text = caption(
         "overview",
         piles=about(piles),
@@ -422,10 +449,21 @@ def draw(results: Results) -> Iterator[Figure]:
 
 def _grains_on_the_least_slope(results: Results) -> pd.DataFrame:
     """The single grains of the one diagram."""
-    grains = single_grains(results)
+    grains = _few_exact(single_grains(results))
     grains = grains[drawable(grains, "reynolds", "shields_dem")]
     is_least: pd.Series[bool] = grains["alpha_deg"] == grains["alpha_deg"].min()
     return grains[is_least]
+
+
+def _few_exact(grains: pd.DataFrame) -> pd.DataFrame:
+    """Single grains, of which few that the closed form answered are points as well."""
+    if grains.empty or grains["shields_dem"].notna().any() or len(grains) > FEW:
+        return grains
+    return grains.assign(
+        shields_dem=grains["shields_closed_form"],
+        reynolds=grains["reynolds_closed_form"],
+        ustar_m_s=grains["ustar_closed_form_m_s"],
+    )
 
 
 def _draw_kind(
