@@ -231,13 +231,15 @@ class Evidence:
         if len(self.held):
             return self.held
         table = self._exact
-        return commonest(table[table["force_law"] == table["regime"]])
+        return _alike(table[table["force_law"] == table["regime"]])
 
     @cached_property
     def bridged(self) -> pd.DataFrame:
         """The same by the bridged law, in all regimes and in the transition."""
         table = self.joined("single_grain")
-        table = table if len(table) else self._exact
+        if table.empty:
+            table = self._exact
+            return _alike(table[table["force_law"] == BRIDGED])
         return commonest(table[table["force_law"] == BRIDGED])
 
     def piles(
@@ -286,11 +288,15 @@ def commonest(grains: pd.DataFrame) -> pd.DataFrame:
     DataFrame
         Those grains.
     """
-    held = grains[grains["waiting_time"] >= WAITING_TIME]
-    combination = held.groupby(others(held, *GRAIN), dropna=False).ngroup()
-    if held.empty:
-        return held
-    return held[combination == combination.mode()[0]]
+    return _alike(grains[grains["waiting_time"] >= WAITING_TIME])
+
+
+def _alike(grains: pd.DataFrame) -> pd.DataFrame:
+    """The grains of the commonest combination of what is not of `GRAIN`."""
+    if grains.empty:
+        return grains
+    combination = grains.groupby(others(grains, *GRAIN), dropna=False).ngroup()
+    return grains[combination == combination.mode()[0]]
 
 
 def others(table: pd.DataFrame, *along: str) -> list[str]:
