@@ -34,7 +34,7 @@ from orchestrator.flow.surface_stress import SurfaceStress
 from orchestrator.physics.velocity import log_law_speed
 from orchestrator.runs import case, engine
 from orchestrator.runs.case import Case
-from orchestrator.study.parts import Flow
+from orchestrator.study.method import FlowMethod
 from orchestrator.types import BoolArray, FloatArray
 
 HERE = Path(__file__).resolve().parents[1] / "docs/measured"
@@ -148,7 +148,7 @@ def lines_of(section: FlowCase) -> FloatArray:
 def ridge(cases: Path) -> Iterator[Row]:
     """A ridge in three dimensions against its section, by the means of its two sides."""
     first = RIDGE / 40
-    settings = Flow(
+    settings = FlowMethod(
         roughness=RIDGE / 600,
         viscosity=1e-5,
         first_cell_height=first,
