@@ -267,7 +267,9 @@ class Strips:
             counted = is_held & in_class
             if counted.sum() >= FEWEST:
                 part = min(MOVED * size**-mobility, 1.0)
-                points.append((size, np.quantile(own[counted], part)))
+                # by its flow at least that part of the grains has moved, as in tables
+                found = np.quantile(own[counted], part, method="higher")
+                points.append((size, found))
         if len(points) < 2:
             return math.nan
         ln_size, ln_theta = np.log(np.array(points)).T

@@ -43,6 +43,7 @@ SETTINGS = (
     "forces.loaded_grains",
     "forces.exposure",
     "forces.sheltering",
+    "forces.drag",
     "grain.cohesion",
     "threshold.displacement",
 )

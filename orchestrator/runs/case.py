@@ -38,6 +38,7 @@ GENERATED = (
     "postProcessing",
     "polyMesh",
     "settling.csv",
+    "going.csv",
     "samples.csv",
     "*.dump",
     "load_steps.csv",

@@ -205,8 +205,8 @@ def test_equal_grains_that_rain_onto_a_lattice_reproduce_it(tmp_path: Path) -> N
     assert row.max() == 4
 
 
-class OfThreeSizes(PouredBed):
-    """A large grain and two of d in pockets of the floor, a small one on these two."""
+class OfTwoSizes(PouredBed):
+    """In pockets of the floor two grains of d under a small one, and a large one."""
 
     @cached_property
     def grains(self) -> tuple[FloatArray, FloatArray]:
@@ -219,20 +219,23 @@ class OfThreeSizes(PouredBed):
         return np.vstack([floor, middle + above]), sizes
 
 
-def test_a_bed_is_cut_by_the_tops_of_its_grains(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("depth", "small_stays"), [(0.5, False), (1.2, True)])
+def test_a_bed_is_cut_by_the_tops_of_its_grains_over_their_diameters(
+    tmp_path: Path, depth: float, small_stays: bool
+) -> None:
     """The pockets are exact: over their row grains of 1.6, 1 and 0.6 d lie 1.2, 0.87 and 0.62."""
-    depth = 0.8
-    bed = OfThreeSizes(_plane().line, depth, SURFACE, MIXED, 1.0, 35.0, 0)
+    bed = OfTwoSizes(_plane().line, depth, SURFACE, MIXED, 1.0, 35.0, 0)
     rows = pd.read_csv(_run(bed, tmp_path) / BED)
     left = rows[rows["fixed"] == 0].set_index("size")["z_over_d"].sort_index()
-    on_floor = np.sqrt(0.75) - depth
-    on_two = on_floor + np.sqrt(0.8**2 - 0.5**2)
-    # the centre of the small grain lies above the line, its top under that of a grain of d
-    assert on_two > SURFACE
-    assert on_two + 0.3 < SURFACE + 0.5
-    # the large grain is the other way round, and it is gone
+    unit = np.sqrt(0.75) - depth
     large = np.sqrt(1.3**2 - 0.5**2) - depth
-    assert large < SURFACE
-    assert large + 0.8 > SURFACE + 0.5
-    np.testing.assert_allclose(left.index, [0.6, 1.0, 1.0])
-    np.testing.assert_allclose(left, [on_two, on_floor, on_floor], atol=2e-3)
+    small = unit + np.sqrt(0.8**2 - 0.5**2)
+    # the centre of the large grain lies above the line, its top within 1.6 d of the bed
+    assert (large > SURFACE) == (depth == 0.5)
+    assert large - 0.8 < SURFACE - 0.5
+    # that of the small one lies within 0.6 d of it on the lower bed alone
+    assert (small - 0.3 < SURFACE - 0.5) == small_stays
+    sizes = [0.6, 1.0, 1.0, 1.6] if small_stays else [1.0, 1.0, 1.6]
+    heights = [small, unit, unit, large] if small_stays else [unit, unit, large]
+    np.testing.assert_allclose(left.index, sizes)
+    np.testing.assert_allclose(left, heights, atol=2e-3)
