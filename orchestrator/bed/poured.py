@@ -68,8 +68,8 @@ LAYER = np.sin(np.pi / 3)
 NEAR = 0.5
 """Fixed grains whose surfaces are nearer to that of a mobile one are in the case, d."""
 OVERLAP = 0.02
-"""Overlap of two grains where the ends of a strip meet, from which on one is left out, d:
-springs open a smaller one while the bed settles."""
+"""Overlap of two grains where the ends of a strip meet, from which on one is left
+out, d: springs open a smaller one while the bed settles."""
 LOCAL = 5.0
 """Length of bed before and behind a grain that its height is compared with, d."""
 
@@ -507,7 +507,8 @@ def joined(
     directory
         The directory of the case.
     length
-        Length of the strip from x = 0, d; a whole number, as the fixed grains are d apart.
+        Length of the strip from x = 0, d; a whole number, as the fixed grains are d
+        apart.
     surface
         Height of the highest centres over the level bed, d.
     layers
@@ -518,7 +519,8 @@ def joined(
     Returns
     -------
     Packing
-        The mobile grains, of which the exposed ones are counted, and a layer under them.
+        The mobile grains, of which the exposed ones are counted, and a layer under
+        them.
     """
     bed = deck.read_table(directory / BED)
     xyz = bed[["x_over_d", "y_over_d", "z_over_d"]].to_numpy(float)
@@ -552,7 +554,7 @@ def joined(
 def _without_overlaps(
     xyz: FloatArray, sizes: FloatArray, is_floor: BoolArray, sides: FloatArray
 ) -> BoolArray:
-    """Which grains are left where the ends of a strip meet; those of the floor all are."""
+    """Which grains are left where the ends of a strip meet; the whole floor is."""
     from scipy.spatial import cKDTree
 
     tree = cKDTree(xyz, boxsize=np.append(sides, 0.0))

@@ -1,9 +1,9 @@
 """Grains that go on, by LIGGGHTS: a level strip without an end under gusts.
 
-A strip of poured grains is cut to a whole number of diameters, and its two ends are made
-one. The drag on each grain is that of its velocity relative to the fluid at its place, so
-that a grain that is as fast as the fluid feels none. The flow is raised in load steps; in
-each a gust acts, and a grain goes on that comes `DISTANCE` downstream after it is over.
+A strip of poured grains is cut to a whole number of diameters, and its two ends are
+made one. The drag on each grain is that of its velocity relative to the fluid at its
+place, so that a grain that is as fast as the fluid feels none. The flow is raised in
+load steps; in each a gust acts, and a grain goes on that comes `DISTANCE` downstream after it is over.
 """
 
 import math
@@ -33,11 +33,11 @@ from orchestrator.types import FloatArray
 DISTANCE = 20.0
 """Way downstream after the gust from which on a grain goes on, d."""
 LONGEST = 60.0
-"""Time for which the mean flow acts after the gust, sqrt(d/g'): three times what a grain
-that goes on needs in water for `DISTANCE`."""
+"""Time for which the mean flow acts after the gust, sqrt(d/g'): three times what a
+grain that goes on needs in water for `DISTANCE`."""
 PAUSE = 400.0
-"""Longest time in which the grains come to rest between two load steps, sqrt(d/g'): one that
-flies at 40 d sinks for 80."""
+"""Longest time in which the grains come to rest between two load steps, sqrt(d/g'):
+one that flies at 40 d sinks for 80."""
 SETTLE = 20.0
 """Time in which the bed settles before the first load step, sqrt(d/g')."""
 LOOK = 1.0
@@ -51,8 +51,8 @@ MARGIN = 2.0
 ROOM = 40.0
 """Height of the box over the bed, d; no grain near its threshold hops so high."""
 FIRST, LAST = 0.4, 4.0
-"""Shields numbers of the first and of the last load step over the threshold of the closed
-form."""
+"""Shields numbers of the first and of the last load step over the threshold of the
+closed form."""
 GOING = "going.csv"
 GONE = "gone.dump"
 
@@ -151,7 +151,7 @@ class GoingCase(Case):
 
     @property
     def closed_form(self) -> float:
-        """Shields number of the mean flow at which one grain goes on by the closed form."""
+        """Shields number at which one grain goes on by the closed form."""
         scene = self.scene
         fluid = scene.fluid
         grains = saltation.Grains.of(
@@ -231,7 +231,7 @@ class GoingCase(Case):
         )
 
     def collect(self, directory: Path) -> None:
-        """Check the run, and write when each exposed grain went on to ``motion.csv``."""
+        """Check the run, and write when grains went on to ``motion.csv``."""
         liggghts.check_log(directory)
         settling = directory / "settling.csv"
         if deck.read_table(settling)["grains"].nunique() > 1:

@@ -257,7 +257,7 @@ class Geometry:
 
     @property
     def joined_length(self) -> float:
-        """Length of a strip whose ends are one, d: whole, as its fixed grains are d apart."""
+        """Length of a strip whose ends are one, a whole number of d."""
         return float(math.floor(self.length + digits.SLACK))
 
     @property
