@@ -3,7 +3,8 @@
 A strip of poured grains is cut to a whole number of diameters, and its two ends are
 made one. The drag on each grain is that of its velocity relative to the fluid at its
 place, so that a grain that is as fast as the fluid feels none. The flow is raised in
-load steps; in each a gust acts, and a grain goes on that comes `DISTANCE` downstream after it is over.
+load steps; in each a gust acts, and a grain goes on that comes `DISTANCE` downstream
+after it is over.
 """
 
 import math
