@@ -48,6 +48,41 @@ def test_links_lead_somewhere(page: Path) -> None:
             assert anchor[1:] in anchors, anchor
 
 
+def test_every_page_says_where_to_go_next() -> None:
+    """The tables of study-file.md and the index are made or are lists themselves."""
+    pages = [page for page in PAGES if page.parent.name == "docs"]
+    ends = [page for page in pages if page.name not in ("README.md", "study-file.md")]
+    missing = [
+        page.name
+        for page in ends
+        if "## Where to go next" not in page.read_text(encoding="utf-8")
+    ]
+    assert not missing
+
+
+# words that the glossary has another word for, and the word
+INSTEAD = {
+    r"cheap to dear": "fast to accurate",
+    r"quiet time": "waiting time",
+    r"fidelity levels?": "fidelity",
+    r"every level, keeps": "fidelity",
+    r"add up by their squares": "combine as the root of the sum of their squares",
+}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_a_page_uses_the_words_of_the_glossary(page: Path) -> None:
+    text = " ".join(page.read_text(encoding="utf-8").split())
+    assert [word for word in INSTEAD if re.search(word, text)] == []
+
+
+def test_the_glossary_has_the_words_that_pages_use() -> None:
+    text = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
+    words = ["method", "fidelity", "reference", "core-s", "deck", "floor", "preset"]
+    words += ["digest", "criterion", "answer card", "engine", "threshold stress"]
+    assert [word for word in words if f"| {word} |" not in text] == []
+
+
 def test_the_first_picture_is_of_the_preset_that_make_study_runs() -> None:
     drawn = (ROOT / "docs" / "first-look.svg").read_text(encoding="utf-8")
     piles = plan.make(study.load("first-look")).piles.values()
