@@ -26,8 +26,6 @@ POURED = """
 title = "Small poured beds"
 fluid = { density = 1000.0, viscosity = 1e-6 }
 grain = { diameter = 1e-3, density = 2650.0 }
-method.flow.model = "flat"
-method.grains.stiffness = 1e3
 
 [bed]
 kind = "pile"
@@ -35,16 +33,18 @@ shape = "flat"
 packing = "poured"
 poured_depth = 3.0
 
-[method.grains]
-mobile_layers = 2
-
 [threshold]
 fractions = [0.1, 0.3]
 
 [method]
 kind = "dem"
 
+[method.flow]
+model = "flat"
+
 [method.grains]
+stiffness = 1e3
+mobile_layers = 2
 load_increment = 0.05
 waiting_time = 6.0
 time_step = 0.3

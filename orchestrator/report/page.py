@@ -171,6 +171,8 @@ def _inline(figure: "Figure") -> Markup:
 
 def _with_titles(svg: str, group: str, points: Sequence[Sequence[str]]) -> str:
     """An SVG whose points of a group have titles, in their order."""
+    if not points:
+        return svg  # a count of 0 would replace all that follow
     start = svg.index(f'id="{group}"')
     before, after = svg[:start], svg[start:]
     said = iter(points)

@@ -47,14 +47,18 @@ diameter = 5e-4
 law = "%s"
 [[group]]
 name = "pile"
-bed = {{ kind = "pile", height = 0.005, slope_deg = 20.0, roughness = "d/30", %s }}
+bed.kind = "pile"
+bed.height = 0.005
+bed.slope_deg = 20.0
+bed.roughness = "d/30"
+%s
 """
 """A pile under the stress of a theory, which needs no OpenFOAM."""
 POURED = f"""
 fluid = {{ density = 1000.0, viscosity = 1e-6 }}
 grain = {{ diameter = 1e-3, density = 2650.0, sizes = {{ sigma_g = 1.3 }} }}
-method.grains.stiffness = 1e3
 method.flow.model = "waves"
+threshold.fractions = [0.1, 0.3]
 [bed]
 kind = "pile"
 shape = "gaussian"
@@ -64,7 +68,7 @@ height = 0.005
 poured_depth = 4.0
 {PROTOCOL}
 final_fraction = 0.4
-fractions = [0.1, 0.3]
+stiffness = 1e3
 """
 """A poured hump of grains of many sizes."""
 
@@ -90,8 +94,8 @@ formulas = _pack("formulas")
 all_levels = _pack("all_levels", SMALL)
 poured = _pack("poured", POURED, (4,))
 # Eq. 2 far above its range: grains that lift carries off; and level rows, which empty in chains
-lift_off = _pack("lift_off", THEORY % ("low", "mobile_layers = 1"), (4,))
-level_rows = _pack("level_rows", THEORY % ("high", 'packing = "horizontal"'), (4,))
+lift_off = _pack("lift_off", THEORY % ("low", "method.grains.mobile_layers = 1"), (4,))
+level_rows = _pack("level_rows", THEORY % ("high", 'bed.packing = "horizontal"'), (4,))
 
 
 SCENE = Options(patterns=("2-incline-5",), seconds=60.0, memory=0.5)

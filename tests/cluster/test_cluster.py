@@ -23,14 +23,8 @@ from tests.faults.bench import (
 
 STUDY = """
 time_limit = 100
-[method.grains]
-load_increment = 0.006
-waiting_time = 3.0
 [grain]
 diameter = 1e-3
-
-[method.grains]
-stiffness = 1e3
 [bed]
 kind = "pile"
 height = 0.01
@@ -38,6 +32,9 @@ slope_deg = 15.0
 packing = "disordered"
 
 [method.grains]
+load_increment = 0.006
+waiting_time = 3.0
+stiffness = 1e3
 mobile_layers = 1
 [method.flow]
 cells_per_face = 20

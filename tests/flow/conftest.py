@@ -12,7 +12,6 @@ from orchestrator.flow.case import FlowCase
 from orchestrator.runs import case, process
 from orchestrator.runs.case import templates
 from orchestrator.study.method import FlowMethod
-from orchestrator.study.parts import Flow
 from tests.conftest import Shared
 
 SETTINGS = FlowMethod(
@@ -26,11 +25,18 @@ PILE = FlowCase(0.02, 15.0, SETTINGS)
 
 
 def changed(flow: FlowCase, **settings: Any) -> FlowCase:
-    """A case with other settings of the solve."""
-    return replace(flow, settings=flow.settings.model_copy(update=settings))
+    """A case with other settings of the solve, or something else above the flow."""
+    top: dict[str, Any] = {}
+    for name in ("top", "depth"):
+        if name in settings:
+            top[name] = settings.pop(name)
+    above = flow.above.model_copy(update=top)
+    return replace(
+        flow, settings=flow.settings.model_copy(update=settings), above=above
+    )
 
 
-OPEN = replace(PILE, above=Flow(top="open water", depth=6.0 * PILE.height_m))
+OPEN = changed(PILE, top="open water", depth=6.0 * PILE.height_m)
 
 Solve = Callable[[FlowCase], Path]
 

@@ -19,7 +19,6 @@ from orchestrator.flow.stress import APPROACH_ERROR, WallStress, bubble
 from orchestrator.runs import case
 from orchestrator.runs.files import read_json
 from orchestrator.solvers import openfoam
-from orchestrator.study.parts import Flow
 from orchestrator.study.study import parse
 from tests.flow.conftest import OPEN, PILE, Solve, allrun, changed, edit
 
@@ -279,8 +278,7 @@ def test_the_stress_scales_with_the_size_and_grows_in_shallow_water(
     lengths = ("roughness", "first_cell_height", "viscosity")
     settings = {name: 10 * getattr(PILE.settings, name) for name in lengths}
     larger = replace(changed(PILE, **settings), height_m=10 * PILE.height_m)
-    above = Flow(top="open water", depth=3.0 * PILE.height_m)
-    shallow = replace(OPEN, above=above)
+    shallow = changed(OPEN, depth=3.0 * PILE.height_m)
     flows = PILE, larger, OPEN, shallow
     deep, scaled, six, three = (windward_mean(solve(flow), flow) for flow in flows)
     assert scaled == pytest.approx(deep, rel=1e-4)

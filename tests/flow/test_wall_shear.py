@@ -40,9 +40,7 @@ FLOWS = {
     "steep": replace(changed(PILE, cells_per_face=32), slope_deg=32.0),
     "smooth": changed(PILE, roughness=3.3e-6),
     "open water": OPEN,
-    "closed channel": replace(
-        OPEN, above=OPEN.above.model_copy(update={"top": "closed channel"})
-    ),
+    "closed channel": changed(OPEN, top="closed channel"),
     "curved": over("curved and rounded"),
     "cosine": over("cosine"),
     "fence": over("fence"),

@@ -58,13 +58,14 @@ LIFT_OFF = """
 fluid = { density = 1.0, viscosity = 1e-5 }
 grain = { diameter = 5e-4, density = 2500.0 }
 method.flow.model = "waves"
-method.grains = { stiffness = 1e3, mobile_layers = 1 }
 forces = { law = "low" }
 bed = { kind = "pile", height = 0.005, slope_deg = 20.0, roughness = "d/30" }
 [threshold]
 fractions = [0.1, 0.3]
 
 [method.grains]
+stiffness = 1e3
+mobile_layers = 1
 load_increment = 0.05
 waiting_time = 6.0
 time_step = 0.3

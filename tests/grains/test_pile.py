@@ -67,10 +67,10 @@ def test_a_run_goes_on_beyond_the_largest_fraction_that_is_asked_for(
     tmp_path: Path,
 ) -> None:
     """It is reached, and half a grain more too, whatever `final_fraction` is."""
-    text = SMALL.format(step=0.05) + "waiting_time = 6.0\nfractions = [0.95]\n"
+    text = SMALL.format(step=0.05) + "waiting_time = 6.0\n"
     text = text.replace("final_fraction = 0.75", "")
     text = text.replace("cells_per_face = 20", 'model = "waves"')
-    text += 'method = "dem"\n'
+    text += '[threshold]\nfractions = [0.95]\n[method]\nkind = "dem"\n'
     results = small_study.run(tmp_path, text)
     (row,) = results.tables["pile_threshold"].to_dict("records")
     assert row["highest_fraction"] >= 0.95
@@ -94,7 +94,8 @@ def test_runs_that_end_at_one_fraction_are_one_case(
 ) -> None:
     def pile(final: float, fractions: str) -> Pile:
         text = SMALL.format(step=0.05).replace("final_fraction = 0.75", "")
-        text += f'final_fraction = {final}\nfractions = [{fractions}]\nmethod = "dem"\n'
+        text += f"final_fraction = {final}\n"
+        text += f'[threshold]\nfractions = [{fractions}]\n[method]\nkind = "dem"\n'
         (scene,) = study.parse(text, name="last", where="test").scenes
         return Pile(scene)
 
@@ -137,7 +138,7 @@ def test_the_grains_of_a_row_without_a_free_end_hold_one_another(
     model = '"flat"' if '"flat"' in fields else '"waves"'
     text = (
         text.replace("cells_per_face = 20", f"model = {model}")
-        + f'method = "{method}"\n'
+        + f'[method]\nkind = "{method}"\n'
     )
     (scene,) = study.parse(text, name="row", where="test").scenes
     assert least <= Pile(scene).row_hold(tmp_path) <= most
@@ -146,7 +147,10 @@ def test_the_grains_of_a_row_without_a_free_end_hold_one_another(
 def test_load_steps_begin_below_the_first_grain_that_is_held(tmp_path: Path) -> None:
     """On a step down grains lie loose at the limiting slope: no flow is below theirs."""
     text = SMALL.format(step=0.05).replace("slope_deg = 20.0", 'shape = "step down"')
-    text = text.replace("cells_per_face = 20", 'model = "waves"') + 'method = "dem"\n'
+    text = (
+        text.replace("cells_per_face = 20", 'model = "waves"')
+        + '[method]\nkind = "dem"\n'
+    )
     (scene,) = study.parse(text, name="loose", where="test").scenes
     loads = Pile(scene).loads(tmp_path)
     alone = loads.alone()
@@ -164,7 +168,7 @@ def test_a_torque_of_the_law_is_no_hold_of_a_row(tmp_path: Path, law: str) -> No
         "slope_deg = 20.0", 'shape = "step up"\nslope_deg = 15'
     )
     text = text.replace("cells_per_face = 20", 'model = "waves"')
-    text += f'method = "pivot"\n[forces]\nlaw = "{law}"\n'
+    text += f'[method]\nkind = "pivot"\n[forces]\nlaw = "{law}"\n'
     (scene,) = study.parse(text, name="row", where="test").scenes
     assert Pile(scene).row_hold(tmp_path) == pytest.approx(1, abs=0.01)
 
@@ -184,7 +188,9 @@ def test_rows_of_a_bed_without_grains_are_judged_around_the_first_motion(
     each = {}
     for method in ("pivot", "local"):
         text = SMALL.format(step=0.05).replace("height = 0.01", "height = 1.0")
-        text = text.replace("slope_deg = 20.0", fields) + f'method = "{method}"\n'
+        text = (
+            text.replace("slope_deg = 20.0", fields) + f'[method]\nkind = "{method}"\n'
+        )
         text = text.replace("cells_per_face = 20", 'model = "waves"')
         (scene,) = study.parse(text, name="long", where="test").scenes
         each[method] = Pile(scene).row_hold(tmp_path)
@@ -197,7 +203,10 @@ def test_along_a_plane_the_closed_form_is_that_of_a_grain_on_it(
     tmp_path: Path, shape: str, slope: float
 ) -> None:
     text = SMALL.format(step=0.05).replace("slope_deg = 20.0", f'shape = "{shape}"')
-    text = text.replace('"pile"', f'"pile"\nslope_deg = {slope}') + 'method = "local"\n'
+    text = (
+        text.replace('"pile"', f'"pile"\nslope_deg = {slope}')
+        + '[method]\nkind = "local"\n'
+    )
     text = text.replace("cells_per_face = 20", 'model = "flat"')
     (scene,) = study.parse(text, name="plane", where="test").scenes
     exact = closed_form(scene).friction_velocity
@@ -211,6 +220,7 @@ method.flow.model = "flat"
 [threshold]
 fractions = [0.1, 0.3]
 [method.grains]
+stiffness = 1e3
 load_increment = 0.05
 waiting_time = 6.0
 time_step = 0.3
@@ -220,12 +230,10 @@ final_fraction = 0.5
 """
 MIXED = """
 grain = { diameter = 1e-3, density = 2650.0, sizes = { sigma_g = 1.25 } }
-method.grains.stiffness = 1e3
 bed = { kind = "pile", slope_deg = 15.0, height = 0.006, packing = "poured", poured_depth = 3.0 }
 """
 STRIP = """
 grain = { diameter = 1e-3, density = 2650.0 }
-method.grains.stiffness = 1e3
 [bed]
 kind = "pile"
 shape = "flat"
@@ -234,9 +242,6 @@ length = 0.004
 packing = "poured"
 poured_depth = 3.0
 width = 3.0
-
-[method.grains]
-mobile_layers = 1
 """
 """A poured pile and a strip: all that is asserted of them holds for each of the seeds 0
 to 11, which were tried."""
@@ -251,6 +256,7 @@ def mixed(tmp_path_factory: pytest.TempPathFactory) -> Results:
 @pytest.fixture(scope="module")
 def strip(tmp_path_factory: pytest.TempPathFactory) -> Results:
     text = STUDY.format(fields=STRIP, methods=["pivot", "dem"])
+    text += '"method.grains.mobile_layers" = [1]\n'
     return small_study.run(tmp_path_factory.mktemp("strip"), text)
 
 
@@ -299,7 +305,7 @@ def test_each_method_answers_on_one_shared_bed(
     assert len({id(pile.packing) for pile in results.plan.piles.values()}) == 1
     made = results.tables
     rows = made["pile_threshold"].merge(
-        made["scenes"][["scene_id", "method"]], on="scene_id"
+        made["methods"][["scene_id", "method"]], on="scene_id"
     )
     early = rows[rows["fraction"] == 0.1].set_index("method")["shields"]
     assert set(early.index) == {

@@ -160,8 +160,7 @@ def test_each_grain_of_a_lattice_bears_the_stress_of_its_own_bed() -> None:
     # by peeling a grain waits for those before it, and needs no more flow once they have gone; the
     # grain of the crest and that of the foot have another share of the bed
     assert answers["peeling"].max() == pytest.approx(exact, rel=0.05)
-    gusts = 'model = "flat", gusts = { intensity = 0.4, events = 100 }'
-    text = (PILE % "pivot").replace('model = "flat"', gusts)
+    text = PILE % "pivot" + "flow.gusts = { intensity = 0.4, events = 100 }\n"
     (gusty,) = parse(text, name="a", where="a").scenes
     ratio = Geometry(gusty).loads(Path()).alone() / answers["pivot"]
     assert ratio == pytest.approx(1 / math.sqrt(peak_over_mean(0.4, 100)), rel=1e-6)

@@ -21,12 +21,13 @@ from tests.bed.test_line import bed as bed_of
 PILE = """
 grain = { diameter = 1e-3 }
 method.flow.expansion_ratio = 1.4
-method.grains = { stiffness = 1e3, mobile_layers = 1 }
 bed = { kind = "pile", slope_deg = 25.0, height = 0.01, roughness = "d/30" }
 [threshold]
 fractions = [0.25, 0.5, 0.75]
 
 [method.grains]
+stiffness = 1e3
+mobile_layers = 1
 load_increment = 0.03
 waiting_time = 6.0
 time_step = 0.3

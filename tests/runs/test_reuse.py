@@ -13,22 +13,28 @@ from orchestrator.study import study
 from tests.small_study import run
 
 TEXT = """
-grain = { diameter = 1e-3, stiffness = 1e3 }
+grain = { diameter = 1e-3 }
+threshold.fractions = [0.1]
+method.kind = "dem"
 forces = { law = "zeng" }
-protocol = { method = "dem", load_increment = 0.1, final_fraction = 0.1, fractions = [0.1] }
 
 [bed]
 kind = "pile"
 slope_deg = 25.0
 height = 0.006
+
+[method.grains]
+stiffness = 1e3
 mobile_layers = 1
+load_increment = 0.1
+final_fraction = 0.1
 
 [[group]]
 name = "waves"
-flow = { model = "waves" }
+method.flow.model = "waves"
 [[group]]
 name = "solved"
-flow = { cells_per_face = 20 }
+method.flow.cells_per_face = 20
 """
 
 
