@@ -21,8 +21,8 @@ from orchestrator.runs.cluster import SYSTEMS, Queue
 from orchestrator.study.units import number, whole_number
 
 if TYPE_CHECKING:
+    from orchestrator.experiments.surfaces import SurfaceStudy
     from orchestrator.pipeline import Finished
-    from orchestrator.study.surfaces import SurfaceStudy
 
 OF_SURFACES = {
     "study": "orchestrator.experiments.surface",
@@ -192,9 +192,10 @@ def _study(options: Namespace) -> int:
     from orchestrator.study.study import load
 
     if options.command in OF_SURFACES:
-        surfaces = import_module("orchestrator.study.surfaces").load(options.source)
-        if surfaces is not None:
-            return _surface(options, surfaces)
+        surfaces = import_module("orchestrator.experiments.surfaces")
+        asked = surfaces.load(options.source)
+        if asked is not None:
+            return _surface(options, asked)
     workers = options.workers
     studies = []
     if "source" in options:

@@ -22,6 +22,7 @@ from orchestrator.bed.raster import geotiff
 from orchestrator.bed.surface import OF_GROUND, Surface
 from orchestrator.experiments.erosion import given_threshold
 from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs
+from orchestrator.experiments.surfaces import SurfaceScene, SurfaceStudy
 from orchestrator.flow.case import SPEED_HEIGHT
 from orchestrator.flow.mesh3 import LEVELS, wind_axes
 from orchestrator.flow.surface_case import SURFACE_STRESS, SurfaceFlowCase
@@ -40,7 +41,6 @@ from orchestrator.study.scene import (
     VISCOUS_CELLS,
     default_first_cell_height,
 )
-from orchestrator.study.surfaces import SurfaceScene, SurfaceStudy
 from orchestrator.types import FloatArray
 
 MOVES = "wind_m_s"

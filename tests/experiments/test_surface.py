@@ -12,9 +12,8 @@ from PIL import Image
 from orchestrator.bed import raster
 from orchestrator.bed.surface import cone
 from orchestrator.cli import main
-from orchestrator.experiments import erosion
+from orchestrator.experiments import erosion, surfaces
 from orchestrator.grains import onset
-from orchestrator.study import surfaces
 
 FILE = """
 title = "A cone in wind from the west"

@@ -317,7 +317,8 @@ def test_a_level_bed_has_no_height(bed: str) -> None:
 
 SOLVERS = """
 import sys
-from orchestrator.study import study, surfaces
+from orchestrator.experiments import surfaces
+from orchestrator.study import study
 for name in study.presets():
     assert (surfaces.load(name) or study.load(name)).scenes
 print(*set(sys.modules) & {"orchestrator.flow", "orchestrator.solvers", "gmsh", "pyvista"})

@@ -10,7 +10,8 @@ from orchestrator.calculator import PARAMETERS
 from orchestrator.calculator.asked import thresholds_and_questions
 from orchestrator.calculator.cli import OPTIONS
 from orchestrator.errors import InputError
-from orchestrator.study import study, surfaces, units
+from orchestrator.experiments import surfaces
+from orchestrator.study import study, units
 from orchestrator.study.source import presets
 
 WATER = "fluid.kind = 'water'\n"

@@ -93,8 +93,8 @@ class SurfaceBed(Part):
     width: Positive | None = None
     """width of an oval's flat top along x, m; by default one height"""
     smoothing_cells: Annotated[float, Field(ge=0.25, le=10)] | None = None
-    """standard deviation over which heights are smoothed, in cells of the flow's mesh; by
-    default 1.25 of a file and 0.5 of a shape"""
+    """standard deviation over which heights are smoothed, in cells of the flow's mesh;
+    by default 1.25 of a file and 0.5 of a shape"""
     roughness: Annotated[float, Field(ge=1e-12, le=10)]
     """roughness length of the bed, m, or a part of the diameter, "d/30" """
     entrainment_angle_deg: float = Field(default=60.0, ge=1, le=60)
@@ -140,8 +140,8 @@ class SurfaceErosion(Part):
     fastest_mile: Annotated[tuple[Wind, ...], List, Field(min_length=1)] = (20.0,)
     """fastest mile of each time between two disturbances, wind at 10 m, m/s"""
     threshold: float | str | None = None
-    """friction velocity of every face, m/s, or a material of AP-42; by default the closed
-    form"""
+    """friction velocity of every face, m/s, or a material of AP-42; by default the
+    closed form"""
     wind: str | None = None
     """wind rose, a CSV file with the columns from_deg, speed_m_s and share"""
 
@@ -165,7 +165,7 @@ class SurfaceScene(Part):
 
     @property
     def is_natural(self) -> bool:
-        """Whether its fluid is another than the paper's, in which nothing is measured."""
+        """Whether its fluid is not the paper's, in which nothing is measured."""
         return (self.fluid.density, self.fluid.viscosity) != PAPER_FLUID[:2]
 
     @property

@@ -8,7 +8,7 @@ import pytest
 from orchestrator.bed.raster import geotiff
 from orchestrator.bed.surface import cone
 from orchestrator.errors import InputError
-from orchestrator.study import surfaces
+from orchestrator.experiments import surfaces
 
 FILE = """
 [fluid]
