@@ -304,69 +304,125 @@ def _cell(row: Mapping[str | None, Any], name: str) -> float:
     return value
 
 
+@dataclass(frozen=True)
+class _Refusal:
+    """How the file of a profile is refused: its place, and the line of each point.
+
+    Without lines the file is refused as a whole: points of a smoothed line are not in it.
+    """
+
+    where: str
+    lines: Sequence[int]
+
+    def at(self, point: int, what: str, remedy: str) -> InputError:
+        """The refusal of a point."""
+        if not self.lines:
+            return self.whole(what, remedy)
+        return InputError(what, f"{self.where}: line {self.lines[point]}", remedy)
+
+    def whole(self, what: str, remedy: str) -> InputError:
+        """The refusal of the whole line."""
+        return InputError(what, self.where, remedy)
+
+
 @cache
 def read_profile(text: str, name: str, where: str, smoothing: float) -> Profile:
     """Read a profile and smooth it.
 
-    The text is CSV with the columns ``x_m`` and ``z_m``; `where` names it in messages. `smoothing`
-    is twice the standard deviation of the Gaussian weights of a mean along x, m; 0 for none. An
-    `InputError` names the line and the remedy.
+    Parameters
+    ----------
+    text
+        CSV with the columns ``x_m`` and ``z_m``.
+    name
+        The name of the file.
+    where
+        The file, for messages.
+    smoothing
+        Twice the standard deviation of the Gaussian weights of a mean along x, m; 0 for none.
+
+    Raises
+    ------
+    InputError
+        With the line and the remedy.
     """
     lines, points = read_columns(text, ("x_m", "z_m"), where)
-    x, z = np.array(points).reshape(-1, 2).T
-
-    def refuse(what: str, remedy: str, point: int | None = None) -> None:
-        place = where if point is None or smoothing else f"{where}: line {lines[point]}"
-        raise InputError(what, place, remedy)
-
-    if len(x) < 3:
-        refuse(f"{len(x)} points make no bed", "write 3 at least")
-    steps, length = np.diff(x), float(np.ptp(x))
-    back, widest, middle = (
-        int(np.argmin(steps > 0)),
-        int(np.argmax(steps)),
-        float(np.median(steps)),
-    )
-    if steps[back] <= 0:
-        what = f"x does not rise to {x[back + 1]:g} m: unsorted, twice the same, or an overhang"
-        refuse(what, "sort the lines by x, with one height for each place", back + 1)
-    if len(x) >= DENSE and steps[widest] > GAP * middle:
-        what = f"a gap of {steps[widest]:g} m after x = {x[widest]:g} m; others are {middle:g} m"
-        refuse(what, "fill it with points", widest + 1)
+    refusal = _Refusal(where, () if smoothing else lines)
+    if len(points) < 3:
+        raise refusal.whole(f"{len(points)} points make no bed", "write 3 at least")
+    x, z = np.array(points).T
+    _check_steps(x, refusal)
     needs = needed_smoothing(x, z)
     more = "give bed.smoothing, a length in m"
     if smoothing:
         more = "raise bed.smoothing"
     elif needs:
         more = f"give bed.smoothing = {needs:g} m"
-    if smoothing > length / 4:
-        refuse(
-            f"smoothing over {smoothing:g} m leaves nothing of {length:g} m",
-            "lower bed.smoothing",
-        )
-    count = length / smoothing * RESOLVED if smoothing else len(x)
-    if count > MOST_CORNERS:
-        refuse(
-            f"{count:.0f} points, more than the {MOST_CORNERS} that a mesh has", more
-        )
+    corners = _count_of_corners(x, smoothing, more, refusal)
     if smoothing:
-        x, z = _smoothed(x, z, smoothing, max(int(np.ceil(count)), DENSE))
+        x, z = _smoothed(x, z, smoothing, max(corners, DENSE))
+    _check_heights(x, z, more, refusal)
+    # to nine digits of the length: means are known no better, and the name of a bed is its corners
+    length = np.ptp(x)
+    xs = tuple(on_grid(x - x[0], length).tolist())
+    zs = tuple(on_grid(z - z[0], length).tolist())
+    lines_of_corners = [f"{a!r},{b!r}" for a, b in zip(xs, zs, strict=True)]
+    digest = digest_text("\n".join(lines_of_corners))
+    return Profile(name, xs, zs, text, digest, needs)
+
+
+def _check_steps(x: FloatArray, refusal: _Refusal) -> None:
+    """Refuse points that do not follow each other along x, and a gap between them."""
+    steps = np.diff(x)
+    back = int(np.argmin(steps > 0))
+    if steps[back] <= 0:
+        place = f"{x[back + 1]:g} m"
+        what = f"x does not rise to {place}: unsorted, twice the same, or an overhang"
+        remedy = "sort the lines by x, with one height for each place"
+        raise refusal.at(back + 1, what, remedy)
+    widest = int(np.argmax(steps))
+    middle = float(np.median(steps))
+    if len(x) >= DENSE and steps[widest] > GAP * middle:
+        gap = f"a gap of {steps[widest]:g} m after x = {x[widest]:g} m"
+        what = f"{gap}; others are {middle:g} m"
+        raise refusal.at(widest + 1, what, "fill it with points")
+
+
+def _count_of_corners(
+    x: FloatArray, smoothing: float, more: str, refusal: _Refusal
+) -> int:
+    """The number of corners of a line; `more` is the remedy if these are too many."""
+    length = float(np.ptp(x))
+    count = float(len(x))
+    if smoothing:
+        count = length / smoothing * RESOLVED
+    if smoothing > length / 4:
+        what = f"smoothing over {smoothing:g} m leaves nothing of {length:g} m"
+        raise refusal.whole(what, "lower bed.smoothing")
+    if count > MOST_CORNERS:
+        what = f"{count:.0f} points, more than the {MOST_CORNERS} that a mesh has"
+        raise refusal.whole(what, more)
+    return int(np.ceil(count))
+
+
+def _check_heights(x: FloatArray, z: FloatArray, more: str, refusal: _Refusal) -> None:
+    """Refuse a line that is level or too steep; `more` is the remedy against noise."""
     if np.ptp(z) == 0:
-        refuse(
-            "level: it has no height to measure by",
-            'ask for shape = "flat" with a height',
-        )
+        what = "level: it has no height to measure by"
+        raise refusal.whole(what, 'ask for shape = "flat" with a height')
     slopes = np.degrees(np.arctan2(np.diff(z), np.diff(x)))
     steep = int(np.argmax(np.abs(slopes)))
     if abs(slopes[steep]) > STEEPEST_DEG:
-        what = f"{slopes[steep]:.0f} deg at x = {x[steep]:g} m, above {STEEPEST_DEG:g}"
-        refuse(what, f"{more}; check that x and z are both in m", steep + 1)
-    # to nine digits of the length: means are known no better, and the name of a bed is its corners
-    xs, zs = (
-        tuple(on_grid(values - values[0], np.ptp(x)).tolist()) for values in (x, z)
-    )
-    corners = "\n".join(f"{a!r},{b!r}" for a, b in zip(xs, zs, strict=True))
-    return Profile(name, xs, zs, text, digest_text(corners), needs)
+        slope = f"{slopes[steep]:.0f} deg at x = {x[steep]:g} m"
+        what = f"{slope}, above {STEEPEST_DEG:g}"
+        remedy = f"{more}; check that x and z are both in m"
+        raise refusal.at(steep + 1, what, remedy)
+
+
+def _turned_about_ends(values: FloatArray) -> FloatArray:
+    """Coordinates that go on beyond both ends of a line, turned about these."""
+    before = 2 * values[0] - values[:0:-1]
+    behind = 2 * values[-1] - values[-2::-1]
+    return np.concatenate([before, values, behind])
 
 
 def _smoothed(
@@ -374,12 +430,10 @@ def _smoothed(
 ) -> tuple[FloatArray, FloatArray]:
     """Weighted means at the ends of `count` equal steps."""
     # beyond its ends the line goes on as turned about them: they stay where they are
-    around, heights = (
-        np.concatenate([2 * v[0] - v[:0:-1], v, 2 * v[-1] - v[-2::-1]]) for v in (x, z)
-    )
-    share = np.gradient(
-        around
-    )  # each point stands for the bed half-way to its neighbours
+    around = _turned_about_ends(x)
+    heights = _turned_about_ends(z)
+    # each point stands for the bed half-way to its neighbours
+    share = np.gradient(around)
     places = np.linspace(x[0], x[-1], count + 1)
     first, last = np.searchsorted(around, [places - 2 * length, places + 2 * length])
     means = np.interp(places, x, z)

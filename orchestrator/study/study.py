@@ -299,13 +299,27 @@ def parse(text: str, *, name: str, where: str, files: Files | None = None) -> St
     if files is None:
         files = Files(Path(where).parent)
     files.carried = dict(file.profiles)
-    groups_of_file = file.group or (_Group(),)
+    return Study(
+        name=name,
+        title=file.title or name,
+        groups=_groups(file, where, files),
+        time_limit_s=file.time_limit,
+        tolerance=file.tolerance,
+        cluster=file.cluster,
+        erosion=file.erosion,
+        text=text + files.added,
+    )
+
+
+def _groups(file: _File, where: str, files: Files) -> tuple[Group, ...]:
+    """The groups of a study with their scenes, the force law of each decided."""
+    tables_of = file.group or (_Group(),)
     places = [where]
     if file.group:
         places = [_place(where, number) for number in range(len(file.group))]
     listed: list[list[Scene]] = []
     count = 0
-    for group, place in zip(groups_of_file, places, strict=True):
+    for group, place in zip(tables_of, places, strict=True):
         axes = _axes(file, group, place)
         count += math.prod(map(len, axes.values()))
         if count > MOST_SCENES:
@@ -316,25 +330,15 @@ def parse(text: str, *, name: str, where: str, files: Files | None = None) -> St
             tables[part] |= table
         listed.append([*_scenes(tables, axes, place, files)])
     # force laws are found for the scenes of all groups at once
-    laws = [*resolved([*itertools.chain(*listed)])]
+    laws = resolved([*itertools.chain(*listed)])
     groups = []
-    first = 0
-    for number, group in enumerate(groups_of_file):
-        last = first + len(listed[number])
-        scenes = tuple(itertools.chain(*laws[first:last]))
-        name_of_group = group.name or f"group {number + 1}"
-        groups.append(Group(name_of_group, scenes, places[number]))
-        first = last
-    return Study(
-        name=name,
-        title=file.title or name,
-        groups=tuple(groups),
-        time_limit_s=file.time_limit,
-        tolerance=file.tolerance,
-        cluster=file.cluster,
-        erosion=file.erosion,
-        text=text + files.added,
-    )
+    for number, group in enumerate(tables_of):
+        scenes: list[Scene] = []
+        for _ in listed[number]:
+            scenes += next(laws)
+        name = group.name or f"group {number + 1}"
+        groups.append(Group(name, tuple(scenes), places[number]))
+    return tuple(groups)
 
 
 def _place(where: str, group: int) -> str:
