@@ -62,6 +62,8 @@ KINDS = {
 """Kinds of scenes, and the level of each."""
 CONTRACT = "## Write a solver\n"
 """Heading in docs/benchmark.md with which the contract for solvers begins."""
+AFTER_CONTRACT = "## Where to go next\n"
+"""Heading behind the contract: its links lead nowhere from a pack."""
 _DECIMAL = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 """A number as programs print it: Python would take 1_000 and other scripts, too."""
 _IN_SCENES = re.compile(
@@ -530,12 +532,12 @@ def contract() -> str:
     Returns
     -------
     str
-        The page from its section "Write a solver" on.
+        The page from its section "Write a solver" to the links at its end.
     """
     inside = PACKAGE / "docs"
     folder = inside if inside.is_dir() else PACKAGE.parent / "docs"
     page = (folder / "benchmark.md").read_text(encoding="utf-8")
-    return page[page.index(CONTRACT) :]
+    return page[page.index(CONTRACT) : page.index(AFTER_CONTRACT)]
 
 
 def _readme(programs: Mapping[str, str]) -> str:

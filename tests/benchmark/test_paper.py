@@ -89,7 +89,7 @@ def test_it_is_called_a_table_and_no_pack() -> None:
         InputError, match=r"a table of expected answers, and no pack.*README"
     ):
         pack.read(FOLDER)
-    for page in ("README.md", "docs/README.md", "docs/benchmark.md"):
+    for page in ("docs/README.md", "docs/benchmark.md"):
         text = (ROOT / page).read_text(encoding="utf-8")
         (line,) = (
             line for line in text.splitlines() if "benchmark/paper/README.md" in line
