@@ -29,6 +29,7 @@ DUNE = f"""
 fluid = {{ density = 1.22, viscosity = 1.48e-5 }}
 grain = {{ diameter = 3e-4, density = 2650.0 }}
 bed = {{ kind = "pile", profile = "dune.csv", smoothing = 0.8, roughness = 1e-5 }}
+threshold.criterion = "leaves"
 method.flow.expansion_ratio = 1.2
 [[group]]
 [[group]]
