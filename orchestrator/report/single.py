@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from orchestrator.physics.beside import FIELD
+from orchestrator.physics.beside import FIELD, GOES_ON
 from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.report.card import Card, Number, Worth, decimals
 from orchestrator.report.subjects import (
@@ -47,7 +47,11 @@ def card(row: Row, holding: Mapping[str, float]) -> Card:
     """
     told = quantity(row)
     size = length(float(row["d_m"]))
-    ending = " and go on" if isinstance(row.get("decides"), str) else ""
+    # rows of `threshold` have no column for the criterion, and this one for grains that
+    # go on alone
+    goes_on = row.get("criterion", GOES_ON) == GOES_ON
+    is_decided = isinstance(row.get("decides"), str)
+    ending = " and go on" if goes_on and is_decided else ""
     return Card(
         f"At which {told.flow} does a grain of {size} start to move{ending}?",
         _scene_of_grain(row),
