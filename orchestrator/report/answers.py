@@ -88,13 +88,23 @@ def _of_beds(results: Results) -> Card:
     rows = results.exemplars
     if rows.empty:
         rows = results.at_fraction.assign(seeds=1, of_seeds=1)
-    keys = labels.varying(rows, "fraction")
-    if len(rows[keys].drop_duplicates()) > 1 and len(rows) > 1:
+    if are_several_beds(rows):
         return _of_several(rows, results)
     row = rows.iloc[0]
     if sheets.sizes(results) is not None:
         return _of_mixture(row, results)
     return _of_bed(row, results)
+
+
+def are_several_beds(rows: pd.DataFrame) -> bool:
+    """Whether thresholds are of beds that differ in more than the share that moves."""
+    return len(rows[labels.varying(rows, "fraction")].drop_duplicates()) > 1
+
+
+def is_one_grain(grains: pd.DataFrame) -> bool:
+    """Whether thresholds of single grains are those of one grain."""
+    questions = [*LEVEL_GRAIN, "force_law", "depth_m"]
+    return len(grains[questions].drop_duplicates()) == 1
 
 
 def _of_bed(row: pd.Series, results: Results) -> Card:
@@ -428,8 +438,7 @@ def measured_of_size(row: pd.Series, size: float) -> float:
 
 def _of_grains(grains: pd.DataFrame) -> Card:
     """The card of one grain, or of several."""
-    questions = [*LEVEL_GRAIN, "force_law", "depth_m"]
-    if len(grains[questions].drop_duplicates()) == 1:
+    if is_one_grain(grains):
         return _of_grain(grains.iloc[0])
     told = sheets.quantity(grains)
     usable = grains[valid(grains)]

@@ -138,10 +138,9 @@ def of(results: Results) -> Head | None:
         return None
     row = rows.iloc[0]
     pile = results.plan.piles[str(row["scene_id"])]
-    is_one = len(rows[labels.varying(rows, "fraction")].drop_duplicates()) == 1
     has_place = row["first_ustar0_m_s"] > 0 and not single.is_level(row)
     is_line = has_place and not pile.bed.is_triangle
-    if is_one and is_line:
+    if is_line and not answers.are_several_beds(rows):
         return _along(row, pile, results)
     return None
 
@@ -165,7 +164,7 @@ def below(results: Results) -> Head | None:
     row = rows.iloc[0]
     if sheets.sizes(results) is not None:
         return _sizes(row, results)
-    if len(rows[labels.varying(rows, "fraction")].drop_duplicates()) > 1:
+    if answers.are_several_beds(rows):
         return _sweep(rows)
     return _shares(row, results)
 
@@ -417,8 +416,7 @@ def _moved(x: Any, y: Any, has_moved: Any) -> tuple[Any, Any]:
 
 def _of_grains(grains: pd.DataFrame) -> Head | None:
     """Of one grain the laws and the sizes, of several the curves of a sweep."""
-    questions = [*LEVEL_GRAIN, "force_law", "depth_m"]
-    if len(grains[questions].drop_duplicates()) == 1:
+    if answers.is_one_grain(grains):
         return _of_grain(grains.iloc[0])
     return _sweep(grains)
 
