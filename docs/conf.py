@@ -1,4 +1,8 @@
-"""The settings of Sphinx for `make docs`: the Markdown of the repository as a site."""
+"""The settings of Sphinx for `make docs`: the Markdown of the repository as a site.
+
+The page `docs/functions.md` has a table of modules; in the site the functions of each
+follow it, as their docstrings describe them.
+"""
 
 import re
 from pathlib import Path
@@ -11,9 +15,14 @@ from sphinx.writers.html5 import HTML5Translator
 project = "orchestrator"
 author = "the maintainers of orchestrator"
 copyright = author
-extensions = ["myst_parser"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+napoleon_use_ivar = True
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
 root_doc = "README"
-include_patterns = ["README.md", "CHANGELOG.md", "docs/*.md", "**/README.md"]
+include_patterns = ["*.md", "docs/*.md", "**/README.md"]
 exclude_patterns = ["results", "site", ".*"]
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4
@@ -25,6 +34,7 @@ html_copy_source = False
 html_show_copyright = False
 
 ROOT = Path(__file__).parents[1]
+FUNCTIONS = "docs/functions"
 
 
 def setup(app: Sphinx) -> None:
@@ -44,9 +54,13 @@ def _block(writer: HTML5Translator, node: nodes.math_block) -> None:
 
 
 def _with_contents(_: Sphinx, name: str, source: list[str]) -> None:
-    """Give the first page the pages of the index, part by part."""
+    """Give the first page the index, and the page of functions their docstrings."""
     if name == root_doc:
         source[0] += "\n\n" + "\n\n".join(_parts())
+    if name == FUNCTIONS:
+        modules = re.findall(r"(?m)^\| `(orchestrator[.\w]*)` \|", source[0])
+        before, title, after = source[0].partition("## Where to go next")
+        source[0] = "\n\n".join([before, *map(_functions, modules), title + after])
 
 
 def _parts() -> list[str]:
@@ -65,4 +79,18 @@ def _tree(title: str, pages: list[str]) -> str:
     listed = [str((ROOT / "docs" / page).resolve().relative_to(ROOT)) for page in pages]
     return "\n".join(
         ["```{toctree}", ":hidden:", f":caption: {title}", "", *listed, "```"]
+    )
+
+
+def _functions(module: str) -> str:
+    """The section of the functions of a module."""
+    return "\n".join(
+        [
+            f"## {module}",
+            "",
+            "```{eval-rst}",
+            f".. automodule:: {module}",
+            "   :members:",
+            "```",
+        ]
     )

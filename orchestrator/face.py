@@ -102,15 +102,24 @@ def threshold(
     -------
     DataFrame
         A row for each point of the raveled arrays, or for each point and law, with
-        units in
-    the columns' names; ``valid`` and ``why_not`` say where a law ends. A number that is
-    usual in another unit is asked about in a warning.
+        units in the columns' names; ``valid`` and ``why_not`` say where a law ends.
+        A number that is usual in another unit is asked about in a warning.
 
     Raises
     ------
     InputError
         For a point that is no scene, a law or criterion that is none, or if no law
         holds at any point.
+
+    Examples
+    --------
+    Two sizes of grains on a level bed in the paper's fluid:
+
+    >>> rows = threshold([2e-4, 1e-3])
+    >>> rows["law"].tolist()
+    ['bridged', 'bridged']
+    >>> rows["shields"].round(4).tolist()
+    [0.0272, 0.0323]
     """
     given: dict[str, Any] = {"diameter": diameter, **parameters}
     for name, values in given.items():

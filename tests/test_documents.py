@@ -2,6 +2,7 @@
 
 import copy
 import re
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,9 @@ PAGES = [
     ROOT / "README.md",
     *sorted((ROOT / "docs").glob("*.md")),
     *sorted(ROOT.glob("*/*/README.md")),
+    *sorted(ROOT.glob("templates/*/*/README.md")),
+    ROOT / "CONTRIBUTING.md",
+    ROOT / "CHANGELOG.md",
 ]
 
 
@@ -28,6 +32,33 @@ def test_the_citation_and_the_index_follow() -> None:
     index = (ROOT / "docs" / "README.md").read_text(encoding="utf-8")
     pages = sorted(path.name for path in (ROOT / "docs").glob("*.md"))
     assert [name for name in pages if f"({name})" not in index] == ["README.md"]
+
+
+def test_the_index_has_every_page_that_a_page_links() -> None:
+    """A link to a page that the site lacks stops `make docs`."""
+    index = ROOT / "docs" / "README.md"
+    listed = {ROOT / "README.md", index, *_linked(index)}
+    pages = [page for page in PAGES if not page.is_relative_to(ROOT / "orchestrator")]
+    found = {goal for page in pages for goal in _linked(page)}
+    assert sorted(found - listed) == []
+    assert sorted(set(pages) - listed) == []
+
+
+def _linked(page: Path) -> set[Path]:
+    """The pages that a page links."""
+    text = page.read_text(encoding="utf-8")
+    names = re.findall(r"\]\(([^)#:\s]+\.md)(?:#[^)\s]*)?\)", text)
+    return {(page.parent / name).resolve() for name in names}
+
+
+def test_the_page_of_functions_has_every_module_of_the_physics() -> None:
+    text = (ROOT / "docs" / "functions.md").read_text(encoding="utf-8")
+    listed = re.findall(r"(?m)^\| `(orchestrator[.\w]*)` \|", text)
+    assert [name for name in listed if not import_module(name).__doc__] == []
+    modules = {path.stem for path in (ROOT / "orchestrator/physics").glob("[a-z]*.py")}
+    # numbers alone, and the columns of tables
+    modules -= {"constants", "beside"}
+    assert modules <= {name.rpartition(".")[2] for name in listed}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
