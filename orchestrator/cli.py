@@ -12,7 +12,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from orchestrator import __version__
+from orchestrator import __version__, examples
 from orchestrator.benchmark import cli as benchmark
 from orchestrator.calculator import cli as calculator
 from orchestrator.errors import Fault, InputError, of_exception
@@ -32,17 +32,17 @@ OF_SURFACES = {
 
 
 COMMANDS = {
-    "study": "run what is missing of a study, and draw it",
-    "status": "what of a study is done, running, failed and why",
-    "report": "draw tables, figures and page of a study again",
-    "gallery": "one page over the studies that a directory holds",
+    "study": "run the missing cases of a study, and write its page",
+    "status": "list the cases that are done, running or failed, and why",
+    "report": "write tables, figures and page of a study again",
+    "gallery": "write one page over the studies in a directory",
     "prune": "drop the large files of finished cases; a rerun makes them anew",
-    "ladder": "what each model costs and how far it is off",
-    "budget": "what the choices are worth that all models share",
-    "stability": "for developers: maps of where each method fails",
-    "validate": "the models beside what was measured",
-    "erosion": "what wind takes from a stockpile, by its solved flow and by AP-42",
-    "doctor": "are the solvers here, can it draw; what to install",
+    "ladder": "measure the cost and the error of each fidelity",
+    "budget": "measure how much each assumption changes a threshold",
+    "stability": "draw maps of where each method fails; for developers",
+    "validate": "compare the models with measured thresholds",
+    "erosion": "compute what wind takes from a stockpile, also by AP-42",
+    "doctor": "check solvers and drawing, and say what to install",
 }
 """Commands that this module adds, with what each does."""
 RUNNING = {
@@ -84,7 +84,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     warnings.showwarning = lambda message, *_, **__: _say(f"warning: {message}")
     # PYTHONWARNINGS=error is about libraries: a message of this program ends no command
     warnings.simplefilter("default", UserWarning)
-    options = _parser().parse_args(sys.argv[1:] if arguments is None else arguments)
+    options = parser().parse_args(sys.argv[1:] if arguments is None else arguments)
     try:
         if getattr(options, "workers", 1) < 1:
             raise InputError("at least 1", "--workers")
@@ -111,7 +111,17 @@ class _Parser(argparse.ArgumentParser):
     """A parser that names the nearest option in place of an unknown one."""
 
     def __init__(self, **settings: Any) -> None:
-        super().__init__(**{**settings, "allow_abbrev": False})
+        form = argparse.RawDescriptionHelpFormatter
+        fixed = {"allow_abbrev": False, "formatter_class": form}
+        super().__init__(**{**settings, **fixed})
+
+    def format_help(self) -> str:
+        """The help with examples of the command, and its page, at its end."""
+        _, _, command = self.prog.partition(" ")
+        text = super().format_help()
+        if command not in examples.SHOWN:
+            return text
+        return f"{text}\n{examples.shown(command)}\n"
 
     def parse_known_args(self, args: Any, namespace: Any = None) -> Any:  # type: ignore[override]
         """Refuse an unknown option first: another may be missing because of it."""
@@ -131,12 +141,18 @@ class _Parser(argparse.ArgumentParser):
             self.error(f"there is no option {name}: {advice}")
 
 
-def _parser() -> argparse.ArgumentParser:
-    """The parser of all commands."""
+def parser() -> argparse.ArgumentParser:
+    """Make the parser of all commands.
+
+    Returns
+    -------
+    ArgumentParser
+        The parser.
+    """
     about = "When does a sediment grain, or a whole bedform of grains, start to move?"
-    parser = _Parser(prog="orchestrator", description=about)
-    parser.add_argument("--version", action="version", version=__version__)
-    commands = parser.add_subparsers(required=True, metavar="command")
+    made = _Parser(prog="orchestrator", description=about)
+    made.add_argument("--version", action="version", version=__version__)
+    commands = made.add_subparsers(required=True, metavar="command")
     for name, text in COMMANDS.items():
         command = commands.add_parser(name, help=text)
         run = _study if name in RUNNING else _other
@@ -144,37 +160,43 @@ def _parser() -> argparse.ArgumentParser:
         if name in RUNNING:
             _add_run_options(command, RUNNING[name])
         elif name != "doctor":
-            command.add_argument("directory", type=Path, metavar="DIR")
+            text = "directory of a study, such as results/first-look"
+            if name == "gallery":
+                text = "directory that holds studies, such as results"
+            command.add_argument("directory", type=Path, metavar="DIR", help=text)
         if name == "report":
-            text = "draw the figures too that it folds away"
+            text = "draw the folded figures too"
             command.add_argument("--all", action="store_true", help=text)
         if name == "study":
             _add_study_options(command)
             calculator.add(commands)
     benchmark.add(commands)
-    return parser
+    return made
 
 
 def _add_run_options(command: argparse.ArgumentParser, preset: str) -> None:
     """Add the options of a command that runs cases, on a study if it has a preset."""
     add = command.add_argument
     if preset:
-        add("source", nargs="?", default=preset, metavar="FILE|PRESET")
-    add("--out", type=Path, metavar="DIR", help="default: results/NAME")
+        text = f"study file, or name of a preset; default: {preset}"
+        add("source", nargs="?", default=preset, metavar="FILE|PRESET", help=text)
+    text = "directory of the results; default: results/ and the name of the "
+    text += "file" if preset == "first-look" else "command"
+    add("--out", type=Path, metavar="DIR", help=text)
     count = os.cpu_count() or 1
-    text = "cases at a time"
+    text = "number of cases at a time; default: one for each processor"
     add("--workers", type=whole_number, default=count, metavar="N", help=text)
-    text = "say what would run, how long, and end"
+    text = "list what would run, with time and disk, and end"
     add("--plan", action="store_true", help=text)
 
 
 def _add_study_options(command: argparse.ArgumentParser) -> None:
     """Add the options of the command that runs a study."""
-    text = "the cheapest models known to be within"
-    text = f"error that tau_c may have, such as 0.05: {text}"
+    text = "accepted relative error of a threshold, such as 0.05; the fastest models "
+    text += "known to be within it are taken"
     command.add_argument("--tolerance", type=number, metavar="X", help=text)
-    text = "settings in the file's [cluster]"
-    text = f"run the cases in jobs of a queue: %(choices)s; {text}"
+    text = "run the cases in jobs of a queue: %(choices)s; its settings stand in the "
+    text += "table [cluster] of the file"
     queues = sorted(SYSTEMS)
     command.add_argument("--cluster", choices=queues, metavar="QUEUE", help=text)
 

@@ -3,12 +3,14 @@
 import errno
 import os
 import re
+import shlex
 import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
 
+from orchestrator import cli, examples
 from orchestrator.errors import LONGEST, Fault, InputError, of_exception
 from tests.conftest import Command
 
@@ -43,6 +45,29 @@ def imitation(folder: Path, script: str) -> str:
 def grains(tmp_path: Path) -> str:
     (tmp_path / "grains.toml").write_text(GRAINS)
     return "grains.toml"
+
+
+def test_the_help_of_each_command_has_two_examples_and_its_page(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    parts = ["export", "run", "compare"]
+    commands = [*cli.COMMANDS, "threshold", "benchmark"]
+    commands += [f"benchmark {part}" for part in parts]
+    assert sorted(commands) == sorted(examples.SHOWN)
+    for command in commands:
+        with pytest.raises(SystemExit):
+            cli.main([*command.split(), "--help"])
+        text = capsys.readouterr().out
+        lines = re.findall(r"(?m)^  orchestrator (.+)$", text)
+        assert len(lines) == 2, command
+        for line in lines:
+            assert line.startswith(command)
+            words = shlex.split(line.partition(" > ")[0])
+            cli.parser().parse_args(words)  # it ends the program where words are wrong
+        (page,) = re.findall(r"(?m)^explained in (\S+)$", text)
+        name = command.split()[0]
+        page_text = (Path(__file__).parents[1] / page).read_text(encoding="utf-8")
+        assert re.search(rf"orchestrator {name}|`{name}[ `]", page_text), command
 
 
 def test_a_study_of_single_grains_and_the_same_again(

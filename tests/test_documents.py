@@ -11,7 +11,7 @@ import nbformat
 import pytest
 
 import orchestrator
-from orchestrator import __version__, plan
+from orchestrator import __version__, cli, plan
 from orchestrator.study import study
 from tests.conftest import Command
 
@@ -42,6 +42,19 @@ def test_the_index_has_every_page_that_a_page_links() -> None:
     found = {goal for page in pages for goal in _linked(page)}
     assert sorted(found - listed) == []
     assert sorted(set(pages) - listed) == []
+
+
+def test_the_page_of_commands_has_every_command_and_preset() -> None:
+    text = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+    assert [name for name in cli.COMMANDS if f"| `{name}" not in text] == []
+    presets = {path.stem for path in (ROOT / "orchestrator").glob("*/presets/*.toml")}
+    _, listed = text.split("## Presets")
+    named = {
+        name
+        for row in re.findall(r"(?m)^\| (`.+?) \|", listed)
+        for name in re.findall(r"`([\w-]+)`", row)
+    }
+    assert presets == named - {"erosion"}
 
 
 def _linked(page: Path) -> set[Path]:

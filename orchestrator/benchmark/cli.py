@@ -81,7 +81,7 @@ def _add_run(parts: Any) -> None:
 
 
 def _add_compare(parts: Any) -> None:
-    text = "the same for answers that are there already"
+    text = "compare answers that are there already"
     command = _part(parts, "compare", text, "PACK RESULTS ...")
     command.set_defaults(run=_judge)
     _add_scenes(command)

@@ -22,12 +22,10 @@ FORM = (
     "write a number in SI units, or FIRST:LAST:COUNT such as 1e-4:2e-3:20; "
     "a z0 may be d/30"
 )
-RANGES = (
-    "Any number may be a range FIRST:LAST:COUNT, such as --diameter 1e-4:2e-3:20, "
-    "for a table; several ranges give every combination. Diameter, viscosity, "
-    "roughness and depth are spaced geometrically, all others evenly. "
-    "A fluid below 100 kg/m3 is a gas."
-)
+RANGES = """\
+Any number may be a range FIRST:LAST:COUNT, such as --diameter 1e-4:2e-3:20, for a
+table; several ranges give every combination. Diameter, viscosity, roughness and
+depth are spaced geometrically, all others evenly. A fluid below 100 kg/m3 is a gas."""
 LAW_HELP = (
     "force law of the answer; default: bridged, or bridged-gravel where the drag law "
     "of bridged ends; paper: Eq. 2 or 4 where each holds"
@@ -47,7 +45,7 @@ def add(commands: Any) -> None:
     commands
         The subparsers of the program, as `argparse` makes them.
     """
-    about = "when one grain starts to move, closed form, at once"
+    about = "compute when one grain starts to move, closed form, at once"
     command = commands.add_parser("threshold", help=about, epilog=RANGES)
     for name in PARAMETERS:
         command.add_argument(
