@@ -18,7 +18,7 @@ from orchestrator.benchmark import judge, pack, page
 from orchestrator.benchmark.export import Ours
 from orchestrator.benchmark.judge import ANSWER, ANSWER_BYTES, MIB, OURS, USED, name_of
 from orchestrator.benchmark.pack import Pack
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, printable
 from orchestrator.runs import process, workspace
 from orchestrator.runs.files import Folder, opened, read_json, text_of
 from orchestrator.tables import csv as text_of_table
@@ -196,6 +196,7 @@ def compare(
             remedy = "run one with another --name, or rename its directory"
             raise InputError(f"two solvers have the name {solver}", "RESULTS", remedy)
         _check_pack(place, chosen)
+    notes = [note for place in results for note in _of_unknown_pack(place, chosen)]
     about = workspace.read_marker(results[0], workspace.RESULTS)
     is_of_run = len(results) == 1 and about.get("kind") == workspace.RESULTS.word
     if out is None and is_of_run:
@@ -210,7 +211,7 @@ def compare(
     with workspace.claimed(out, kind, name) as folder:
         if kind == workspace.COMPARISON:
             _note_pack(folder, chosen)
-        return _written(chosen, judged, folder)
+        return _written(chosen, judged, folder, notes)
 
 
 def _check_pack(place: Path, chosen: Pack) -> None:
@@ -223,6 +224,23 @@ def _check_pack(place: Path, chosen: Pack) -> None:
         remedy = "run the solver on this one with --out"
         remedy = f"compare them with the pack that they answer, or {remedy}"
         raise InputError(what, where=str(place), remedy=remedy)
+
+
+def _of_unknown_pack(place: Path, chosen: Pack) -> list[str]:
+    """Say that nothing tells which pack answers belong to, unless `run` wrote them."""
+    if "pack" in workspace.read_marker(place, workspace.RESULTS):
+        return []
+    solver = name_of(place)
+    name = printable(chosen.root.name)
+    text = (
+        f"{solver}: nothing in its directory tells which pack was answered, as "
+        f"“benchmark run” notes it; the answers are taken for answers to “{name}”"
+    )
+    scenes = {answer.parent.name for answer in place.glob(f"*/{ANSWER}")}
+    others = scenes - {*chosen.scenes}
+    if others:
+        text = f"{text}, which has no scene for {len(others)} of {len(scenes)} of them"
+    return [text]
 
 
 def _note_pack(folder: Folder, chosen: Pack) -> None:
@@ -333,7 +351,10 @@ def _solve(
 
 
 def _written(
-    chosen: Pack, judged: tuple[pd.DataFrame, pd.DataFrame], folder: Folder
+    chosen: Pack,
+    judged: tuple[pd.DataFrame, pd.DataFrame],
+    folder: Folder,
+    notes: Sequence[str] = (),
 ) -> Outcome:
     """Put tables, figures and page of a comparison into a directory."""
     numbers, verdicts = judged
@@ -342,7 +363,7 @@ def _written(
         of_theirs = numbers[numbers["solver"] != OURS]
         folder.put(NUMBERS, text_of_table(_solver_first(of_theirs), "%.9g"))
         folder.put(VERDICTS, text_of_table(_solver_first(theirs), "%.6g"))
-        page.write(chosen, numbers, verdicts, folder)
+        page.write(chosen, numbers, verdicts, folder, notes)
     lines = []
     for row in judge.failures(theirs).itertuples():
         lines.append(f"{row.solver}: {row.scenes}: {row.why}")
@@ -350,7 +371,7 @@ def _written(
         lines[LISTED:] = [f"and {len(lines) - LISTED} more: see {VERDICTS}"]
     table = judge.summary(theirs).dropna(axis=1, how="all")
     text = table.to_string(index=False, na_rep="", float_format="{:.3g}".format)
-    summary = "\n".join([text, *judge.in_words(theirs)])
+    summary = "\n".join([text, *notes, *judge.in_words(theirs)])
     return Outcome(lines, summary, folder.root / page.PAGE)
 
 

@@ -85,7 +85,11 @@ AXES: dict[str, tuple[str, str, Look]] = {
 
 
 def write(
-    chosen: Pack, numbers: pd.DataFrame, verdicts: pd.DataFrame, folder: Folder
+    chosen: Pack,
+    numbers: pd.DataFrame,
+    verdicts: pd.DataFrame,
+    folder: Folder,
+    notes: Sequence[str] = (),
 ) -> None:
     """Put the page and its figures into a directory.
 
@@ -97,6 +101,8 @@ def write(
         The tables of `judge.judge`.
     folder
         The directory.
+    notes
+        What is said of the answers before the verdicts.
     """
     theirs = verdicts[verdicts["solver"] != OURS]
     scenes = theirs[[*SHOWN]].assign(
@@ -109,7 +115,7 @@ def write(
         # the name of a solver may have letters that the font has not
         warnings.filterwarnings("ignore", "Glyph .* missing from font")
         beds = _beds(numbers, theirs) + _shields(chosen, numbers)
-        said = "\n\n".join(judge.in_words(theirs))
+        said = "\n\n".join([*notes, *judge.in_words(theirs)])
         sections = [
             Section("", said, (), (judge.summary(theirs),), card=_card(theirs)),
             Section("What failed", tables=(judge.failures(theirs),)),

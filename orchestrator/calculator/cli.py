@@ -170,13 +170,15 @@ def values(name: str, text: str) -> list[Value]:
         raise InputError(what, OPTIONS[name], FORM)
     import numpy as np  # a single number is answered without
 
+    from orchestrator import digits
+
     if name in GEOMETRIC and first > 0:
         spaced = np.geomspace(first, last, int(count)).tolist()
     else:
         spaced = np.linspace(first, last, int(count)).tolist()
     if is_part:
-        return [f"d/{1 / part:.12g}" for part in spaced]
-    return [*spaced]
+        return [f"d/{digits.FORMAT % (1 / part)}" for part in spaced]
+    return [digits.rounded(value) for value in spaced]
 
 
 def _end(text: str, is_part: bool) -> float:

@@ -34,11 +34,12 @@ def print_csv(rows: Sequence["Row"]) -> None:
     Parameters
     ----------
     rows
-        The rows of `table.thresholds`; a NaN is an empty cell.
+        The rows of `table.thresholds`; a NaN is an empty cell, and every number has
+        nine digits, which are the same on all processors.
     """
     writer = csv.writer(sys.stdout, lineterminator="\n")
     writer.writerow(rows[0])
-    for row in rows:
+    for row in _rounded(rows):
         writer.writerow([None if _is_nan(value) else value for value in row.values()])
 
 
@@ -54,6 +55,7 @@ def as_json(rows: Sequence["Row"]) -> str:
     -------
     str
         A record has the parameters, the laws of the rules, and an object for each law.
+        Every number has nine digits, which are the same on all processors.
     """
     from orchestrator.physics.beside import MEASURED, TESTED
 
@@ -63,6 +65,7 @@ def as_json(rows: Sequence["Row"]) -> str:
     for column in OF_CRITERION:
         if column in rows[0]:
             names[column] = column
+    rows = _rounded(rows)
     law_count = len({row["law"] for row in rows})
     records = []
     for start in range(0, len(rows), law_count):
@@ -70,6 +73,19 @@ def as_json(rows: Sequence["Row"]) -> str:
     text = json.dumps(records if len(records) > 1 else records[0])
     # JSON has neither NaN nor Infinity
     return json.dumps(json.loads(text, parse_constant=lambda _: None), indent=2)
+
+
+def _rounded(rows: Sequence["Row"]) -> list["Row"]:
+    """Rows whose numbers have nine digits."""
+    from orchestrator import digits
+
+    written = []
+    for row in rows:
+        copy: Row = {}
+        for column, value in row.items():
+            copy[column] = digits.rounded(value) if isinstance(value, float) else value
+        written.append(copy)
+    return written
 
 
 def _record(of_laws: Sequence["Row"], names: Mapping[str, str]) -> "Row":

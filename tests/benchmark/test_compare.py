@@ -293,6 +293,30 @@ def test_answers_to_another_pack_are_not_compared(
     assert not compare.compare(again, [results], tmp_path / "page", SCENE).failures
 
 
+def test_answers_of_which_no_pack_is_noted_are_said_to_be(
+    formulas: Path, tmp_path: Path
+) -> None:
+    """By hand nothing tells which pack was answered: scenes of two packs have equal names."""
+    answers = tmp_path / "by hand"
+    for name in ("2-incline-5", "of-another-pack"):
+        (answers / name).mkdir(parents=True)
+        (answers / name / "answer.csv").write_text(INCLINE)
+    told = compare.compare(formulas, [answers], tmp_path / "page", SCENE)
+    where = f"taken for answers to “{formulas.name}”"
+    for said in (told.summary, told.page.read_text()):
+        assert "by hand: nothing in its directory tells which pack was answered" in said
+        assert f"{where}, which has no scene for 1 of 2 of them" in said
+    shutil.rmtree(answers / "of-another-pack")
+    told = compare.compare(formulas, [answers], tmp_path / "page", SCENE)
+    assert where in told.summary
+    assert "has no scene" not in told.summary
+    # run notes the pack
+    summary = run(formulas, tmp_path, TAIL).summary
+    assert "which pack" not in summary
+    again = compare.compare(formulas, [tmp_path / "results"], None, SCENE)
+    assert "which pack" not in again.summary + again.page.read_text()
+
+
 def test_a_comparison_stays_where_another_pack_has_the_same_name(
     formulas: Path, all_levels: Path, tmp_path: Path
 ) -> None:
