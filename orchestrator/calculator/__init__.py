@@ -6,7 +6,7 @@ Here are its parameters and results, by every name that they have.
 from typing import NamedTuple
 
 from orchestrator.physics import fluids
-from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
+from orchestrator.physics.constants import GRAIN_COLUMNS, GRAVITY, LIFT_COEFFICIENT
 
 
 class Parameter(NamedTuple):
@@ -39,42 +39,62 @@ class Parameter(NamedTuple):
 MOST_POINTS = 100_000
 """Largest number of points of a table."""
 PARAMETERS = {
-    "diameter": Parameter("grain.diameter", "d_m", "d, m", (1e-7, 10)),
+    "diameter": Parameter(
+        "grain.diameter", GRAIN_COLUMNS["diameter"], "d, m", (1e-7, 10)
+    ),
     "density": Parameter(
-        "grain.density", "rho_sol_kg_m3", "rho_sol, kg/m3", (1, 2e4), 2500.0
+        "grain.density", GRAIN_COLUMNS["density"], "rho_sol, kg/m3", (1, 2e4), 2500.0
     ),
     "fluid_density": Parameter(
-        "fluid.density", "rho_f_kg_m3", "rho_f, kg/m3", (1e-6, 2e4), fluids.PAPER[0]
+        "fluid.density",
+        GRAIN_COLUMNS["fluid_density"],
+        "rho_f, kg/m3",
+        (1e-6, 2e4),
+        fluids.PAPER[0],
     ),
     "viscosity": Parameter(
-        "fluid.viscosity", "nu_m2_s", "nu, m2/s", (1e-8, 1e3), fluids.PAPER[1]
+        "fluid.viscosity",
+        GRAIN_COLUMNS["viscosity"],
+        "nu, m2/s",
+        (1e-8, 1e3),
+        fluids.PAPER[1],
     ),
     "slope_deg": Parameter(
         "bed.slope_deg",
-        "alpha_deg",
+        GRAIN_COLUMNS["slope_deg"],
         "alpha, deg",
         (0, 30),
         0.0,
         note="the flow goes up it",
     ),
     "entrainment_angle_deg": Parameter(
-        "bed.entrainment_angle_deg", "beta_deg", "beta, deg", (30, 60), 60.0
+        "bed.entrainment_angle_deg",
+        GRAIN_COLUMNS["entrainment_angle_deg"],
+        "beta, deg",
+        (30, 60),
+        60.0,
     ),
     "roughness": Parameter(
         "bed.roughness",
-        "z0_m",
+        GRAIN_COLUMNS["roughness"],
         "z0, m",
         (1e-12, 1),
         "d/30",
         note='or such a part: "d/10"',
     ),
     "lift_coefficient": Parameter(
-        "forces.lift_coefficient", "alpha_s", "alpha_s", (0, 100), LIFT_COEFFICIENT
+        "forces.lift_coefficient",
+        GRAIN_COLUMNS["lift_coefficient"],
+        "alpha_s",
+        (0, 100),
+        LIFT_COEFFICIENT,
     ),
-    "gravity": Parameter("fluid.gravity", "g_m_s2", "g, m/s2", (1e-5, 1e4), GRAVITY),
+    "gravity": Parameter(
+        "fluid.gravity", GRAIN_COLUMNS["gravity"], "g, m/s2", (1e-5, 1e4), GRAVITY
+    ),
     "cohesion": Parameter(
         "grain.cohesion",
-        "cohesion_n_m",
+        GRAIN_COLUMNS["cohesion"],
         "cohesion, N/m",
         (0, 1e3),
         0.0,

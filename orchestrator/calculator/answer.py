@@ -6,26 +6,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from orchestrator.physics.constants import GAS_BELOW
-from orchestrator.physics.threshold import thresholds_of
+from orchestrator.physics.threshold import SingleGrain, thresholds_of
 from orchestrator.report import single
 from orchestrator.report.card import Card
 
 if TYPE_CHECKING:  # this loads numpy
     from orchestrator.types import Row
-
-GRAIN = (
-    "d_m",
-    "z0_m",
-    "rho_f_kg_m3",
-    "nu_m2_s",
-    "alpha_s",
-    "rho_sol_kg_m3",
-    "alpha_deg",
-    "beta_deg",
-    "g_m_s2",
-    "cohesion_n_m",
-)
-"""Columns of all that the closed form depends on, in the order of `SingleGrain`."""
 
 
 def card(rows: Sequence["Row"]) -> Card:
@@ -70,8 +56,8 @@ def as_row(row: "Row") -> "Row":
     level = row["ustar_m_s"]
     if row["alpha_deg"] > 0:
         # of either criterion: a slope changes what it takes to leave the pocket
-        here = tuple(float(row[name]) for name in GRAIN)
-        flat = tuple(float({**row, "alpha_deg": 0.0}[name]) for name in GRAIN)
+        here = SingleGrain.of_row(row)
+        flat = replace(here, slope_deg=0.0)
         on_slope, on_level = thresholds_of(row["law"], [here, flat])
         level *= float(on_level.friction_velocity / on_slope.friction_velocity)
     theta = row["measured_curve"]

@@ -3,6 +3,7 @@
 import re
 from collections import defaultdict
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from orchestrator.calculator import (
 from orchestrator.errors import InputError
 from orchestrator.physics import saltation
 from orchestrator.physics.beside import beside
-from orchestrator.physics.constants import GAS_BELOW
+from orchestrator.physics.constants import GAS_BELOW, GRAIN_COLUMNS
 from orchestrator.physics.fluids import PAPER as PAPER_FLUID
 from orchestrator.physics.laws import LAWS, Exposure, law
 from orchestrator.physics.threshold import (
@@ -106,11 +107,11 @@ def thresholds(
     if "depth" in points:
         _check_depth(grains)
     exposure = Exposure(
-        grains["diameter"],
-        grains["roughness"],
-        grains["fluid_density"],
-        grains["viscosity"],
-        grains["lift_coefficient"],
+        diameter=grains["diameter"],
+        roughness=grains["roughness"],
+        fluid_density=grains["fluid_density"],
+        viscosity=grains["viscosity"],
+        lift_coefficient=grains["lift_coefficient"],
     )
     inputs = {each.column: grains[name] for name, each in PARAMETERS.items()}
     # numbers beyond all floats end as laws that do not hold
@@ -211,7 +212,7 @@ def _block(name: str, at: Threshold, exposure: Exposure, grains: Table) -> Table
     block |= measurable_speeds(
         ustar,
         roughness=grains["roughness"],
-        density=density,
+        fluid_density=density,
         viscosity=grains["viscosity"],
         depth=np.where(density < GAS_BELOW, np.nan, grains["depth"]),
     )
@@ -285,7 +286,7 @@ def _going_on(
     changed |= measurable_speeds(
         ustar,
         roughness=grains["roughness"],
-        density=density,
+        fluid_density=density,
         viscosity=grains["viscosity"],
         depth=np.where(density < GAS_BELOW, np.nan, grains["depth"]),
     )
@@ -357,7 +358,7 @@ def _grains(points: Mapping[str, Any]) -> Table:
         grains[name] = np.array(column, float)
     for index in np.flatnonzero(~_is_ordinary(grains)):
         point = {name: column[index] for name, column in given.items()}
-        for name, value in _as_scene(point)._asdict().items():
+        for name, value in asdict(_as_scene(point)).items():
             grains[name][index] = value
     return grains
 
@@ -381,7 +382,7 @@ def _as_scene(point: Mapping[str, Any]) -> SingleGrain:
     from orchestrator.study.study import make_scene
 
     parts: dict[str, Row] = defaultdict(dict)
-    for name in SingleGrain._fields:
+    for name in GRAIN_COLUMNS:
         part, _, field = PARAMETERS[name].field.partition(".")
         value = point[name]
         parts[part][field] = value if isinstance(value, str) else float(value)

@@ -7,7 +7,7 @@ Arya, EPA/600/S3-85/059).
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import log
 from pathlib import Path
 from typing import NamedTuple
@@ -254,7 +254,7 @@ def solved(scene: Scene, threshold: float | None, cases: Path) -> Surface:
     assert isinstance(bed, PileBed)
     faces = _faces(bed, FlowModel(scene).line, FlowModel(scene).stress(cases))
     if threshold is None:
-        level = single_grain(scene)._replace(slope_deg=0)
+        level = replace(single_grain(scene), slope_deg=0.0)
         (own,) = thresholds_of(scene.forces.law, [level])
         threshold = float(own.friction_velocity)
     over_wind = float(log_law_ustar(1.0, WIND_HEIGHT, scene.solve_roughness))

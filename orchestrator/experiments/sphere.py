@@ -61,7 +61,13 @@ def sphere(fields: Fields, galileo: float, *, clear: bool) -> float:
     gap = gaps[0] if "forces.exposure" in fields else ROUGHNESS
 
     def around(ustar: ArrayLike) -> Exposure:
-        return Exposure(1.0, ROUGHNESS, 1.0, 1.0, gap=gap - level(ustar))
+        return Exposure(
+            diameter=1.0,
+            roughness=ROUGHNESS,
+            fluid_density=1.0,
+            viscosity=1.0,
+            gap=gap - level(ustar),
+        )
 
     def drag(ustar: ArrayLike) -> FloatArray:
         return LAW.drag(ustar, around(ustar))
@@ -109,7 +115,16 @@ def _balanced_level(
     """The level at which the flow begins around the sphere if drags are balanced."""
 
     def drag(ustar: FloatArray, sizes: FloatArray, above: FloatArray) -> FloatArray:
-        return LAW.drag(ustar, Exposure(sizes, ROUGHNESS, 1.0, 1.0, gap=above))
+        return LAW.drag(
+            ustar,
+            Exposure(
+                diameter=sizes,
+                roughness=ROUGHNESS,
+                fluid_density=1.0,
+                viscosity=1.0,
+                gap=above,
+            ),
+        )
 
     patch, areas = sheltering.patches(packing, 1.0)
     shelter = sheltering.balanced(
@@ -154,7 +169,12 @@ def speed_of(density: float, tangent: float) -> float:
     0.379
     """
     # the roughness does not matter to a drag at a given speed
-    at = Exposure(DIAMETER_M, 1e-4, WATER_DENSITY, WATER_VISCOSITY)
+    at = Exposure(
+        diameter=DIAMETER_M,
+        roughness=1e-4,
+        fluid_density=WATER_DENSITY,
+        viscosity=WATER_VISCOSITY,
+    )
     submerged = weight(
         diameter=DIAMETER_M,
         density=density,

@@ -22,7 +22,6 @@ from orchestrator.bed.surface import Surface
 from orchestrator.errors import InputError
 from orchestrator.physics import fluids
 from orchestrator.physics.fluids import PAPER as PAPER_FLUID
-from orchestrator.physics.laws import Exposure
 from orchestrator.physics.threshold import (
     AUTO,
     PAPER,
@@ -191,7 +190,7 @@ class SurfaceScene(Part):
             return self.forces.law
         grain = self.grain_in_pocket
         (at,) = thresholds_of("bridged", [grain])
-        return str(default_laws(at.friction_velocity, Exposure(*grain[:5])))
+        return str(default_laws(at.friction_velocity, grain.exposure))
 
     @property
     def name(self) -> str:

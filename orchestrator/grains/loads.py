@@ -134,14 +134,19 @@ def forces(
     """
     law = LAWS[scene.forces.law]
     grain = single_grain(scene)
-    given = (grain.diameter * np.asarray(sizes, float), *grain[1:5])
+    exposure = grain.exposure
+    diameters = grain.diameter * np.asarray(sizes, float)
     heights = np.asarray(grain.roughness if gaps is None else gaps, float)
 
+    def exposed(ustar: ArrayLike) -> Exposure:
+        gap = heights - level(ustar)
+        return Exposure(**{**exposure.fields, "diameter": diameters, "gap": gap})
+
     def drag(ustar: ArrayLike) -> FloatArray:
-        return law.drag(ustar, Exposure(*given, heights - level(ustar)))
+        return law.drag(ustar, exposed(ustar))
 
     def lift(ustar: ArrayLike) -> FloatArray:
-        return law.lift(ustar, Exposure(*given, heights - level(ustar)))
+        return law.lift(ustar, exposed(ustar))
 
     return drag, lift
 
@@ -170,7 +175,7 @@ def on_slopes(scene: Scene, slopes_deg: FloatArray) -> FloatArray:
     """
     slopes, place = np.unique(np.round(slopes_deg, 9), return_inverse=True)
     grain = single_grain(scene)
-    grains = [grain._replace(slope_deg=slope) for slope in slopes.tolist()]
+    grains = [replace(grain, slope_deg=slope) for slope in slopes.tolist()]
     found = thresholds_of(scene.forces.law, grains)
     peaks = np.array([each.friction_velocity for each in found], float)
     speeds = np.nan_to_num(peaks, nan=0.0, posinf=np.inf) / np.sqrt(scene.gust)

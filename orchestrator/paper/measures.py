@@ -148,7 +148,13 @@ def constant(evidence: Evidence) -> Comparisons:
     for (beta, z0), series in parts(flat, "beta_deg", "z0_over_d"):
         if len(series) < 2:
             continue
-        unit = Exposure(1.0, z0, 1.0, 1.0, series["alpha_s"].iloc[0])
+        unit = Exposure(
+            diameter=1.0,
+            roughness=z0,
+            fluid_density=1.0,
+            viscosity=1.0,
+            lift_coefficient=series["alpha_s"].iloc[0],
+        )
         lift_over_drag = law.lift(1.0, unit) / law.drag(1.0, unit)
         lifts.append(lift_over_drag / np.tan(np.radians(beta)))
         tau = series.sort_values("reynolds")["shields_dem"]
@@ -598,7 +604,13 @@ def _within_drag_law(name: str, table: pd.DataFrame) -> Comparisons:
     high = table[(table["force_law"] == "high") & table["reynolds"].notna()]
     if high.empty:
         return
-    unit = Exposure(1.0, high["z0_over_d"].to_numpy(float), 1.0, 1.0, 1.0)
+    unit = Exposure(
+        diameter=1.0,
+        roughness=high["z0_over_d"].to_numpy(float),
+        fluid_density=1.0,
+        viscosity=1.0,
+        lift_coefficient=1.0,
+    )
     particle_reynolds = law.particle_reynolds(high["reynolds"].to_numpy(float), unit)
     what = f"high regime: thresholds of {name} within the range of the drag law"
     yield Comparison(what, particle_reynolds <= law.drag_end, is_judged=False)

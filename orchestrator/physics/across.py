@@ -46,7 +46,7 @@ class _Moments:
         """The moments on some of the grains."""
         return _Moments(
             law=self.law,
-            exposure=Exposure(*[field[places] for field in self.exposure.fields]),
+            exposure=self.exposure.at(places),
             beta=self.beta[places],
             down=self.down[places],
             aside=self.aside[places],
@@ -133,7 +133,9 @@ def threshold_across(
     Examples
     --------
     >>> from orchestrator.physics.laws import LAWS
-    >>> sand = Exposure(1e-3, 1e-3 / 30, 1000.0, 1e-6)
+    >>> sand = Exposure(
+    ...     diameter=1e-3, roughness=1e-3 / 30, fluid_density=1000.0, viscosity=1e-6
+    ... )
     >>> grain = {"density": 2650.0, "entrainment_angle_deg": 60.0}
     >>> headings = {"slope_deg": 20.0, "heading_deg": [0.0, 90.0, 180.0]}
     >>> print(threshold_across(LAWS["bridged"], sand, **grain, **headings).round(5))
@@ -151,14 +153,15 @@ def threshold_across(
     pulled = np.asarray(cohesion, float) * exposure.diameter * np.sin(2 * beta)
     along = submerged * np.sin(slope) * np.sin(beta)
     given = np.broadcast_arrays(
-        *exposure.fields,
+        *exposure.fields.values(),
         beta,
         along * np.cos(heading),
         along * np.sin(heading),
         submerged * np.cos(slope) * np.cos(beta) + pulled,
     )
     *fields, angle, down, aside, held = [np.ravel(array) for array in given]
-    moments = _Moments(law, Exposure(*fields), angle, down, aside, held)
+    of_grains = Exposure(**dict(zip(exposure.fields, fields, strict=True)))
+    moments = _Moments(law, of_grains, angle, down, aside, held)
     return _first(moments).reshape(given[0].shape)
 
 

@@ -13,3 +13,16 @@ GAS_BELOW = 100.0
 """Density that tells gases from liquids, kg/m3: Venus has 65 at its ground."""
 LIFT_COEFFICIENT = 1.615
 """Saffman's 6.46 for the radius, over 4 for the squared diameter."""
+GRAIN_COLUMNS = {
+    "diameter": "d_m",
+    "roughness": "z0_m",
+    "fluid_density": "rho_f_kg_m3",
+    "viscosity": "nu_m2_s",
+    "lift_coefficient": "alpha_s",
+    "density": "rho_sol_kg_m3",
+    "slope_deg": "alpha_deg",
+    "entrainment_angle_deg": "beta_deg",
+    "gravity": "g_m_s2",
+    "cohesion": "cohesion_n_m",
+}
+"""Columns of tables with the quantities of `SingleGrain`, by its attributes."""

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from orchestrator.errors import InputError
 from orchestrator.physics import velocity
 from orchestrator.physics.constants import INVERSE_KARMAN, LIFT_COEFFICIENT
-from orchestrator.types import BoolArray, FloatArray
+from orchestrator.types import BoolArray, FloatArray, IntArray
 
 _EQUATIONS = "Eqs. 2 and 4 of the paper"
 MODEL = f"a model of this program: {_EQUATIONS} on a stress that is carried together"
@@ -50,7 +50,9 @@ class Exposure:
 
     Examples
     --------
-    >>> sand = Exposure(1e-3, 1e-3 / 30, 1000.0, 1e-6)
+    >>> sand = Exposure(
+    ...     diameter=1e-3, roughness=1e-3 / 30, fluid_density=1000.0, viscosity=1e-6
+    ... )
     >>> print(sand.reynolds([0.01, 0.02]))
     [10. 20.]
     """
@@ -64,6 +66,7 @@ class Exposure:
 
     def __init__(
         self,
+        *,
         diameter: ArrayLike,
         roughness: ArrayLike,
         fluid_density: ArrayLike,
@@ -86,21 +89,36 @@ class Exposure:
             object.__setattr__(self, name, np.asarray(value, float))
 
     @property
-    def fields(self) -> tuple[FloatArray, ...]:
-        """The six fields in the order of the constructor's parameters."""
-        return (
-            self.diameter,
-            self.roughness,
-            self.fluid_density,
-            self.viscosity,
-            self.lift_coefficient,
-            self.gap,
-        )
+    def fields(self) -> dict[str, FloatArray]:
+        """The six fields by the constructor's parameters."""
+        return {
+            "diameter": self.diameter,
+            "roughness": self.roughness,
+            "fluid_density": self.fluid_density,
+            "viscosity": self.viscosity,
+            "lift_coefficient": self.lift_coefficient,
+            "gap": self.gap,
+        }
 
     @property
     def ratio(self) -> FloatArray:
         """Roughness length over diameter, z0/d."""
         return np.asarray(self.roughness / self.diameter)
+
+    def at(self, places: IntArray | slice) -> "Exposure":
+        """Take some of the grains.
+
+        Parameters
+        ----------
+        places
+            Their places in the fields, which are arrays of one shape (n,).
+
+        Returns
+        -------
+        Exposure
+            The grains at these places.
+        """
+        return Exposure(**{name: each[places] for name, each in self.fields.items()})
 
     def zeros(self, ustar: ArrayLike) -> FloatArray:
         """Make zeros of the shape of a force on the grain.
@@ -115,7 +133,7 @@ class Exposure:
         FloatArray
             Zeros of the shape that the fields and the friction velocity broadcast to.
         """
-        shapes = [field.shape for field in self.fields]
+        shapes = [field.shape for field in self.fields.values()]
         return np.zeros(np.broadcast_shapes(np.shape(ustar), *shapes))
 
     def reynolds(self, ustar: ArrayLike) -> FloatArray:
@@ -165,7 +183,9 @@ class SphereDrag:
 
     Examples
     --------
-    >>> sand = Exposure(1e-3, 1e-3 / 30, 1000.0, 1e-6)
+    >>> sand = Exposure(
+    ...     diameter=1e-3, roughness=1e-3 / 30, fluid_density=1000.0, viscosity=1e-6
+    ... )
     >>> print(f"{SCHILLER_NAUMANN.force(np.array(0.1), sand):.3e}")
     4.287e-06
     """
@@ -330,7 +350,9 @@ class ForceLaw(ABC):
 
     Examples
     --------
-    >>> sand = Exposure(1e-3, 1e-3 / 30, 1000.0, 1e-6)
+    >>> sand = Exposure(
+    ...     diameter=1e-3, roughness=1e-3 / 30, fluid_density=1000.0, viscosity=1e-6
+    ... )
     >>> print(f"{LAWS['bridged'].drag(0.02, sand):.3e}")
     3.958e-06
     """
@@ -455,12 +477,12 @@ class ForceLaw(ABC):
             above_sublayer = np.maximum(ustar, at.ustar(SUBLAYER))
             wall = velocity.smooth_wall_roughness(above_sublayer, at.viscosity)
             smooth = Exposure(
-                at.diameter,
-                at.roughness + wall,
-                at.fluid_density,
-                at.viscosity,
-                at.lift_coefficient,
-                at.gap,
+                diameter=at.diameter,
+                roughness=at.roughness + wall,
+                fluid_density=at.fluid_density,
+                viscosity=at.viscosity,
+                lift_coefficient=at.lift_coefficient,
+                gap=at.gap,
             )
             over = self.speed(ustar, at) / self.speed(ustar, smooth)
         return np.asarray(np.where(reynolds < SUBLAYER, 1.0, over))

@@ -1,13 +1,13 @@
 """The threshold of motion of one exposed grain that rolls over its neighbour."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
+from orchestrator.physics.constants import GRAIN_COLUMNS, GRAVITY, LIFT_COEFFICIENT
 from orchestrator.physics.laws import LAWS, Exposure, ForceLaw, Validity, reasons
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
@@ -205,7 +205,7 @@ class _Balances:
         """The balances at some places of the arrays."""
         return _Balances(
             law=self.law,
-            exposure=Exposure(*[field[places] for field in self.exposure.fields]),
+            exposure=self.exposure.at(places),
             along=self.along[places],
             outward=self.outward[places],
             turning=self.turning[places],
@@ -289,14 +289,16 @@ def friction_velocity_at(
 
     Examples
     --------
-    >>> sand = Exposure(1e-3, 1e-3 / 30, 1000.0, 1e-6)
+    >>> sand = Exposure(
+    ...     diameter=1e-3, roughness=1e-3 / 30, fluid_density=1000.0, viscosity=1e-6
+    ... )
     >>> print(friction_velocity_at(LAWS["bridged"], sand, [1e-6, 0.0]).round(5))
     [0.01028     nan]
     """
     local = np.asarray(speed_up, float)
     direction = np.sign(local)
     given = np.broadcast_arrays(
-        *exposure.fields,
+        *exposure.fields.values(),
         direction * along,
         np.asarray(outward),
         direction * turning,
@@ -305,7 +307,8 @@ def friction_velocity_at(
     )
     flat = [np.ravel(array).astype(float) for array in given]
     *fields, along, outward, turning, target, ratio = flat
-    balances = _Balances(law, Exposure(*fields), along, outward, turning, target)
+    of_grains = Exposure(**dict(zip(exposure.fields, fields, strict=True)))
+    balances = _Balances(law, of_grains, along, outward, turning, target)
     found = balances.roots()
     with np.errstate(divide="ignore"):
         undisturbed = found / ratio
@@ -434,7 +437,9 @@ def threshold(
 
     Examples
     --------
-    >>> sand = Exposure(1e-3, 1e-3 / 30, 1000.0, 1e-6)
+    >>> sand = Exposure(
+    ...     diameter=1e-3, roughness=1e-3 / 30, fluid_density=1000.0, viscosity=1e-6
+    ... )
     >>> angles = {"slope_deg": [0.0, 15.0], "entrainment_angle_deg": 60.0}
     >>> found = threshold(LAWS["bridged"], sand, density=2650.0, **angles)
     >>> print(found.shields.round(4))
@@ -506,7 +511,9 @@ def why_not(
 
     Examples
     --------
-    >>> sand = Exposure(1e-3, 1e-3 / 30, 1000.0, 1e-6)
+    >>> sand = Exposure(
+    ...     diameter=1e-3, roughness=1e-3 / 30, fluid_density=1000.0, viscosity=1e-6
+    ... )
     >>> why_not(LAWS["low"], np.array([0.002, 0.02]), sand)
     ['', 'Re* 20 is not below 3']
     """
@@ -611,7 +618,8 @@ def default_laws(ustar: ArrayLike, exposure: Exposure) -> NDArray[np.str_]:
 
     Examples
     --------
-    >>> sizes = Exposure([1e-3, 3e-2], [1e-3 / 30, 1e-3], 1000.0, 1e-6)
+    >>> water = {"fluid_density": 1000.0, "viscosity": 1e-6}
+    >>> sizes = Exposure(diameter=[1e-3, 3e-2], roughness=[1e-3 / 30, 1e-3], **water)
     >>> default_laws([0.018, 0.25], sizes).tolist()
     ['bridged', 'bridged-gravel']
     """
@@ -640,7 +648,8 @@ def regime(low: Threshold, high: Threshold) -> NDArray[np.str_]:
 
     Examples
     --------
-    >>> sand = Exposure([5e-5, 1e-3], [5e-6, 1e-4], 1000.0, 1e-6)
+    >>> water = {"fluid_density": 1000.0, "viscosity": 1e-6}
+    >>> sand = Exposure(diameter=[5e-5, 1e-3], roughness=[5e-6, 1e-4], **water)
     >>> pocket = {"density": 2650.0, "slope_deg": 0.0, "entrainment_angle_deg": 60.0}
     >>> print(regime(*(threshold(LAWS[n], sand, **pocket) for n in ("low", "high"))))
     ['low' 'transition']
@@ -652,7 +661,8 @@ def regime(low: Threshold, high: Threshold) -> NDArray[np.str_]:
     return np.select([is_low, is_high], ["low", "high"], "transition")
 
 
-class SingleGrain(NamedTuple):
+@dataclass(frozen=True, kw_only=True)
+class SingleGrain:
     """All quantities that the closed form depends on.
 
     Attributes
@@ -684,12 +694,50 @@ class SingleGrain(NamedTuple):
     gravity: float
     cohesion: float = 0.0
 
+    @classmethod
+    def of_row(cls, row: Mapping[Any, Any]) -> "SingleGrain":
+        """Make the grain of a row of a table.
 
-_ANSWERS: dict[tuple[str, tuple[float, ...]], Threshold] = {}
+        Parameters
+        ----------
+        row
+            A row with the columns `GRAIN_COLUMNS`.
+
+        Returns
+        -------
+        SingleGrain
+            The grain.
+
+        Examples
+        --------
+        >>> sand = {"d_m": 1e-3, "rho_sol_kg_m3": 2650.0, "cohesion_n_m": 0.0}
+        >>> water = {"rho_f_kg_m3": 1000.0, "nu_m2_s": 1e-6, "g_m_s2": 9.81}
+        >>> bed = {"z0_m": 1e-4, "alpha_deg": 0.0, "beta_deg": 60.0, "alpha_s": 1.6}
+        >>> SingleGrain.of_row({**sand, **water, **bed}).density
+        2650.0
+        """
+        numbers = {}
+        for name, column in GRAIN_COLUMNS.items():
+            numbers[name] = float(row[column])
+        return cls(**numbers)
+
+    @property
+    def exposure(self) -> Exposure:
+        """The grain and the fluid around it, as the force laws take them."""
+        return Exposure(
+            diameter=self.diameter,
+            roughness=self.roughness,
+            fluid_density=self.fluid_density,
+            viscosity=self.viscosity,
+            lift_coefficient=self.lift_coefficient,
+        )
+
+
+_ANSWERS: dict[tuple[str, SingleGrain], Threshold] = {}
 """Thresholds that were found, by the name of the law and the grain."""
 
 
-def thresholds_of(name: str, grains: Sequence[tuple[float, ...]]) -> list[Threshold]:
+def thresholds_of(name: str, grains: Sequence[SingleGrain]) -> list[Threshold]:
     """Find the thresholds of grains under a force law, each once.
 
     Many grains at once take a hundredth of the time that they take one by one.
@@ -699,7 +747,7 @@ def thresholds_of(name: str, grains: Sequence[tuple[float, ...]]) -> list[Thresh
     name
         Name of the force law.
     grains
-        The grains, with the quantities of `SingleGrain` in their order.
+        The grains.
 
     Returns
     -------
@@ -715,11 +763,10 @@ def thresholds_of(name: str, grains: Sequence[tuple[float, ...]]) -> list[Thresh
     >>> print(thresholds_of("bridged", [grain])[0].shields.round(4))
     0.0418
     """
-    keys = [(name, tuple(grain)) for grain in grains]
+    keys = [(name, grain) for grain in grains]
     new = [key for key in dict.fromkeys(keys) if key not in _ANSWERS]
     if new:
-        table = np.array([grain for _, grain in new])
-        found = _threshold_of_table(name, table)
+        found = _threshold_of_all(name, [grain for _, grain in new])
         for place, key in enumerate(new):
             _ANSWERS[key] = found.grain(place)
     return [_ANSWERS[key] for key in keys]
@@ -735,22 +782,24 @@ def forget() -> None:
     _ANSWERS.clear()
 
 
-def _threshold_of_table(name: str, table: FloatArray) -> Threshold:
-    """The thresholds of a table with a row for each grain, of shape (rows,)."""
-    column = dict(zip(SingleGrain._fields, table.T, strict=True))
+def _threshold_of_all(name: str, grains: Sequence[SingleGrain]) -> Threshold:
+    """The thresholds of n grains under a force law, of shape (n,)."""
+    numbers: dict[str, FloatArray] = {}
+    for field in GRAIN_COLUMNS:
+        numbers[field] = np.array([getattr(grain, field) for grain in grains], float)
     exposure = Exposure(
-        diameter=column["diameter"],
-        roughness=column["roughness"],
-        fluid_density=column["fluid_density"],
-        viscosity=column["viscosity"],
-        lift_coefficient=column["lift_coefficient"],
+        diameter=numbers["diameter"],
+        roughness=numbers["roughness"],
+        fluid_density=numbers["fluid_density"],
+        viscosity=numbers["viscosity"],
+        lift_coefficient=numbers["lift_coefficient"],
     )
     return threshold(
         LAWS[name],
         exposure,
-        density=column["density"],
-        slope_deg=column["slope_deg"],
-        entrainment_angle_deg=column["entrainment_angle_deg"],
-        gravity=column["gravity"],
-        cohesion=column["cohesion"],
+        density=numbers["density"],
+        slope_deg=numbers["slope_deg"],
+        entrainment_angle_deg=numbers["entrainment_angle_deg"],
+        gravity=numbers["gravity"],
+        cohesion=numbers["cohesion"],
     )

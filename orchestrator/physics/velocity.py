@@ -173,7 +173,7 @@ def measurable_speeds(
     ustar: ArrayLike,
     *,
     roughness: ArrayLike,
-    density: ArrayLike,
+    fluid_density: ArrayLike,
     viscosity: ArrayLike,
     depth: ArrayLike,
     closed: bool = False,
@@ -186,7 +186,7 @@ def measurable_speeds(
         Friction velocity, m/s.
     roughness
         Roughness length z0 of the bed, m.
-    density
+    fluid_density
         Density of the fluid, kg/m3.
     viscosity
         Kinematic viscosity of the fluid, m2/s.
@@ -205,14 +205,14 @@ def measurable_speeds(
 
     Examples
     --------
-    >>> water = {"roughness": 1e-4, "density": 1000.0, "viscosity": 1e-6}
+    >>> water = {"fluid_density": 1000.0, "viscosity": 1e-6, "roughness": 1e-4}
     >>> speeds = measurable_speeds(0.05, **water, depth=0.5)
     >>> print(speeds["current_1m_m_s"], speeds["mean_velocity_m_s"].round(3))
     nan 0.917
     """
     nu = np.asarray(viscosity, float)
     deep = np.asarray(depth, float)
-    is_gas = np.asarray(density, float) < GAS_BELOW
+    is_gas = np.asarray(fluid_density, float) < GAS_BELOW
     # without a flow, and without a depth, numbers are divided by zero or not numbers
     with np.errstate(divide="ignore", invalid="ignore"):
         z0 = outer_roughness(roughness, ustar, nu)

@@ -3,14 +3,14 @@
 import math
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
-from typing import Any
 
 import pandas as pd
 
 from orchestrator.grains.pile import Pile
+from orchestrator.physics.constants import GRAIN_COLUMNS
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import MEASURED_SOURCE, wilcock_crowe_hiding
-from orchestrator.physics.threshold import thresholds_of
+from orchestrator.physics.threshold import SingleGrain, thresholds_of
 from orchestrator.report import labels, sheets, single, theory
 from orchestrator.report.card import Card, Mark, Number, Worth
 from orchestrator.report.results import (
@@ -27,7 +27,6 @@ from orchestrator.report.subjects import (
     length,
     solid,
 )
-from orchestrator.tables.quoted import LEVEL_GRAIN
 
 NONE = Card(
     "When do these grains start to move?",
@@ -103,7 +102,7 @@ def are_several_beds(rows: pd.DataFrame) -> bool:
 
 def is_one_grain(grains: pd.DataFrame) -> bool:
     """Whether thresholds of single grains are those of one grain."""
-    questions = [*LEVEL_GRAIN, "force_law", "depth_m"]
+    questions = [*GRAIN_COLUMNS.values(), "force_law", "depth_m"]
     return len(grains[questions].drop_duplicates()) == 1
 
 
@@ -469,14 +468,14 @@ def laws_that_hold(row: pd.Series) -> dict[str, float]:
     Parameters
     ----------
     row
-        Columns `LEVEL_GRAIN` of a grain.
+        Columns `GRAIN_COLUMNS` of a grain.
 
     Returns
     -------
     dict of str to float
         Friction velocity at the threshold, m/s, by the name of the law.
     """
-    asked: Any = tuple(float(row[name]) for name in LEVEL_GRAIN)
+    asked = SingleGrain.of_row(row.to_dict())
     found = {}
     for name in LAWS:
         (at,) = thresholds_of(name, [asked])

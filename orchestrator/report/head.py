@@ -20,12 +20,11 @@ from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import within
 from orchestrator.physics.curves import Air, shao_lu, soulsby_whitehouse
 from orchestrator.physics.laws import LAWS
-from orchestrator.physics.threshold import thresholds_of
+from orchestrator.physics.threshold import SingleGrain, thresholds_of
 from orchestrator.report import answers, labels, sheets, single, style
 from orchestrator.report.results import Results
 from orchestrator.report.style import Look
 from orchestrator.report.subjects import Quantity, is_gas
-from orchestrator.tables.quoted import LEVEL_GRAIN
 
 WIDE = 1136
 NARROW = 360
@@ -448,7 +447,7 @@ def _of_grain(row: pd.Series) -> Head:
 
 def _by_law(ax: Axes, row: pd.Series, told: Quantity) -> None:
     """A line of dots: the threshold under each law."""
-    grain: Any = tuple(float(row[name]) for name in LEVEL_GRAIN)
+    grain = SingleGrain.of_row(row.to_dict())
     found = []
     for name in LAWS:
         (at,) = thresholds_of(name, [grain])
@@ -525,10 +524,10 @@ def _by_size(ax: Axes, row: pd.Series, told: Quantity) -> None:
     d = np.geomspace(float(row["d_m"]) / 6, float(row["d_m"]) * 6, 61)
     law = str(row["force_law"])
     part = float(row["z0_m"]) / float(row["d_m"])
-    grains: list[Any] = []
+    grains = []
     for size in d.tolist():
         changed = {**row.to_dict(), "d_m": size, "z0_m": part * size}
-        grains.append(tuple(float(changed[name]) for name in LEVEL_GRAIN))
+        grains.append(SingleGrain.of_row(changed))
     found = thresholds_of(law, grains)
     computed = []
     measured = []

@@ -109,7 +109,7 @@ def in_unit(row: Row, ustar: float, told: Quantity) -> float:
     speeds = measurable_speeds(
         ustar,
         roughness=float(row["z0_m"]),
-        density=float(row["rho_f_kg_m3"]),
+        fluid_density=float(row["rho_f_kg_m3"]),
         viscosity=float(row["nu_m2_s"]),
         depth=known(depth),
         closed=row.get("flow_top") == "closed channel",

@@ -13,10 +13,17 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.physics import curves
+from orchestrator.physics.constants import GRAIN_COLUMNS
 from orchestrator.physics.curves import Air
 from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.measured import BUFFINGTON_MONTGOMERY, MEASURED_SOURCE
-from orchestrator.physics.threshold import LAWS_OF, Threshold, shields_at, thresholds_of
+from orchestrator.physics.threshold import (
+    LAWS_OF,
+    SingleGrain,
+    Threshold,
+    shields_at,
+    thresholds_of,
+)
 from orchestrator.report import labels
 from orchestrator.report.page import caption
 from orchestrator.report.results import Results, split
@@ -57,19 +64,6 @@ SWEEP_M = (5e-5, 1e-3)
 """Diameters of the curves for air, m; a study with others widens the range."""
 POINTS = 240
 """Diameters of a curve for air."""
-GRAIN = [
-    "d_m",
-    "z0_m",
-    "rho_f_kg_m3",
-    "nu_m2_s",
-    "alpha_s",
-    "rho_sol_kg_m3",
-    "alpha_deg",
-    "beta_deg",
-    "g_m_s2",
-    "cohesion_n_m",
-]
-"""Columns of all that the closed form depends on, in the order of `SingleGrain`."""
 BED = ["alpha_deg", "beta_deg", "z0_over_d", "alpha_s"]
 """Columns of all that a line depends on beside its law, in the order of `Bed`."""
 BAGNOLD_FROM = 3.5  # Bagnold's A is 0.1 above this Re* only; it rises below
@@ -172,7 +166,11 @@ class Line:
     def holds(self, reynolds: FloatArray) -> BoolArray:
         """Whether the law holds at some Re*; in units of d, nu and rho_f they are u*."""
         unit = Exposure(
-            1.0, self.bed.roughness_ratio, 1.0, 1.0, self.bed.lift_coefficient
+            diameter=1.0,
+            roughness=self.bed.roughness_ratio,
+            fluid_density=1.0,
+            viscosity=1.0,
+            lift_coefficient=self.bed.lift_coefficient,
         )
         return LAWS[self.law].valid(reynolds, unit)
 
@@ -219,7 +217,9 @@ class Line:
 def lines(scenes: pd.DataFrame) -> list[Line]:
     """The lines through some scenes, by rising slope, entrainment angle, z0/d and lift."""
     listed = []
-    for key, group in split(scenes[[*GRAIN, "z0_over_d", "force_law"]], *BED):
+    for key, group in split(
+        scenes[[*GRAIN_COLUMNS.values(), "z0_over_d", "force_law"]], *BED
+    ):
         for law in drawn(group["force_law"]):
             of_law = group[group["force_law"] == law]
             first, last = span(of_law)
@@ -240,7 +240,8 @@ def span(scenes: pd.DataFrame) -> tuple[float, float]:
 
 def thresholds(scenes: pd.DataFrame, law: str) -> list[Threshold]:
     """The closed form of the single grains of some rows under a law."""
-    return thresholds_of(law, list(scenes[GRAIN].itertuples(index=False, name=None)))
+    rows = scenes[list(GRAIN_COLUMNS.values())].to_dict("records")
+    return thresholds_of(law, [SingleGrain.of_row(row) for row in rows])
 
 
 def in_gas(scenes: pd.DataFrame) -> "pd.Series[bool]":

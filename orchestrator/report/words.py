@@ -169,7 +169,7 @@ def flow_at(row: pd.Series, ustar: float) -> str:
     speeds = measurable_speeds(
         ustar,
         roughness=row["z0_m"],
-        density=row["rho_f_kg_m3"],
+        fluid_density=row["rho_f_kg_m3"],
         viscosity=row["nu_m2_s"],
         depth=depth,
         closed=row["flow_top"] == "closed channel",

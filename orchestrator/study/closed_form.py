@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import cast
 
 from orchestrator.physics import velocity
-from orchestrator.physics.laws import Exposure
 from orchestrator.physics.threshold import (
     AUTO,
     LAWS_OF,
@@ -26,16 +25,20 @@ from orchestrator.study.scene import CELLS_OVER_Z0, Scene
 def single_grain(scene: Scene) -> SingleGrain:
     """The grain of a scene; its entrainment angle is that of the pocket that it lies in."""
     grain, bed, fluid = scene.grain, scene.bed, scene.fluid
-    flow = (
-        bed.roughness,
-        fluid.density,
-        fluid.viscosity,
-        scene.forces.lift_coefficient,
-    )
-    pivot = (grain.density, bed.slope_deg, scene.pocket_angle_deg, fluid.gravity)
     # at a contact of two sizes the pull is that of their harmonic mean
     cohesion = grain.cohesion * 2 / (1 + bed.relative_size)
-    return SingleGrain(grain.diameter, *flow, *pivot, cohesion)
+    return SingleGrain(
+        diameter=grain.diameter,
+        roughness=bed.roughness,
+        fluid_density=fluid.density,
+        viscosity=fluid.viscosity,
+        lift_coefficient=scene.forces.lift_coefficient,
+        density=grain.density,
+        slope_deg=bed.slope_deg,
+        entrainment_angle_deg=scene.pocket_angle_deg,
+        gravity=fluid.gravity,
+        cohesion=cohesion,
+    )
 
 
 def closed_form(scene: Scene, name: str | None = None) -> Threshold:
@@ -88,7 +91,7 @@ def law_of(scene: Scene) -> str:
         return scene.forces.law
     grain = single_grain(scene)
     (at,) = thresholds_of("bridged", [grain])
-    return str(default_laws(at.friction_velocity, Exposure(*grain[:5])))
+    return str(default_laws(at.friction_velocity, grain.exposure))
 
 
 def resolved(scenes: Sequence[Scene]) -> Iterator[tuple[Scene, ...]]:

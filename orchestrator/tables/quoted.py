@@ -11,8 +11,8 @@ import pandas as pd
 
 from orchestrator.physics import saltation
 from orchestrator.physics.beside import GOES_ON
-from orchestrator.physics.constants import GAS_BELOW
-from orchestrator.physics.threshold import thresholds_of
+from orchestrator.physics.constants import GAS_BELOW, GRAIN_COLUMNS
+from orchestrator.physics.threshold import SingleGrain, thresholds_of
 from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.types import FloatArray
 
@@ -20,19 +20,6 @@ ENDS = ("_low", "_high")
 """Endings of the columns of an interval, before the unit."""
 SPEEDS = ("wind_10m", "mean_velocity")
 """Speeds of which the interval and the measured value are told, without the unit."""
-LEVEL_GRAIN = (
-    "d_m",
-    "z0_m",
-    "rho_f_kg_m3",
-    "nu_m2_s",
-    "alpha_s",
-    "rho_sol_kg_m3",
-    "alpha_deg",
-    "beta_deg",
-    "g_m_s2",
-    "cohesion_n_m",
-)
-"""Columns of all that the closed form depends on, in the order of `SingleGrain`."""
 
 
 def quoted(rows: pd.DataFrame) -> dict[str, FloatArray]:
@@ -130,7 +117,7 @@ def _speeds_of(rows: pd.DataFrame, ustar: FloatArray) -> dict[str, FloatArray]:
         speeds = measurable_speeds(
             ustar,
             roughness=rows["z0_m"].to_numpy(float),
-            density=rows["rho_f_kg_m3"].to_numpy(float),
+            fluid_density=rows["rho_f_kg_m3"].to_numpy(float),
             viscosity=rows["nu_m2_s"].to_numpy(float),
             depth=rows["depth_m"].to_numpy(float),
             closed=closed,
@@ -155,9 +142,8 @@ def _level_ustar(rows: pd.DataFrame) -> FloatArray:
     found = np.full(len(rows), np.nan)
     for law in rows["force_law"].unique():
         is_of_law = (rows["force_law"] == law).to_numpy()
-        grains: list[Any] = list(
-            level.loc[is_of_law, list(LEVEL_GRAIN)].itertuples(index=False, name=None)
-        )
+        of_law = level.loc[is_of_law, list(GRAIN_COLUMNS.values())]
+        grains = [SingleGrain.of_row(row) for row in of_law.to_dict("records")]
         at = [each.friction_velocity for each in thresholds_of(str(law), grains)]
         found[is_of_law] = np.array(at, float)
     if "criterion" not in rows:

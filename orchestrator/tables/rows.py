@@ -245,7 +245,7 @@ def _speeds(scene: Scene, ustar: float) -> Row:
     speeds = measurable_speeds(
         ustar,
         roughness=scene.bed.roughness,
-        density=fluid.density,
+        fluid_density=fluid.density,
         viscosity=fluid.viscosity,
         depth=flow.depth or np.nan,
         closed=flow.top == "closed channel",

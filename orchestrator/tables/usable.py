@@ -180,11 +180,11 @@ def _beyond_law(name: str, rows: pd.DataFrame, ustar: "pd.Series[float]") -> lis
     law = LAWS[name]
     d = rows["d_m"].to_numpy()
     exposure = Exposure(
-        d,
-        rows["z0_over_d"].to_numpy() * d,
-        rows["rho_f_kg_m3"].to_numpy(),
-        rows["nu_m2_s"].to_numpy(),
-        rows["alpha_s"].to_numpy(),
+        diameter=d,
+        roughness=rows["z0_over_d"].to_numpy() * d,
+        fluid_density=rows["rho_f_kg_m3"].to_numpy(),
+        viscosity=rows["nu_m2_s"].to_numpy(),
+        lift_coefficient=rows["alpha_s"].to_numpy(),
     )
     weights = {}
     # a pile has the share of grains that lift carried off

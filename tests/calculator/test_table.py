@@ -19,7 +19,7 @@ def test_every_point_and_law_is_the_closed_form_of_it() -> None:
     table = pd.DataFrame(thresholds({"diameter": d, "slope_deg": slopes}))
     assert len(table) == 40 * len(LAWS)
     for name, law in LAWS.items():
-        here = Exposure(d, d / 30, 1.0, 1e-5)
+        here = Exposure(diameter=d, roughness=d / 30, fluid_density=1.0, viscosity=1e-5)
         one = threshold(
             law, here, density=2500.0, slope_deg=slopes, entrainment_angle_deg=60.0
         )

@@ -1,5 +1,7 @@
 """Where a bed in three dimensions moves: slopes, headings, shares and hours."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -70,8 +72,8 @@ def test_grains_go_on_by_the_slope_along_the_stress() -> None:
 
 
 def test_a_grain_that_cannot_hop_has_no_gust() -> None:
-    silt = SAND._replace(
-        diameter=1e-4, roughness=3e-6, fluid_density=1000.0, viscosity=1e-6
+    silt = replace(
+        SAND, diameter=1e-4, roughness=3e-6, fluid_density=1000.0, viscosity=1e-6
     )
     slopes = np.array([0.0, 20.0])
     leaving = onset.leaves(silt, "bridged", slopes, slopes)

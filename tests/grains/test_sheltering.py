@@ -34,7 +34,12 @@ method.kind = "%s"
 
 
 def _drag(ustar: FloatArray, sizes: FloatArray, gaps: FloatArray) -> FloatArray:
-    return LAW.drag(ustar, Exposure(D * sizes, Z0, RHO, NU, gap=gaps))
+    return LAW.drag(
+        ustar,
+        Exposure(
+            diameter=D * sizes, roughness=Z0, fluid_density=RHO, viscosity=NU, gap=gaps
+        ),
+    )
 
 
 def _levels(
@@ -113,7 +118,13 @@ def test_cohesion_is_shao_and_lu_s(gamma: float, method: str) -> None:
     phi = math.radians(30)
     cohesion = math.pi * gamma / (12 * math.cos(phi))
     if method == "closed form":
-        at = Exposure(d, d / 30, 1.2, 1.5e-5, 0.0)
+        at = Exposure(
+            diameter=d,
+            roughness=d / 30,
+            fluid_density=1.2,
+            viscosity=1.5e-5,
+            lift_coefficient=0.0,
+        )
         grain = {"density": density, "slope_deg": 0.0, "entrainment_angle_deg": 60.0}
         with_it, without = (
             threshold(LAWS["low"], at, **grain, cohesion=value).friction_velocity

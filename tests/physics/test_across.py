@@ -17,7 +17,13 @@ ROUGH = [name for name in LAWS if name != "low"]
 
 
 def grain(lift: float = LIFT_COEFFICIENT) -> Exposure:
-    return Exposure(1e-3, 1e-3 / 30, 1000.0, 1e-6, lift)
+    return Exposure(
+        diameter=1e-3,
+        roughness=1e-3 / 30,
+        fluid_density=1000.0,
+        viscosity=1e-6,
+        lift_coefficient=lift,
+    )
 
 
 @pytest.mark.parametrize("name", ROUGH)

@@ -27,7 +27,7 @@ ratios = st.floats(1 / 60, 1 / 5)
 
 def unit(ratio: float = 1 / 30) -> Exposure:
     """A grain of d = rho = nu = 1, so that ustar is Re*."""
-    return Exposure(1.0, ratio, 1.0, 1.0)
+    return Exposure(diameter=1.0, roughness=ratio, fluid_density=1.0, viscosity=1.0)
 
 
 @pytest.mark.parametrize("part", [5, 20, 60])
@@ -35,7 +35,9 @@ def test_the_forces_of_eqs_2_and_4(part: int) -> None:
     d, rho, a = np.geomspace(3e-5, 2e-3, 7), 1.2, 2.0
     nu, u = np.array([[1e-6], [1e-5], [1e-3]]), np.array([[[1e-3]], [[0.3]], [[5.0]]])
     r = 1 / part
-    at = Exposure(d, r * d, rho, nu, a)
+    at = Exposure(
+        diameter=d, roughness=r * d, fluid_density=rho, viscosity=nu, lift_coefficient=a
+    )
     low, high = LAWS["low"], LAWS["high"]
     stokes = 1.5 * np.pi * (1 + 2 * r) * rho * (d * u) ** 2 * np.ones_like(nu)
     np.testing.assert_allclose(low.drag(u, at), stokes)
@@ -91,7 +93,7 @@ def test_no_force_falls_while_the_flow_rises(
 def test_forces_scale_with_rho_nu_squared_at_a_reynolds_number(
     name: str, ratio: float, reynolds: float, d: float, nu: float, rho: float
 ) -> None:
-    grain = Exposure(d, ratio * d, rho, nu)
+    grain = Exposure(diameter=d, roughness=ratio * d, fluid_density=rho, viscosity=nu)
     ustar = grain.ustar(reynolds)
     for force, scale in zip(FORCES, np.array([1, 1, d]) * rho * nu**2, strict=True):
         value = float(getattr(LAWS[name], force)(ustar, grain))
@@ -101,7 +103,13 @@ def test_forces_scale_with_rho_nu_squared_at_a_reynolds_number(
 
 @pytest.mark.parametrize("name", [name for name, one in LAWS.items() if one.protrudes])
 def test_the_higher_a_grain_stands_the_more_it_feels(name: str) -> None:
-    at = Exposure(1e-3, 1e-3 / 30, 1000.0, 1e-6, gap=np.linspace(-1.2, 1, 12) * 1e-3)
+    at = Exposure(
+        diameter=1e-3,
+        roughness=1e-3 / 30,
+        fluid_density=1000.0,
+        viscosity=1e-6,
+        gap=np.linspace(-1.2, 1, 12) * 1e-3,
+    )
     drag = LAWS[name].drag(0.03, at)
     assert np.isfinite(drag).all()
     assert (np.diff(drag[1:]) > 0).all()

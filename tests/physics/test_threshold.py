@@ -38,13 +38,15 @@ INDEPENDENT = [
 def of_air(
     name: str, d: ArrayLike, ratio: float, alpha: float, beta: float, nu: ArrayLike
 ) -> Threshold:
-    where = Exposure(d, np.multiply(ratio, d), 1.0, nu)
+    where = Exposure(
+        diameter=d, roughness=np.multiply(ratio, d), fluid_density=1.0, viscosity=nu
+    )
     angles = {"slope_deg": alpha, "entrainment_angle_deg": beta}
     return threshold(LAWS[name], where, density=2500.0, **angles)
 
 
 def water(d: float, beta: float = 50, law: str = "bridged") -> Threshold:
-    where = Exposure(d, d / 30, 1000.0, 1e-6)
+    where = Exposure(diameter=d, roughness=d / 30, fluid_density=1000.0, viscosity=1e-6)
     return threshold(
         LAWS[law], where, density=2650.0, slope_deg=0, entrainment_angle_deg=beta
     )
@@ -106,7 +108,10 @@ def test_the_bridged_curve_dips_between_the_regimes_and_leaves_soulsby_below_one
 def test_moments_balance_at_the_threshold(
     name: str, d: float, ratio: float, beta: float, slope: float, nu: float
 ) -> None:
-    law, where = LAWS[name], Exposure(d, ratio * d, 1.0, nu)
+    law, where = (
+        LAWS[name],
+        Exposure(diameter=d, roughness=ratio * d, fluid_density=1.0, viscosity=nu),
+    )
     found = of_air(name, d, ratio, slope, beta, nu)
     b, u = np.radians(beta), found.friction_velocity
     moment = (
@@ -124,7 +129,7 @@ def test_moments_balance_at_the_threshold(
 def test_an_array_of_grains_is_its_grains_in_turn(name: str) -> None:
     d, slope = np.array([[5e-5], [3e-4], [2e-3]]), np.array([0.0, 10.0, 25.0])
     where, grain = (
-        Exposure(d, d / 10, 1.0, 1e-5),
+        Exposure(diameter=d, roughness=d / 10, fluid_density=1.0, viscosity=1e-5),
         {"density": 2500.0, "entrainment_angle_deg": 60},
     )
     many = threshold(LAWS[name], where, slope_deg=slope, **grain)
@@ -144,7 +149,10 @@ def test_an_array_of_grains_is_its_grains_in_turn(name: str) -> None:
 def test_thresholds_rise_with_slope_weight_and_the_depth_of_the_pocket(
     name: str, d: float, ratio: float, beta: float, factor: float
 ) -> None:
-    where, grain = Exposure(d, ratio * d, 1.0, 1e-5), {"density": 2500.0}
+    where, grain = (
+        Exposure(diameter=d, roughness=ratio * d, fluid_density=1.0, viscosity=1e-5),
+        {"density": 2500.0},
+    )
     slopes = np.linspace(0, beta, 9)
     angle = {"entrainment_angle_deg": beta}
     up = threshold(
@@ -159,7 +167,7 @@ def test_thresholds_rise_with_slope_weight_and_the_depth_of_the_pocket(
 def test_without_resistance_there_is_no_threshold() -> None:
     found = threshold(
         LAWS["bridged"],
-        Exposure(1e-3, 1e-4, 1000.0, 1e-6),
+        Exposure(diameter=1e-3, roughness=1e-4, fluid_density=1000.0, viscosity=1e-6),
         density=np.array([2650.0, 900.0, 2650.0, np.nan]),
         slope_deg=np.array([-50.0, 0.0, 0.0, 0.0]),
         entrainment_angle_deg=45.0,
@@ -178,7 +186,13 @@ def test_a_grain_without_resistance_has_no_threshold_under_any_law(name: str) ->
 
 def test_a_grain_that_no_flow_moves_has_an_infinite_threshold() -> None:
     # a grain without lift, in a pocket that is bottomless for a drag
-    where = Exposure(1e-3, 1e-3 / 30, 1000.0, 1e-6, lift_coefficient=0.0)
+    where = Exposure(
+        diameter=1e-3,
+        roughness=1e-3 / 30,
+        fluid_density=1000.0,
+        viscosity=1e-6,
+        lift_coefficient=0.0,
+    )
     angles = {"slope_deg": 0, "entrainment_angle_deg": 0}
     found = threshold(LAWS["bridged"], where, density=2650.0, **angles)
     assert float(found.friction_velocity) == float(found.shields) == np.inf
@@ -189,7 +203,13 @@ def test_a_lift_beyond_the_weight_ends_the_pivot() -> None:
     """Up a slope the lift can pass the weight before the drag turns the grain."""
     grain = {"density": 2650.0, "slope_deg": 20}
     for lift, reason in ((10.0, "lift over the weight"), (1.615, "")):
-        where = Exposure(5e-4, 5e-4 / 30, 1.2, 1.5e-5, lift)
+        where = Exposure(
+            diameter=5e-4,
+            roughness=5e-4 / 30,
+            fluid_density=1.2,
+            viscosity=1.5e-5,
+            lift_coefficient=lift,
+        )
         found = threshold(LAWS["bridged"], where, entrainment_angle_deg=50, **grain)
         assert bool(found.valid) == (not reason)
         (text,) = physics.why_not(
@@ -208,7 +228,9 @@ def test_a_small_grain_hides_between_its_neighbours() -> None:
 
 
 class TestFrictionVelocityAt:
-    where = Exposure(1e-3, 1e-4, 1000.0, 1e-6)
+    where = Exposure(
+        diameter=1e-3, roughness=1e-4, fluid_density=1000.0, viscosity=1e-6
+    )
 
     def test_the_local_flow_is_the_undisturbed_one_sped_up(self) -> None:
         ratio = np.array([0.5, 1.0, 1.6])
@@ -283,7 +305,13 @@ def test_a_torque_and_a_lift_both_lower_the_threshold() -> None:
     assert float(water(3e-4, law="zeng-torque").friction_velocity) < float(bare)
     without_lift = threshold(
         LAWS["bridged"],
-        Exposure(3e-4, 1e-5, 1000.0, 1e-6, lift_coefficient=0.0),
+        Exposure(
+            diameter=3e-4,
+            roughness=1e-5,
+            fluid_density=1000.0,
+            viscosity=1e-6,
+            lift_coefficient=0.0,
+        ),
         density=2650.0,
         slope_deg=0,
         entrainment_angle_deg=50,

@@ -49,7 +49,7 @@ def test_measured_is_the_same_flow_with_the_measured_threshold(
     (wind,) = measurable_speeds(
         [row["measured_ustar0_m_s"]],
         roughness=row["z0_m"],
-        density=row["rho_f_kg_m3"],
+        fluid_density=row["rho_f_kg_m3"],
         viscosity=row["nu_m2_s"],
         depth=math.nan,
     )["wind_10m_m_s"]

@@ -180,7 +180,7 @@ def test_a_channel_is_laminar_by_its_flow_where_it_has_no_mean_velocity(
         ustar0,
         roughness=1e-3 / 30,
         viscosity=nu,
-        density=1.0,
+        fluid_density=1.0,
         depth=depth,
         closed=closed,
     )
