@@ -621,10 +621,11 @@ def _card(name: str, fraction: float, theta: _Interval, ustar0: _Interval) -> Ca
             )
         )
     return Card(
-        f"How far do the choices of the model move the flow that moves {part}?",
+        f"How far off may the flow be that moves {part} of the grains, by the model?",
         f"{name}.",
         tuple(numbers),
-        "Nothing is measured here: each choice is changed alone.",
+        "Nothing is measured here: each choice of the model is changed alone, such as "
+        "how grains are packed, and the changes are added up.",
         Worth("good", "usable", "Quote the interval beside a threshold of such a bed."),
     )
 

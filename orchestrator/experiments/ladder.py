@@ -48,6 +48,7 @@ from orchestrator.grains.loads import forget
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import of_pile
 from orchestrator.report import style
+from orchestrator.report.card import Card, Number, Worth
 from orchestrator.report.page import Section
 from orchestrator.report.style import Figure, Look
 from orchestrator.runs.case import Case
@@ -501,9 +502,44 @@ def _sections(pairs: pd.DataFrame, known: pd.DataFrame) -> list[Section]:
     title = "The rungs, and what is known of them"
     of_rungs = _tables_of_rungs(known)
     return [
+        Section("", card=_card(pairs)),
         Section("Speed against accuracy", words["accuracy"], charts, [means]),
         Section(title, words["rungs"], (), of_rungs, [words["limit"]]),
     ]
+
+
+def _card(pairs: pd.DataFrame) -> Card:
+    """The answer card: what the cheapest models within some errors cost."""
+    alike = pairs[pairs["same_model"]]
+    each = alike.assign(largest=alike["largest"].abs()).groupby(PAIR, sort=False)
+    worst = each["largest"].max()
+    cost = each["cost_core_s"].mean()
+    numbers = []
+    for tolerance in TOLERANCES:
+        within = cost[worst <= tolerance]
+        if within.empty:
+            continue
+        flow, grains = within.sort_values().index.tolist()[0]
+        meaning = f"of one core for a pile within {100 * tolerance:g} %"
+        note = f"flow by “{flow}”, grains by “{grains}”"
+        numbers.append(Number(float(within.min()), "s", meaning, note))
+    best = (REFERENCE.name, REFERENCE.name)
+    if best in cost.index:
+        meaning = "of one core for the reference"
+        off = 100 * float(pairs["reference_error"].max())
+        note = ""
+        if math.isfinite(off):
+            note = f"other numbers of its own move it by up to {off:.2g} %"
+        numbers.append(Number(float(cost[best]), "s", meaning, note))
+    return Card(
+        "How much computing time does a threshold need, by how far off it may be?",
+        f"{int(pairs.groupby(PAIR)['piles'].sum().max())} piles, each by "
+        f"{len(worst)} pairs of models for flow and grains.",
+        tuple(numbers),
+        "Nothing is measured here: errors are those from the most costly models, the "
+        "reference, at 10, 30, 50 and 70 % of the grains.",
+        Worth("good", "usable", "A tolerance in a study file chooses by these errors."),
+    )
 
 
 def _tables_of_rungs(known: pd.DataFrame) -> list[pd.DataFrame]:

@@ -26,6 +26,7 @@ from orchestrator.fidelity.decision import as_asked, written
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import Motion
 from orchestrator.report import style
+from orchestrator.report.card import Card, Mark, Number, Worth
 from orchestrator.report.page import Section
 from orchestrator.report.style import Figure
 from orchestrator.runs import case
@@ -225,13 +226,42 @@ def experiment(out: Path, folder: Path = FOLDER) -> Experiment:
 def _sections(maps: Sequence[Map], table: pd.DataFrame) -> list[Section]:
     """The page: all maps in one figure, and each with its question."""
     whole = Figure("maps", TITLE, "", (), draw(maps, table))
-    sections = [Section("All maps", MAPS_TEXT, [whole])]
+    sections = [
+        Section("", card=_card(table)),
+        Section("All maps", MAPS_TEXT, [whole]),
+    ]
     for each in maps:
         title = each.data["title"]
         figure = Figure(f"map-{each.name}", title, "", (), draw([each], table))
         limits = each.data.get("limits", ())
         sections.append(Section(title, each.data["question"], [figure], (), limits))
     return sections
+
+
+def _card(table: pd.DataFrame) -> Card:
+    """The answer card: how many runs are good, failed aloud, and failed silently."""
+    of = len(table)
+    counts = table["verdict"].value_counts()
+    good = int(counts.get("good", 0))
+    noticed = int(table["caught"].sum())
+    silent = of - good - noticed
+    told: tuple[tuple[int, str, str, Mark], ...] = (
+        (good, "runs are good", f"within {WRONG:.0%} of their references", "good"),
+        (noticed, "runs say that they failed", "noisy, exploded or stalled", "care"),
+        (silent, "runs are wrong and say nothing", "further off", "bad"),
+    )
+    numbers = []
+    for count, meaning, note, mark in told:
+        number = Number(count, f"of {of}", meaning, note, decimals=0, mark=mark)
+        numbers.append(number)
+    return Card(
+        "Where do the methods fail, and do they say so?",
+        f"{table['map'].nunique()} maps of two numbers each, taken far beyond what is "
+        "used.",
+        tuple(numbers),
+        "Nothing is measured here: each run is compared with a finer one.",
+        Worth("good", "usable", "Stay where the maps are good."),
+    )
 
 
 def judge(one: Map, runs: Runs) -> pd.DataFrame:

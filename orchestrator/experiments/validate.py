@@ -108,6 +108,8 @@ COLOURS = (
     "#d55e00",
 )
 """Colours of the models in figures."""
+MARKERS = "os^DvPX"
+"""Markers of the models."""
 
 
 def by_paper(beds: pd.DataFrame) -> FloatArray:
@@ -563,8 +565,8 @@ def _card(median: "pd.Series[float]") -> Card:
         Number(
             usual,
             "times",
-            f"off the measurements: “{median.index[0]}”",
-            "the first of the list",
+            f"off the measurements: the model “{median.index[0]}”",
+            "the first of the list below; in the median of the sets",
             decimals=2,
         ),
         Number(
@@ -583,8 +585,9 @@ def _card(median: "pd.Series[float]") -> Card:
             "No model is within what is asked; the default is kept.",
         )
     return Card(
-        "Which model is nearest to measured thresholds?",
-        f"{len(median)} models beside flumes, wind tunnels and field sites.",
+        "Which model is nearest to measured thresholds, and how far off is it?",
+        f"{len(median)} models beside flumes, wind tunnels and field sites; nothing is "
+        "fitted to them.",
         numbers,
         "Each set and its source stands below; a factor of 1 is the measurement.",
         worth,
@@ -628,7 +631,8 @@ def factors(scored: pd.DataFrame) -> Canvas:
         y = [sets.index(name) + offset for name in part["set"]]
         ends = part["ratio_10"], part["ratio_90"]
         ax.hlines(y, *ends, color=colour, lw=2.5, alpha=0.5)
-        ax.plot(part["ratio"], y, "o", color=colour, label=model.name)
+        marker = MARKERS[number]
+        ax.plot(part["ratio"], y, marker, ms=5, color=colour, label=model.name)
     ax.axvline(1.0, color="0.2", lw=0.8)
     ax.axvspan(1 / ENOUGH, ENOUGH, color="0.93", zorder=0)
     ax.set_xscale("log")

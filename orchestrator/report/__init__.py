@@ -70,7 +70,7 @@ def _heads(
     results: "Results", guests: Sequence["Guest"], faults: list[str]
 ) -> "dict[str, Any]":
     """The picture below the card, and what stands under a picture of grains."""
-    from orchestrator.report import head, style
+    from orchestrator.report import drawing, head, style
 
     shown: dict[str, Any] = {"head": None, "under": None}
     if guests:
@@ -80,7 +80,7 @@ def _heads(
             with style.settings():
                 chosen = choose(results)
                 if chosen is not None:
-                    shown[name] = (chosen, head.written(chosen))
+                    shown[name] = (chosen, drawing.written(chosen))
         except Exception as error:
             fault = f"{head.__name__}: {type(error).__name__}: {error}"
             faults.append(fault)

@@ -4,13 +4,13 @@ import math
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
+import numpy as np
 import pandas as pd
 
 from orchestrator.grains.pile import Pile
 from orchestrator.physics.constants import GRAIN_COLUMNS
-from orchestrator.physics.laws import LAWS
+from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.measured import MEASURED_SOURCE, wilcock_crowe_hiding
-from orchestrator.physics.threshold import SingleGrain, thresholds_of
 from orchestrator.report import labels, sheets, single, theory
 from orchestrator.report.card import Card, Mark, Number, Worth
 from orchestrator.report.results import (
@@ -23,10 +23,13 @@ from orchestrator.report.subjects import (
     TERMS,
     Quantity,
     fluid,
+    is_gas,
     kind_of_grain,
     length,
     solid,
 )
+from orchestrator.tables.quoted import grain_ustar
+from orchestrator.types import BoolArray, FloatArray
 
 NONE = Card(
     "When do these grains start to move?",
@@ -69,11 +72,9 @@ def card(results: Results) -> Card:
     best = theory.best(theory.ranked(results))
     if len(best) > theory.MANY:
         return _of_laws(results, best)
-    thresholds = results.joined("pile_threshold")
-    hills = list(measured_hills(results))
-    if hills and not thresholds["usable"].any():
-        return _of_hills(hills)
-    if len(thresholds):
+    if is_of_hills(results):
+        return _of_hills([*measured_hills(results)])
+    if len(results.joined("pile_threshold")):
         return _of_beds(results)
     grains = sheets.single_grains(results)
     return _of_grains(grains) if len(grains) else NONE
@@ -165,16 +166,53 @@ def _numbers_of_bed(
     if has_place:
         yield _place(row, pile, results)
     if first > 0:
-        yield Number(
-            single.in_unit(row, first, told),
-            told.unit,
-            f"{told.name} that moves the first grains",
-            single.place_of(told, row),
-            measured=single.in_unit(row, single.measured_ustar(row, first), told),
-        )
+        yield _first_motion(row, first, told)
     yield share(row, told)
     if not has_place:
         yield ustar_number(row)
+
+
+def _first_motion(row: pd.Series, first: float, told: Quantity) -> Number:
+    """The flow that moves the first grains, with its interval or that of the seeds."""
+    low, high = single.first_interval(row)
+    of_what = "load step and the known error of the method"
+    if row["of_seeds"] > 1:
+        low = float(row["first_least"])
+        high = float(row["first_largest"])
+        of_what = _of_seeds(row)
+    elif row["tested_rows"] > 0:
+        of_what = single.tested_on(row)
+    return Number(
+        single.in_unit(row, first, told),
+        told.unit,
+        f"{told.name} that moves the first grains",
+        single.place_of(told, row),
+        low=single.in_unit(row, low, told),
+        high=single.in_unit(row, high, told),
+        interval_of=of_what,
+        measured=single.in_unit(row, single.measured_ustar(row, first), told),
+    )
+
+
+def _of_seeds(row: pd.Series) -> str:
+    """What the interval of several beds is of."""
+    return f"{row['seeds']} beds that differ in chance alone"
+
+
+def _share_interval(row: pd.Series) -> tuple[float, float, str]:
+    """Ends of the friction velocity of a share (m/s), and what the interval is of."""
+    ustar = float(row["ustar0_m_s"])
+    if row["of_seeds"] > 1:
+        ends = (float(row["least"]), float(row["largest"]))
+        of_what = _of_seeds(row)
+    elif row["tested_rows"] > 0:
+        return *single.tested(row, ustar), single.tested_on(row)
+    else:
+        ends = (single.known(row["shields_low"]), single.known(row["shields_high"]))
+        of_what = "load steps, count and the known error of the method"
+    theta = float(row["shields"])
+    low, high = (ustar * math.sqrt(end / theta) for end in ends)
+    return low, high, of_what
 
 
 def _place(row: pd.Series, pile: Pile, results: Results) -> Number:
@@ -225,13 +263,7 @@ def share(row: pd.Series, told: Quantity) -> Number:
         With its interval, or the range of the seeds.
     """
     ustar = float(row["ustar0_m_s"])
-    theta = float(row["shields"])
-    ends = (single.known(row["shields_low"]), single.known(row["shields_high"]))
-    of_what = "load steps, count and the known error of the method"
-    if row["of_seeds"] > 1:
-        ends = (row["least"], row["largest"])
-        of_what = f"{row['seeds']} beds that differ in chance alone"
-    low, high = (ustar * math.sqrt(float(end) / theta) for end in ends)
+    low, high, of_what = _share_interval(row)
     part = f"{row['fraction']:.0%}".replace("%", " %")
     what = "of the bed" if row["method"] == "local" else "of the grains"
     return Number(
@@ -260,13 +292,14 @@ def ustar_number(row: pd.Series) -> Number:
         With its interval.
     """
     ustar = float(row["ustar0_m_s"])
+    low, high, _ = _share_interval(row)
     return Number(
         ustar,
         "m/s",
         "friction velocity",
         "the pull of the flow on the ground, written as a speed",
-        low=single.known(row.get("ustar0_low_m_s")),
-        high=single.known(row.get("ustar0_high_m_s")),
+        low=low,
+        high=high,
         measured=single.measured_ustar(row, ustar),
     )
 
@@ -318,7 +351,9 @@ def _span_of(rows: pd.DataFrame) -> str:
     parts = [f"grains of {sizes}"]
     slopes = sorted(set(rows["alpha_deg"]))
     if slopes != [0.0]:
-        parts.append(f"slopes of {' to '.join(_ends(slopes))}°")
+        ends = _ends(slopes)
+        word = "slopes" if len(ends) > 1 else "a slope"
+        parts.append(f"{word} of {' to '.join(ends)}°")
     fluids = dict.fromkeys(
         fluid(float(rho), float(nu))
         for rho, nu in zip(rows["rho_f_kg_m3"], rows["nu_m2_s"], strict=True)
@@ -364,7 +399,7 @@ def _usable_number(count: int, of: int) -> Number:
         count,
         f"of {of}",
         "thresholds are usable",
-        "the tables give the reason for each other one",
+        "" if count == of else "the tables give the reason for each other one",
         decimals=0,
         mark=_mark_of(count, of),
     )
@@ -468,20 +503,62 @@ def laws_that_hold(row: pd.Series) -> dict[str, float]:
     Parameters
     ----------
     row
-        Columns `GRAIN_COLUMNS` of a grain.
+        A threshold with the columns of its scene.
 
     Returns
     -------
     dict of str to float
         Friction velocity at the threshold, m/s, by the name of the law.
     """
-    asked = SingleGrain.of_row(row.to_dict())
+    return {name: ustar for name, (ustar, holds) in by_law(row).items() if holds}
+
+
+def by_law(row: pd.Series) -> dict[str, tuple[float, bool]]:
+    """Find the threshold of a single grain by each force law, by its own criterion.
+
+    Parameters
+    ----------
+    row
+        A threshold with the columns of its scene.
+
+    Returns
+    -------
+    dict of str to tuple of float and bool
+        Friction velocity at the threshold, m/s, and whether the law holds there, by the
+        name of the law.
+    """
     found = {}
     for name in LAWS:
-        (at,) = thresholds_of(name, [asked])
-        if bool(at.valid):
-            found[name] = float(at.friction_velocity)
+        (ustar,), (holds,) = by_this_law(pd.DataFrame([row]).assign(force_law=name))
+        found[name] = float(ustar), bool(holds)
     return found
+
+
+def by_this_law(rows: pd.DataFrame) -> tuple[FloatArray, BoolArray]:
+    """Find the thresholds of single grains by one law, by their own criterion.
+
+    Parameters
+    ----------
+    rows
+        Thresholds with the columns of their scenes, of one force law.
+
+    Returns
+    -------
+    ustar : ndarray
+        Friction velocity at the threshold, m/s, shape (n,).
+    holds : ndarray
+        Whether the law holds there, shape (n,).
+    """
+    ustar = grain_ustar(rows)
+    exposure = Exposure(
+        diameter=rows["d_m"].to_numpy(float),
+        roughness=rows["z0_m"].to_numpy(float),
+        fluid_density=rows["rho_f_kg_m3"].to_numpy(float),
+        viscosity=rows["nu_m2_s"].to_numpy(float),
+        lift_coefficient=rows["alpha_s"].to_numpy(float),
+    )
+    law = LAWS[str(rows["force_law"].iloc[0])]
+    return ustar, np.asarray(law.valid(ustar, exposure))
 
 
 # many laws, and hills
@@ -521,47 +598,65 @@ def _of_laws(results: Results, best: Sequence[theory.Line]) -> Card:
     mark: Mark = "good" if count == of else "care"
     return Card(
         "Which force law comes nearest to measured thresholds?",
-        f"{law} of {len(best)} laws. {_span_of(results.scenes)}",
+        f"Nearest of {len(best)} laws: {law}. {_span_of(results.scenes)}",
         (*numbers, _usable_number(count, of)),
-        f"{MEASURED_SOURCE}. {said}".strip(),
+        f"{MEASURED_SOURCE[:1].upper()}{MEASURED_SOURCE[1:]}. {said}".strip(),
         Worth(mark, word, f"In water take {law}; in air see what qualifies it."),
     )
 
 
 def _of_hills(hills: Sequence[tuple[float, pd.DataFrame]]) -> Card:
     """The card of hills that others measured: where reversed flow ends behind each."""
-    numbers = []
-    for aspect, rows in hills[:3]:
-        row = rows.iloc[0]
-        model = labels.value("turbulence_model", row["turbulence_model"])
-        ends = rows["reattachment_over_h"]
-        end = float(row["reattachment_over_h"])
-        numbers.append(
-            Number(
-                0.0 if math.isnan(end) else end,
-                "heights",
-                f"reversed flow behind the hill of half length {aspect:g} h",
-                f"by {model}, from the top; 0: none",
-                low=float(ends.fillna(0.0).min()),
-                high=float(ends.fillna(0.0).max()),
-                interval_of=f"the {len(rows)} turbulence models",
-                measured=float(row["measured_reattachment_over_h"] or 0.0)
-                if pd.notna(row["measured_reattachment_over_h"])
-                else 0.0,
-                decimals=1,
-            )
-        )
-    verified = all(rows["measured_verified"].all() for _, rows in hills)
-    source_ = str(hills[0][1]["measured_source"].iloc[0])
-    if not verified:
-        source_ += " (not every number was read in its source)"
+    first = hills[0][1]
+    source_ = str(first["measured_source"].iloc[0])
+    source_ = f"Squares: {source_}."
+    if not all(rows["measured_verified"].all() for _, rows in hills):
+        source_ += " Not every number was read in its source."
     return Card(
-        "Does the computed flow over hills end where it did in the wind tunnel?",
+        "Does the computed flow turn back behind a hill as it did in the wind tunnel?",
         f"{len(hills)} hills of the wind-tunnel experiment RUSHIL; no grains move.",
-        tuple(numbers),
+        tuple(_behind(aspect, rows) for aspect, rows in hills[:3]),
         source_,
-        Worth("care", "usable, for flows", "Compare the models; no threshold is meant"),
+        Worth(
+            "care", "usable, for flows", "Compare the models; no threshold is meant."
+        ),
     )
+
+
+def _behind(aspect: float, rows: pd.DataFrame) -> Number:
+    """How far the flow runs back behind a hill, by the first model and by all."""
+    row = rows.iloc[0]
+    model = labels.value("turbulence_model", row["turbulence_model"])
+    ends = rows["reattachment_over_h"].fillna(0.0)
+    measured = single.known(row["measured_reattachment_over_h"])
+    return Number(
+        single.known(row["reattachment_over_h"]) if ends.iloc[0] else 0.0,
+        "heights",
+        f"behind the top the flow runs back, of a hill of half length {aspect:g} h",
+        f"by {model}; 0: it runs back nowhere",
+        low=float(ends.min()),
+        high=float(ends.max()),
+        interval_of=f"the {len(rows)} turbulence models",
+        measured=0.0 if math.isnan(measured) else measured,
+        decimals=1,
+    )
+
+
+def is_of_hills(results: Results) -> bool:
+    """Whether a study is about hills that others measured, none of whose grains count.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Returns
+    -------
+    bool
+        Whether it is.
+    """
+    thresholds = results.joined("pile_threshold")
+    return bool([*measured_hills(results)]) and not thresholds["usable"].any()
 
 
 def _worth_of_many(shown: pd.DataFrame, count: int, of: int) -> Worth:
@@ -575,7 +670,11 @@ def _worth_of_many(shown: pd.DataFrame, count: int, of: int) -> Worth:
     if all(is_near):
         return Worth("good", "usable", "All are within what was measured.")
     outside = len(is_near) - sum(is_near)
-    advice = f"{outside} of {len(is_near)} are outside what was measured on level beds."
+    what = "wind" if is_gas(float(shown.iloc[0]["rho_f_kg_m3"])) else "flow"
+    advice = (
+        f"{outside} of {len(is_near)} are outside what was measured on level beds: for "
+        f"a {what} take the measured value, to compare beds the computed ones."
+    )
     return Worth("care", "usable, with a correction", advice)
 
 

@@ -131,6 +131,8 @@ def typeset(text: str) -> Markup:
     """
     index = r"\b([^\W\d_]|[^\W\d_a-z][^\W\d_]{1,2})_([A-Za-z]+)\b(?!_)"
     html = re.sub(index, r"\1<sub>\2</sub>", str(escape(text)))
+    # no line breaks within an interval
+    html = re.sub(r"(?<=\d) … (?=\d)", "\u00a0…\u00a0", html)
     return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", html))
 
 

@@ -149,10 +149,19 @@ def seeds_as_one(rows: pd.DataFrame) -> pd.DataFrame:
     rows = rows.assign(of_seeds=twins.transform("size"))[is_told]
     groups = rows.groupby(keys, dropna=False)
     tau = groups["shields"]
-    names = ["shields", "ustar0_m_s", "shields_model_low", "shields_model_high"]
+    names = [
+        "shields",
+        "ustar0_m_s",
+        "first_ustar0_m_s",
+        "shields_model_low",
+        "shields_model_high",
+    ]
+    first = groups["first_ustar0_m_s"]
     means: pd.DataFrame = groups[names].transform("mean")
     rows = rows.assign(
         **means,
+        first_least=first.transform("min"),
+        first_largest=first.transform("max"),
         least=tau.transform("min"),
         largest=tau.transform("max"),
         seeds=tau.transform("size"),

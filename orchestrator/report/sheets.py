@@ -11,7 +11,7 @@ from orchestrator.fidelity.fidelities import FIDELITIES, LOCAL, OWN_NUMBERS
 from orchestrator.grains.threshold import STEP
 from orchestrator.physics.laws import LAWS
 from orchestrator.report import labels, single
-from orchestrator.report.results import Results, split
+from orchestrator.report.results import Results, measured_hills, split
 from orchestrator.report.subjects import MEAN, STRESS, TERMS, WIND, Quantity, is_gas
 from orchestrator.study import fields
 
@@ -134,6 +134,10 @@ def _first_grain(row: pd.Series, frame: pd.DataFrame) -> pd.DataFrame:
     values[PART] = "first grain"
     heads = _heads(told)
     values[heads[0]] = f"{single.in_unit(row, ustar, told):#.3g}"
+    ends = single.first_interval(row)
+    if heads[1] in values and not np.isnan(ends).all():
+        low, high = (single.in_unit(row, end, told) for end in ends)
+        values[heads[1]] = labels.interval(low, high)
     if heads[2] in values:
         values[heads[2]] = f"{single.in_unit(row, beside, told):#.3g}"
     if USTAR_HEAD in values:
@@ -258,6 +262,7 @@ def _thresholds(
     order = list(keys) if is_range else ["alpha_deg", "d_m"]
     rows = rows.sort_values(order, kind="stable")
     told = quantity(rows)
+    rows = _with_tested(rows, told)
     rows = _open_ended(rows, "shields_low", "shields_high")
     rows = _open_ended(rows, told.column("_low"), told.column("_high"))
     number = rows.groupby(list(keys), dropna=False, sort=False).ngroup()
@@ -291,6 +296,25 @@ def _thresholds(
     return pd.DataFrame(table)
 
 
+def _with_tested(rows: pd.DataFrame, told: Quantity) -> pd.DataFrame:
+    """Rows whose intervals are the tested ones where there are such."""
+    is_tested = rows["tested_rows"] > 0
+    if not is_tested.any():
+        return rows
+    of_unit: dict[str, list[float]] = {"_low": [], "_high": []}
+    for _, row in rows.iterrows():
+        ends = single.tested(row, float(row["ustar0_m_s"]))
+        for name, end in zip(of_unit, ends, strict=True):
+            of_unit[name].append(single.in_unit(row, end, told))
+    changed = {}
+    for name, values in of_unit.items():
+        column = told.column(name)
+        changed[column] = rows[column].mask(is_tested, values)
+        tau = rows[f"tested{name}"]
+        changed[f"shields{name}"] = rows[f"shields{name}"].mask(is_tested, tau)
+    return rows.assign(**changed)
+
+
 def _usable(count: int, of: int, why_not: str, is_range: bool) -> str:
     """How many of the thresholds of a row are usable, or why one is not."""
     if is_range:
@@ -298,6 +322,45 @@ def _usable(count: int, of: int, why_not: str, is_range: bool) -> str:
     if of > 1:
         return f"{count} of {of} seeds"
     return "yes" if count else f"no: {why_not}"
+
+
+def hills(results: Results) -> Sheet:
+    """List where the flow runs back behind hills that others measured.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Returns
+    -------
+    Sheet
+        A row for each hill and turbulence model.
+    """
+    table = []
+    for aspect, rows in measured_hills(results):
+        for _, row in rows.iterrows():
+            starts = row["separation_over_h"]
+            ends = row["reattachment_over_h"]
+            measured = row["measured_reattachment_over_h"]
+            cells = {
+                "half length, h": f"{aspect:g}",
+                "turbulence model": labels.value(
+                    "turbulence_model", row["turbulence_model"]
+                ),
+                "the flow runs back from, h": _or_nowhere(starts),
+                "to, h": _or_nowhere(ends),
+                "measured to, h": _or_nowhere(measured),
+            }
+            table.append(cells)
+    shared = ("distances from the top, in heights of the hill",)
+    title = "Where the flow runs back behind each hill"
+    return Sheet(title, pd.DataFrame(table), shared, (), "tables/flow.csv")
+
+
+def _or_nowhere(distance: float) -> str:
+    """A distance, or that there is none."""
+    return f"{distance:.1f}" if distance > 0 else "nowhere"
 
 
 def sizes(results: Results) -> Sheet | None:

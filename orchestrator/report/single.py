@@ -191,10 +191,8 @@ def numbers_of_grain(
     high = max(holding.values(), default=math.nan)
     of_what = f"the {len(holding)} force laws that hold here"
     if row["tested_rows"] > 0:
-        low = ustar * math.sqrt(float(row["tested_low"]) / theta)
-        high = ustar * math.sqrt(float(row["tested_high"]) / theta)
-        share = f"{row['tested_held']:.0%}".replace("%", " %")
-        of_what = f"it held {share} of {row['tested_rows']:.0f} measured thresholds"
+        low, high = tested(row, ustar)
+        of_what = tested_on(row)
     elif len(holding) < 2:
         low = high = math.nan
     measured = measured_ustar(row, ustar)
@@ -223,6 +221,54 @@ def numbers_of_grain(
             )
         )
     return tuple(numbers)
+
+
+def tested(row: Row, ustar: float) -> tuple[float, float]:
+    """Find the ends of the tested interval of a friction velocity.
+
+    Parameters
+    ----------
+    row
+        A threshold with the columns of its scene.
+    ustar
+        A friction velocity of the same bed and grains, m/s.
+
+    Returns
+    -------
+    low, high : float
+        The ends, m/s; NaN where no measured thresholds are of such beds.
+    """
+    if not row["tested_rows"] > 0:
+        return math.nan, math.nan
+    theta = float(row["shields"])
+    low = ustar * math.sqrt(float(row["tested_low"]) / theta)
+    return low, ustar * math.sqrt(float(row["tested_high"]) / theta)
+
+
+def first_interval(row: Row) -> tuple[float, float]:
+    """Find the interval of the flow that moves the first grains of a bed.
+
+    Parameters
+    ----------
+    row
+        A threshold of a pile with the columns of its scene.
+
+    Returns
+    -------
+    low, high : float
+        The tested interval, or else that of load step and known error, m/s; an end that
+        is not known is NaN.
+    """
+    if row["tested_rows"] > 0:
+        return tested(row, known(row["first_ustar0_m_s"]))
+    low = known(row.get("first_ustar0_low_m_s"))
+    return low, known(row.get("first_ustar0_high_m_s"))
+
+
+def tested_on(row: Row) -> str:
+    """Say which measured thresholds the tested interval of a row held."""
+    part = f"{row['tested_held']:.0%}".replace("%", " %")
+    return f"it held {part} of {row['tested_rows']:.0f} measured thresholds"
 
 
 def source(row: Row, told: Quantity, ustar: float | None = None) -> str:
@@ -310,6 +356,8 @@ def worth(row: Row, few: bool = False) -> Worth:
         if has_remedy:
             reason, _, remedy = reason.removesuffix(")").rpartition(" (")
             remedies.insert(0, remedy)
+        if not remedies and known(row["measured_level_ustar_m_s"]) > 0:
+            remedies.append("take the measured value")
         return Worth("bad", f"not usable: {reason}", _sentence("; ".join(remedies)))
     if few:
         advice = (

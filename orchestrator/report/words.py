@@ -99,6 +99,8 @@ def sheet(results: Results, guests: Sequence[Guest] = ()) -> Sheet | None:
     for guest in guests:
         if guest.sheet is not None:
             return guest.sheet
+    if answers.is_of_hills(results):
+        return sheets.hills(results)
     best = theory.best(theory.ranked(results))
     if len(best) > theory.MANY:
         frame = theory.sheet(best)
@@ -253,7 +255,7 @@ def contents(
     has_strips = scenes["width"].any()
     # what a guest lists it has as a section of its own
     first = sheet(results)
-    short = sheets.short(results)
+    short = None if answers.is_of_hills(results) else sheets.short(results)
     is_same = first is None or short is None or first.frame.equals(short.frame)
     return {
         "card": card(results, guests),

@@ -4,6 +4,7 @@ Beside each stands what a measured threshold gives: the same flow, with the meas
 threshold of one grain on a level bed in place of the computed one.
 """
 
+import re
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import pandas as pd
 from orchestrator.physics import saltation
 from orchestrator.physics.beside import GOES_ON
 from orchestrator.physics.constants import GAS_BELOW, GRAIN_COLUMNS
+from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.threshold import SingleGrain, thresholds_of
 from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.types import FloatArray
@@ -20,6 +22,8 @@ ENDS = ("_low", "_high")
 """Endings of the columns of an interval, before the unit."""
 SPEEDS = ("wind_10m", "mean_velocity")
 """Speeds of which the interval and the measured value are told, without the unit."""
+GUSTS = re.compile(r"(\d+) of intensity (\S+),")
+"""Events and intensity in the words of the column ``gusts``."""
 
 
 def quoted(rows: pd.DataFrame) -> dict[str, FloatArray]:
@@ -48,7 +52,7 @@ def quoted(rows: pd.DataFrame) -> dict[str, FloatArray]:
     columns = {"stress_pa": density * ustar**2}
     for end, at in zip(ENDS, _interval(rows, ustar), strict=True):
         columns |= _in_units(rows, at, end)
-    level = _level_ustar(rows)
+    level = grain_ustar(rows.assign(alpha_deg=0.0))
     measured = {}
     for name in ("curve", "median", "low", "high"):
         theta = rows[f"measured_{name}"].to_numpy(float)
@@ -136,24 +140,52 @@ def _weight(rows: pd.DataFrame) -> FloatArray:
     return (excess * rows["g_m_s2"] * rows["d_m"]).to_numpy(float)
 
 
-def _level_ustar(rows: pd.DataFrame) -> FloatArray:
-    """Computed friction velocity of one grain on a level bed by each row's law, m/s."""
-    level = rows.assign(alpha_deg=0.0)
+def grain_ustar(rows: pd.DataFrame) -> FloatArray:
+    """Compute the threshold of one grain by each row's law, criterion and gusts.
+
+    Parameters
+    ----------
+    rows
+        Rows with the columns `GRAIN_COLUMNS`, ``force_law`` and ``gusts``; without
+        ``criterion`` grains leave their pockets.
+
+    Returns
+    -------
+    ndarray
+        Friction velocity of the mean flow on the slope of each row, m/s, shape (n,).
+    """
     found = np.full(len(rows), np.nan)
     for law in rows["force_law"].unique():
         is_of_law = (rows["force_law"] == law).to_numpy()
-        of_law = level.loc[is_of_law, list(GRAIN_COLUMNS.values())]
+        of_law = rows.loc[is_of_law, list(GRAIN_COLUMNS.values())]
         grains = [SingleGrain.of_row(row) for row in of_law.to_dict("records")]
         at = [each.friction_velocity for each in thresholds_of(str(law), grains)]
         found[is_of_law] = np.array(at, float)
+    gust = _gusts(rows)
+    leaving = found / np.sqrt(np.nan_to_num(gust, nan=1.0))
     if "criterion" not in rows:
-        return found
+        return leaving
     is_going_on = (rows["criterion"] == GOES_ON).to_numpy()
-    return np.where(is_going_on, _going_on(rows, found), found)
+    peak = np.nan_to_num(gust, nan=saltation.PEAK)
+    return np.where(is_going_on, _going_on(rows, found, peak), leaving)
 
 
-def _going_on(rows: pd.DataFrame, leaving: FloatArray) -> FloatArray:
-    """The same of grains that go on, from the one that turns them over."""
+def _gusts(rows: pd.DataFrame) -> FloatArray:
+    """Largest over mean stress of the gusts of each row; NaN without gusts."""
+    told = rows.get("gusts", pd.Series(None, rows.index, dtype=object))
+    found = told.astype(object).map(_gust, na_action="ignore")
+    return np.asarray(found, float)
+
+
+def _gust(told: str) -> float:
+    """Largest over mean stress of gusts that a table has as words."""
+    parts = GUSTS.match(told)
+    assert parts
+    return peak_over_mean(float(parts[2]), float(parts[1]))
+
+
+def _going_on(rows: pd.DataFrame, leaving: FloatArray, peak: FloatArray) -> FloatArray:
+    """The same of grains that go on, from the steady flow that turns them over."""
     density = rows["rho_f_kg_m3"].to_numpy(float)
     per_shields = _weight(rows) / density
     grains = saltation.Grains.of(
@@ -161,12 +193,13 @@ def _going_on(rows: pd.DataFrame, leaving: FloatArray) -> FloatArray:
         density=rows["rho_sol_kg_m3"],
         fluid_density=density,
         viscosity=rows["nu_m2_s"],
+        slope_deg=rows["alpha_deg"],
         roughness=rows["z0_m"],
         gravity=rows["g_m_s2"],
     )
-    further = saltation.tabulated(grains).initiation(saltation.PEAK)
+    further = saltation.tabulated(grains).initiation(peak)
     steady = leaving**2 / per_shields
-    found = saltation.motion(steady, further, saltation.hops(grains))
+    found = saltation.motion(steady, further, saltation.hops(grains), peak)
     return np.asarray(np.sqrt(found.shields * per_shields))
 
 

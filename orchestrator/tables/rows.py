@@ -546,6 +546,7 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
     place = point(scene)
     pivots = pile.pivot_thresholds(answer.speed)
     first_x, first_ustar0 = answer.first
+    first_low, first_high = _first_interval(answer)
     checked_x, checked_ustar0 = answer.checked
     for fraction in scene.threshold.fractions:
         found = answer.at(fraction)
@@ -573,6 +574,8 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
             **_speeds(scene, found.ustar0),
             "first_x_m": first_x,
             "first_ustar0_m_s": first_ustar0,
+            "first_ustar0_low_m_s": first_low,
+            "first_ustar0_high_m_s": first_high,
             "pivot_x_m": checked_x,
             "pivot_first_m_s": checked_ustar0,
             "pivot_ustar0_m_s": pivots[_needed(fraction, motion.count) - 1],
@@ -585,6 +588,24 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
             **_smoothing(answer),
             "case": pile.runs[-1].name if pile.runs else None,
         }
+
+
+def _first_interval(answer: Answer) -> tuple[float, float]:
+    """Ends of the friction velocity at which motion starts, m/s.
+
+    They hold the load step in which it starts and what is within the known error of the
+    level; they are not known without a known error.
+    """
+    error = answer.decision.error_estimate
+    _, ustar0 = answer.first
+    if error is None or np.isnan(ustar0):
+        return np.nan, np.nan
+    grains = threshold.of_grains(answer.motion)
+    is_first = np.flatnonzero(grains.value == ustar0)
+    least, most = threshold.within(ustar0**2, error)
+    low = np.append(grains.low[is_first], np.sqrt(least)).min()
+    high = np.append(grains.high[is_first], np.sqrt(most)).max()
+    return float(low), float(high)
 
 
 def _decided(answer: Answer) -> Row:

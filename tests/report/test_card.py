@@ -3,10 +3,14 @@
 import math
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from orchestrator.physics import saltation
+from orchestrator.physics.gusts import peak_over_mean
+from orchestrator.physics.threshold import SingleGrain, thresholds_of
 from orchestrator.physics.velocity import measurable_speeds
-from orchestrator.report import answers, head, shields, single
+from orchestrator.report import answers, drawing, head, head_grain, shields, single
 from orchestrator.report.card import Card, Number, Worth, lines
 from orchestrator.report.results import Results
 from tests.report.conftest import changed, copies, legend_of, only
@@ -100,7 +104,7 @@ def test_pictures_are_drawn_for_two_widths_in_the_colours_of_the_page(
     assert head.of(heap) is None
     chosen = head.below(heap)
     assert chosen is not None
-    html = head.written(chosen)
+    html = drawing.written(chosen)
     assert html.count("<svg") == 2
     assert 'class="draw wide"' in html
     assert 'class="draw narrow"' in html
@@ -123,3 +127,72 @@ def test_motion_starts_within_the_interval_of_its_place(results: Results) -> Non
         ends.append((place.low, place.high))
     assert ends[1][0] < ends[0][0]
     assert len(table)
+
+
+def test_the_first_motion_has_an_interval_in_its_unit(results: Results) -> None:
+    heap = only(results, "pile")
+    row = heap.joined("pile_threshold").iloc[0]
+    first = row["first_ustar0_m_s"]
+    assert row["first_ustar0_low_m_s"] < first < row["first_ustar0_high_m_s"]
+    number = answers.card(heap).numbers[1]
+    assert number.low < number.value < number.high
+    beside = {"tested_rows": 20.0, "tested_held": 0.8}
+    beside |= {"tested_low": row["shields"] / 4, "tested_high": 4 * row["shields"]}
+    table = heap.tables["pile_threshold"].assign(**beside)
+    tested = answers.card(changed(heap, pile_threshold=table)).numbers[1]
+    assert "80 % of 20 measured" in tested.interval_of
+    # a stress goes with the square of the friction velocity, and of the wind
+    assert tested.low == pytest.approx(number.value / 2, rel=0.1)
+    assert tested.high == pytest.approx(2 * number.value, rel=0.1)
+
+
+def test_the_answer_of_a_picture_is_that_of_the_card() -> None:
+    """By force law and by size, of a grain that must go on and of one that leaves."""
+    asked: dict[str, float | str] = {
+        "d_m": 2.5e-4,
+        "z0_m": 2.5e-4 / 30,
+        "rho_f_kg_m3": 1.225,
+        "nu_m2_s": 1.46e-5,
+        "alpha_s": 1.615,
+        "rho_sol_kg_m3": 2650.0,
+        "alpha_deg": 0.0,
+        "beta_deg": 60.0,
+        "g_m_s2": 9.81,
+        "cohesion_n_m": 0.0,
+        "force_law": "bridged",
+    }
+    leaves = answers.by_law(pd.Series(asked))["bridged"][0]
+    by_law = answers.by_law(pd.Series({**asked, "criterion": "goes on"}))
+    goes_on, holds = by_law["bridged"]
+    (steady,) = thresholds_of("bridged", [SingleGrain.of_row(asked)])
+    assert leaves == pytest.approx(float(steady.friction_velocity))
+    # a gust of 2.28 times the mean stress turns it over
+    gust = leaves / math.sqrt(saltation.PEAK)
+    assert goes_on == pytest.approx(gust)
+    assert holds
+    told = "100 of intensity 0.4, 1 √(d/g′) long"
+    under = answers.by_law(pd.Series({**asked, "gusts": told}))["bridged"][0]
+    peak = peak_over_mean(0.4, 100)
+    assert under == pytest.approx(leaves / math.sqrt(peak))
+
+
+@pytest.mark.parametrize("measured", [0.7, 1.0, 1.4])
+@pytest.mark.parametrize("narrow", [False, True])
+def test_labels_of_the_picture_of_a_grain_lie_on_no_points(
+    results: Results, measured: float, narrow: bool
+) -> None:
+    grain = only(results, "grain").joined("single_grain").iloc[0].copy()
+    grain["ustar0_m_s"] = grain["ustar_m_s"]
+    grain["measured_level_ustar_m_s"] = measured * grain["ustar0_m_s"]
+    canvas = head_grain.of_grain(grain).draw(narrow)
+    canvas.draw_without_rendering()
+    for ax in canvas.axes:
+        labels = [text for text in ax.texts if text.get_text()]
+        assert labels
+        for label in labels:
+            box = label.get_window_extent()
+            for line in ax.lines:
+                if line.get_marker() == "None":
+                    continue
+                points = ax.transData.transform(line.get_xydata())
+                assert not any(box.contains(x, y) for x, y in points)

@@ -1,0 +1,190 @@
+"""The picture of one grain: its threshold by force law and by size."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Canvas
+
+from orchestrator.physics.curves import Air, shao_lu, soulsby_whitehouse
+from orchestrator.report import answers, single
+from orchestrator.report.drawing import (
+    ANSWER,
+    FLOW,
+    GROUND,
+    INK,
+    LINE,
+    NONE,
+    SMALL,
+    TEXT,
+    Head,
+    figure,
+    log_sizes,
+    margins,
+)
+from orchestrator.report.style import Look
+from orchestrator.report.subjects import Quantity, is_gas
+
+
+def of_grain(row: pd.Series) -> Head:
+    """Draw the threshold by every law, and by the law that answers for other sizes.
+
+    Parameters
+    ----------
+    row
+        The threshold with the columns of its scene.
+
+    Returns
+    -------
+    Head
+        The picture.
+    """
+    told = single.quantity(row)
+    title = f"The {told.name} that moves the grain, by force law and by size"
+    caption = (
+        "By law: orange, the answer; blue discs, other laws that hold; grey rings, "
+        "laws outside their range. By size: the same law, each size on its like."
+    )
+
+    def draw(narrow: bool) -> Canvas:
+        canvas = figure(narrow, 470 if narrow else 320)
+        shape = (2, 1) if narrow else (1, 2)
+        axes = canvas.subplots(*shape)
+        margins(canvas, 112, 10, 24, 28)
+        if narrow:
+            canvas.subplots_adjust(hspace=0.28)
+        else:
+            canvas.subplots_adjust(wspace=0.16)
+        _by_law(axes[0], row, told)
+        _by_size(axes[1], row, told, narrow)
+        return canvas
+
+    return Head(draw, title, caption)
+
+
+def _by_law(ax: Axes, row: pd.Series, told: Quantity) -> None:
+    """A line of dots: the threshold under each law."""
+    found = []
+    for name, (ustar, holds) in answers.by_law(row).items():
+        found.append((holds, single.in_unit(row, ustar, told), name))
+    found.sort(key=lambda one: (one[0], one[1] if one[0] else -one[1]))
+    asked = str(row["force_law"])
+    measured = single.in_unit(row, single.measured_ustar(row, row["ustar0_m_s"]), told)
+    ax.grid(visible=True, axis="y")
+    for place, (holds, value, name) in enumerate(found):
+        look: Look = {"ms": 6, "mew": 1.3}
+        if name == asked:
+            look |= {"ms": 9, "color": ANSWER}
+            is_left = value < measured
+            ax.annotate(
+                f"{value:.3g}",
+                (value, place),
+                xytext=(-9 if is_left else 9, 0),
+                textcoords="offset points",
+                va="center",
+                ha="right" if is_left else "left",
+                color=ANSWER,
+                weight="bold",
+            )
+        elif holds:
+            look["color"] = FLOW
+        else:
+            look |= {"color": NONE, "mfc": "none"}
+        ax.plot([value], [place], "o", **look)
+    _measured_lines(ax, row, told)
+    ax.set_yticks(range(len(found)), [name for _, _, name in found])
+    shown = [value for holds, value, name in found if holds or name == asked]
+    least = min(*shown, measured)
+    most = max(*shown, measured)
+    ax.set_xlim(0.6 * least, 1.25 * most)
+    ax.set_ylim(-0.6, len(found) - 0.2)
+    ax.set_title(f"{told.name.capitalize()} by force law, {told.unit}", x=-0.2)
+
+
+def _measured_lines(ax: Axes, row: pd.Series, told: Quantity) -> None:
+    """A dashed line where the threshold was measured, and the field's range."""
+    ustar = float(row["ustar0_m_s"])
+    measured = single.in_unit(row, single.measured_ustar(row, ustar), told)
+    ax.axvline(measured, color=INK, lw=1.4, ls=(0, (4, 2)), zorder=1)
+    name = "wind tunnels" if is_gas(float(row["rho_f_kg_m3"])) else "flumes"
+    look: Look = {
+        "xycoords": ax.get_xaxis_transform(),
+        "textcoords": "offset points",
+        "va": "top",
+        "fontsize": SMALL,
+    }
+    ax.annotate(name, (measured, 1.0), xytext=(4, 0), **look)
+    if not row["measured_rows"] > 0:
+        return
+    ends = []
+    for theta in (row["measured_low"], row["measured_high"]):
+        ratio = math.sqrt(float(theta) / _measured_theta(row))
+        at = single.measured_ustar(row, ustar) * ratio
+        ends.append(single.in_unit(row, at, told))
+    ax.axvspan(*ends, color=LINE, lw=0, zorder=0)
+    sites = "field" if is_gas(float(row["rho_f_kg_m3"])) else "80 %"
+    ax.annotate(sites, (ends[0], 1.0), xytext=(-4, 0), ha="right", **look)
+
+
+def _measured_theta(row: pd.Series) -> float:
+    """The Shields number of the measured threshold of a grain."""
+    density = float(row["rho_f_kg_m3"])
+    weight = (float(row["rho_sol_kg_m3"]) - density) * float(row["g_m_s2"])
+    ustar = float(row["measured_level_ustar_m_s"])
+    return density * ustar**2 / (weight * float(row["d_m"]))
+
+
+def _by_size(ax: Axes, row: pd.Series, told: Quantity, narrow: bool) -> None:
+    """The threshold by size: by the law where it holds, and by the published curve."""
+    size = float(row["d_m"])
+    d = np.geomspace(size / 6, size * 6, 61)
+    here = pd.DataFrame([row] * len(d)).assign(d_m=d, z0_m=row["z0_m"] / size * d)
+    ustar, holds = answers.by_this_law(here)
+    ustar = np.where(holds, ustar, np.nan)
+    computed = _told_by(here, ustar, told)
+    measured = _told_by(here, _curve(row, d), told)
+    mm = 1e3 * d
+    ax.plot(mm, computed, color=ANSWER, lw=2)
+    ax.plot(mm, measured, color=INK, lw=1.2, ls=(0, (4, 2)))
+    value = single.in_unit(row, float(row["ustar0_m_s"]), told)
+    ax.plot([1e3 * size], [value], "o", color=ANSWER, ms=8, mec=GROUND)
+    # both curves rise to the right: what is below them is free there
+    is_below = value < measured[30]
+    below: Look = {"textcoords": "offset points", "fontsize": TEXT}
+    below |= {"xytext": (8, -6), "va": "top"}
+    above = {**below, "xytext": (-8, 6), "va": "bottom", "ha": "right"}
+    bold: Look = {"color": ANSWER, "weight": "bold"}
+    ax.annotate(
+        f"{value:.3g}" if narrow else f"this grain: {value:.3g}",
+        (1e3 * size, value),
+        **(below if is_below else above),
+        **bold,
+    )
+    name = "wind tunnels" if is_gas(float(row["rho_f_kg_m3"])) else "flumes"
+    ax.annotate(name, (mm[44], measured[44]), **(above if is_below else below))
+    log_sizes(ax)
+    ax.set_ylim(0, None)
+    long = f"The same for other sizes (mm), {told.unit}"
+    ax.set_title(f"By size (mm), {told.unit}" if narrow else long)
+
+
+def _told_by(rows: pd.DataFrame, ustar: Any, told: Quantity) -> list[float]:
+    """Friction velocities of rows (m/s) in the unit of a quantity."""
+    records = rows.to_dict("records")
+    pairs = zip(records, ustar, strict=True)
+    return [single.in_unit(row, float(one), told) for row, one in pairs]
+
+
+def _curve(row: pd.Series, d: Any) -> Any:
+    """Friction velocity of a published curve for grains of some sizes (m), m/s."""
+    density = float(row["rho_f_kg_m3"])
+    solid = float(row["rho_sol_kg_m3"])
+    nu = float(row["nu_m2_s"])
+    g = float(row["g_m_s2"])
+    if is_gas(density):
+        return shao_lu(d, Air(solid, density, nu, g))
+    excess = (solid / density - 1) * g
+    theta = soulsby_whitehouse(d * (excess / nu**2) ** (1 / 3))
+    return np.sqrt(theta * excess * d)
