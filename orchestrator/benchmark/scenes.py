@@ -16,6 +16,7 @@ from orchestrator.grains.pile import MARGIN, Pile
 from orchestrator.grains.threshold import PileThreshold
 from orchestrator.study import closed_form as study_form
 from orchestrator.study import fields
+from orchestrator.study.method import HELD_FROM
 from orchestrator.study.scene import Scene
 from orchestrator.tables import Tables
 from orchestrator.types import Row
@@ -48,8 +49,6 @@ LIFT_OFF_SCATTER = 0.25
 """Part of N by which the count may differ there."""
 FLOWS = (0.5, 0.8, 1.1, 1.4)
 """Friction velocities at which the forces are asked, over that of the threshold."""
-LEAST_QUIET = 5.0
-"""Load steps shorter than this, sqrt(d/g'), are ramps with other thresholds."""
 _GRAIN = (
     "rho_f_kg_m3 nu_m2_s g_m_s2 d_m rho_sol_kg_m3 alpha_deg beta_deg z0_m force_law"
     " alpha_s regime mass_kg reduced_gravity_m_s2 weight_n"
@@ -188,7 +187,7 @@ def has_pivot(scene: Scene) -> bool:
     # back
     up_the_slope = np.tan(np.radians(scene.bed.slope_deg))
     rolls = bool(threshold.lift * up_the_slope < threshold.drag)
-    is_quiet = scene.method.grains.waiting_time >= LEAST_QUIET
+    is_quiet = scene.method.grains.waiting_time >= HELD_FROM
     return study_form.law_holds(scene) and rolls and is_quiet
 
 

@@ -22,7 +22,7 @@ from matplotlib.patches import Patch, Rectangle
 
 from orchestrator import plan
 from orchestrator.experiments.experiment import Experiment, Results, Runs
-from orchestrator.fidelity.decision import as_asked, written
+from orchestrator.fidelity.decision import as_written, written
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import Motion
 from orchestrator.report import style
@@ -206,7 +206,7 @@ def experiment(out: Path, folder: Path = FOLDER) -> Experiment:
     for each in maps:
         for place in each.places:
             for scene in (*place.scenes, *place.references):
-                asked[scene.id] = as_asked(scene)
+                asked[scene.id] = as_written(scene)
 
     def results(runs: Runs) -> Results:
         judged = [judge(each, runs) for each in maps]

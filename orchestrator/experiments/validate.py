@@ -18,7 +18,7 @@ from orchestrator.errors import InputError
 from orchestrator.experiments.experiment import Experiment, Results, Runs
 from orchestrator.experiments.sphere import speed_of, sphere
 from orchestrator.experiments.strips import PERCENTILES, ROUGH, Strips
-from orchestrator.fidelity.decision import as_asked
+from orchestrator.fidelity.decision import as_written
 from orchestrator.flow.stress import WallStress, bubble
 from orchestrator.physics import saltation
 from orchestrator.physics.constants import GAS_BELOW, GRAVITY
@@ -455,7 +455,7 @@ def experiment(study: Study, out: Path) -> Experiment:
     if not strips or len(hills) != 1 or len(humps) != 1:
         what = "it needs poured strips, one hill of RUSHIL and one profile, the hump"
         raise InputError(what, study.name, "start from the preset validate")
-    asked = {scene.id: as_asked(scene) for scene in study.scenes}
+    asked = {scene.id: as_written(scene) for scene in study.scenes}
     planned = plan.of(asked, cases=out.absolute() / "cases")
 
     def results(runs: Runs) -> Results:

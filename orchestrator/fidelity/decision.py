@@ -19,13 +19,11 @@ from orchestrator.grains.loads import LONGEST_PACKED, Geometry, has_rows_along
 from orchestrator.grains.pile import Pile
 from orchestrator.study.criterion import GOES_ON, goes_on
 from orchestrator.study.fields import FIELDS, default_of
+from orchestrator.study.method import HELD_FROM
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import changed, value_of
 
-LEAST_HELD = (
-    6.0  # waiting time, sqrt(d/g'), below which load steps are a ramp of the flow
-)
 EXACT = "the closed form is exact for a single grain in a held flow"
 LONG_BED = f"more than {LONGEST_PACKED:g} grains long"
 ALONG = f"{LONG_BED}: closed form along the bed, checked where motion starts"
@@ -179,7 +177,7 @@ def _leaving(scene: Scene, tolerance: float | None) -> Decision:
         return _of_grain(scene, tolerance)
     why_as_written = _why_as_written(scene, tolerance)
     if why_as_written is not None:
-        return as_asked(scene, why_as_written)
+        return as_written(scene, why_as_written)
     if tolerance is None:
         most = min(spread.floors().values())
         start, limit = (
@@ -190,11 +188,11 @@ def _leaving(scene: Scene, tolerance: float | None) -> Decision:
         most, start, limit = tolerance, "", "within the tolerance"
     fidelity, why = _looked_up(scene, most)
     if fidelity is None:
-        return as_asked(scene, why)
+        return as_written(scene, why)
     return on_fidelity(scene, fidelity, f"{start}{why} {limit}", is_chosen=True)
 
 
-def as_asked(scene: Scene, why: str = "") -> Decision:
+def as_written(scene: Scene, why: str = "") -> Decision:
     """The decision to answer a scene as it is written; `why` adds to its method."""
     answer = written(scene)
     why = "; ".join(filter(None, (method_of(scene)[1], why)))
@@ -272,13 +270,13 @@ def _is_long(scene: Scene) -> bool:
 
 def _of_grain(scene: Scene, tolerance: float | None) -> Decision:
     """The decision on a single grain: with a tolerance by an exact closed form."""
-    as_written = as_asked(scene)
-    if tolerance is None or as_written.scene.method.kind != "dem":
-        return as_written
-    if scene.method.grains.waiting_time < LEAST_HELD:
-        return as_asked(scene, "the study asks for a ramp of the flow")
+    plain = as_written(scene)
+    if tolerance is None or plain.scene.method.kind != "dem":
+        return plain
+    if scene.method.grains.waiting_time < HELD_FROM:
+        return as_written(scene, "the study asks for a ramp of the flow")
     if scene.bed.slope_deg > scene.bed.entrainment_angle_deg:
-        return as_asked(
+        return as_written(
             scene, "a slope beyond the entrainment angle: the closed form is off"
         )
     exact = changed(scene, {"method.kind": "pivot"})
@@ -305,7 +303,7 @@ def _why_as_written(scene: Scene, tolerance: float | None) -> str | None:
         return f"the study asks for the flow model {scene.method.flow.model}"
     if scene.threshold.update:
         return "no error is known for a bed that changes"
-    if scene.method.grains.waiting_time < LEAST_HELD:
+    if scene.method.grains.waiting_time < HELD_FROM:
         return "the study asks for a ramp of the flow"
     beyond = unmeasured(scene)
     if beyond:
@@ -381,4 +379,4 @@ def checks(answers: Iterable[Decision]) -> dict[str, Decision]:
             cheapest.get(group, member), member, key=lambda one: one[:2]
         )
     why = "it checks an answer without DEM"
-    return {asked: as_asked(dem, why) for _, asked, dem in cheapest.values()}
+    return {asked: as_written(dem, why) for _, asked, dem in cheapest.values()}

@@ -22,6 +22,7 @@ from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.study import units
 from orchestrator.study.declare import UnfitError
+from orchestrator.study.method import HELD_FROM
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import ASKED, Study
@@ -36,7 +37,6 @@ PILE_SLOPES_DEG = (
 TIMESTEPS = ((0.1, 0.4), (0.3, 0.2), (0.6, 0.1), (1.0, 0.05))
 """Largest damping ratio, and the largest safe time step up to it, sqrt(m/K)."""
 LEAST_DAMPING = 0.03
-WAITING_TIME = 3.0  # least time without a passage, sqrt(d/g')
 COARSE_STEP = 0.05
 CLOSE_PACKED_DEG = (
     59.0  # entrainment angle from which the grains of a row hold each other
@@ -249,7 +249,7 @@ def _dem(scene: Scene) -> Iterator[Limit]:
         yield Limit("timestep-damping", "method.grains.damping", what, "0.1 is sound")
     if not isinstance(scene.bed, PileBed):
         return
-    if rules.waiting_time < WAITING_TIME:
+    if rules.waiting_time < HELD_FROM:
         what = f"load steps that wait {rules.waiting_time:g} sqrt(d/g')"
         what += " are a ramp of the flow"
         remedy = "raise it, unless a ramp is what you want"

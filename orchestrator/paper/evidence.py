@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.study import fields
+from orchestrator.study.method import HELD_FROM
 from orchestrator.tables import COLUMNS, Tables, with_methods
 from orchestrator.types import BoolArray, FloatArray
 
@@ -23,8 +24,6 @@ RULE = (
     f"not: in at most {1 - SHARE:.0%} of each; else partly; no data: if a judged line "
     "has none"
 )
-WAITING_TIME = 5.0
-"""Least waiting time of a held flow, sqrt(d/g'); shorter load steps are a ramp."""
 REGIMES = {"low": "low regime", "high": "high regime"}
 BRIDGED = "bridged"
 """The force law that has an answer where neither of the paper's has one."""
@@ -288,7 +287,7 @@ def commonest(grains: pd.DataFrame) -> pd.DataFrame:
     DataFrame
         Those grains.
     """
-    return _alike(grains[grains["waiting_time"] >= WAITING_TIME])
+    return _alike(grains[grains["waiting_time"] >= HELD_FROM])
 
 
 def _alike(grains: pd.DataFrame) -> pd.DataFrame:

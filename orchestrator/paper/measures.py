@@ -14,7 +14,6 @@ from orchestrator.paper.evidence import (
     BRIDGED,
     GRAIN,
     REGIMES,
-    WAITING_TIME,
     Comparison,
     Evidence,
     others,
@@ -23,6 +22,7 @@ from orchestrator.paper.evidence import (
 )
 from orchestrator.physics import curves
 from orchestrator.physics.laws import LAWS, Exposure
+from orchestrator.study.method import HELD_FROM
 from orchestrator.types import FloatArray, IntArray
 
 Comparisons = Iterator[Comparison]
@@ -187,7 +187,7 @@ def numerical(evidence: Evidence) -> Comparisons:
     """
     held = evidence.held
     every = evidence.grains
-    ramps = every[every["waiting_time"] < WAITING_TIME]
+    ramps = every[every["waiting_time"] < HELD_FROM]
     name = "lower end of DEM’s interval of τ over the closed form"
     for flow, grains in (("held flows", held), ("ramps", ramps)):
         ratio = grains["shields_dem_low"] / grains["shields_closed_form"]
@@ -548,7 +548,7 @@ def conditioning(evidence: Evidence) -> Comparisons:
     change = (small["ustar_m_s"] / small["ustar_closed_form_m_s"] - 1).abs()
     name = "d below 0.05 mm: change of u* from the closed form to DEM"
     yield Comparison(name, change, INSENSITIVE, form=".2%")
-    held = evidence.grains[evidence.grains["waiting_time"] >= WAITING_TIME]
+    held = evidence.grains[evidence.grains["waiting_time"] >= HELD_FROM]
     ratio = held["ustar_m_s"] / held["ustar_closed_form_m_s"]
     held = held[[*GRAIN, "stiffness"]].assign(ratio=ratio)
     changes = []

@@ -12,13 +12,12 @@ from orchestrator.grains.pile import Pile
 from orchestrator.plan import Plan
 from orchestrator.runs.case import is_whole
 from orchestrator.study import fields
+from orchestrator.study.method import HELD_FROM
 from orchestrator.study.study import Study
 from orchestrator.tables import Tables, with_methods
 from orchestrator.tables.rows import measured_hill
 
 FRACTION = 0.3  # n/N at which one threshold stands for all of its pile
-RAMP_BELOW = 3.0
-"""Waiting time, sqrt(d/g'), below which load steps are a ramp; 6 are needed near a threshold."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +176,7 @@ def drawable(table: pd.DataFrame, *columns: str) -> "pd.Series[bool]":
 
 def held(table: pd.DataFrame) -> "pd.Series[bool]":
     """Whether each row's scene holds the flow until its grains are quiet; else it is a ramp."""
-    return ~(table["waiting_time"] < RAMP_BELOW)
+    return ~(table["waiting_time"] < HELD_FROM)
 
 
 def by_dem(table: pd.DataFrame) -> pd.DataFrame:

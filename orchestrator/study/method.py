@@ -102,6 +102,14 @@ class FlowMethod(Part):
     """flat bed from the forms to the outlet"""
 
 
+HELD_FROM = 6.0
+"""Least waiting time of load steps in which the flow is held, sqrt(d/g').
+
+Shorter ones are a ramp of the flow, with other thresholds: in the map ``quiet-step`` steps
+of at most 5 % are within 5 % of long ones from here on, and at half of it up to 7 % off.
+"""
+
+
 class GrainMethod(Part):
     """How the grains are moved by DEM: contacts, layers that may move, load steps."""
 

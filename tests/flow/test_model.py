@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator import plan, tables
 from orchestrator.errors import InputError
-from orchestrator.fidelity.decision import as_asked
+from orchestrator.fidelity.decision import as_written
 from orchestrator.flow.model import FlowModel
 from orchestrator.grains.pile import Pile
 from orchestrator.physics.velocity import depth_mean_speed
@@ -30,7 +30,7 @@ kind = "pivot"
 
 def piles(flow: str) -> list[Pile]:
     asked = study.parse(TEXT + flow, name="knobs", where="test")
-    decisions = {scene.id: as_asked(scene) for scene in asked.scenes}
+    decisions = {scene.id: as_written(scene) for scene in asked.scenes}
     return list(plan.of(decisions).piles.values())
 
 
