@@ -25,7 +25,8 @@ from orchestrator.study.parts import PileBed
 from orchestrator.study.study import Study
 
 START_S, SCENE_S, GRAIN_S = 2.5, 4e-3, 4e-5
-"""Times of imports and first figures, of a scene, and of a grain of a bed without a run, s."""
+"""Times of imports and first figures, of a scene, and of a grain of a bed without a
+run, s."""
 BESIDE = (
     1.3  # time of a case with the Python beside its solver, over that of the solver
 )
@@ -58,7 +59,7 @@ class Plan:
 
     @property
     def drawing_s(self) -> float:
-        """Expected time of tables, figures and the grains that move without a run, s."""
+        """Expected time of tables, figures and grains without a run, s."""
         lengths = sum(
             pile.length for pile in self.piles.values() if not pile.method.cases
         )
@@ -66,7 +67,10 @@ class Plan:
 
     @property
     def chosen(self) -> frozenset[str]:
-        """The names of the cases that no scene as it is written needs, nor a check by DEM."""
+        """The names of the cases of chosen fidelities.
+
+        No scene as it is written needs them, and no check by DEM.
+        """
         piles = [
             pile
             for asked, pile in self.piles.items()
@@ -116,7 +120,10 @@ class Plan:
         return done
 
     def missing(self, directory: Path, done: Container[str]) -> dict[str, Case]:
-        """The cases to be run, by name: those not `done`, and those pruned that they need."""
+        """The cases to be run, by name.
+
+        They are those not `done`, and those pruned that they need.
+        """
         missing = {name: case for name, case in self.cases.items() if name not in done}
         starts = (
             need for case in missing.values() if case.needs_bulky for need in case.needs
@@ -153,7 +160,7 @@ def of(
     checks: Mapping[str, Decision] | None = None,
     cases: Path | None = None,
 ) -> Plan:
-    """List the cases that some decisions need, and those of the `checks` of some of them."""
+    """List the cases that some decisions and some `checks` need."""
     piles = _piles(decisions, cases)
     checking = _piles(checks or {}, cases)
     scenes = [answer.scene for asked, answer in decisions.items() if asked not in piles]
@@ -184,7 +191,10 @@ def _piles(decisions: Mapping[str, Decision], cases: Path | None) -> dict[str, P
 
 
 def listed(cases: Iterable[Case]) -> dict[str, Case]:
-    """Some cases and all whose results they need, each once, by name, behind those it needs."""
+    """Some cases and all that they need, by name.
+
+    Each is there once, behind those whose results it needs.
+    """
     found: dict[str, Case] = {}
 
     def add(cases: Iterable[Case]) -> None:
@@ -198,7 +208,10 @@ def listed(cases: Iterable[Case]) -> dict[str, Case]:
 
 
 def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
-    """Lines of text: scenes with their regimes, cases by kind, expected time and disk."""
+    """Say in lines of text what a study would run.
+
+    They have scenes with their regimes, cases by kind, expected time and disk.
+    """
     plan = make(study, directory)
     regimes = _counted(regime_of(scene) for scene in study.scenes)
     yield f"{study.title}: {_number(len(study.scenes), 'scene')}; regimes: {regimes}"
@@ -210,7 +223,8 @@ def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
         yield f"  {times} answered: {why}"
     if plan.smoothings:
         noisy = _number(len(plan.smoothings), "noisy profile")
-        yield f"  {noisy}: also with half and twice the smoothing, and with what it needs"
+        other = "half and twice the smoothing, and with what it needs"
+        yield f"  {noisy}: also with {other}"
     yield from expected(plan, directory, workers)
 
 
@@ -220,7 +234,8 @@ def expected(plan: Plan, directory: Path, workers: int) -> Iterator[str]:
     kinds, todo = (
         _counted(case.kind for case in each) for each in (plan.cases.values(), missing)
     )
-    yield f"{_number(len(plan.cases), 'case')}: {kinds or 'none'}; to run: {todo or 'none'}"
+    every = f"{_number(len(plan.cases), 'case')}: {kinds or 'none'}"
+    yield f"{every}; to run: {todo or 'none'}"
     # a chain of cases takes at least the sum of its times, however many run beside it
     walls = {case.name: case.cost_s / min(case.ranks, workers) for case in missing}
     chains = (
@@ -235,7 +250,7 @@ def expected(plan: Plan, directory: Path, workers: int) -> Iterator[str]:
 
 
 def pace() -> float:
-    """How many times longer a fixed calculation takes than where cases' times were found."""
+    """How much longer a fixed calculation takes than where cases' times were found."""
     sort = partial(np.sort, np.random.default_rng(0).random(100_000), kind="stable")
     return min(timeit.repeat(sort, timer=time.process_time, number=1)) / SORT_S
 

@@ -1,8 +1,11 @@
-"""A pile of grains and its answer: threshold methods, their runs, and the bed that changes.
+"""A pile of grains and its answer.
 
-Without `threshold.update` the flow of the whole pile acts until the last grain has gone, as in the
-paper. With it the grains leave in rounds. After each, the bed line sinks by as much as the upper
-sides of the grains have, and the flow is solved over it; what is left goes on under its forces.
+Here are the threshold methods, their runs, and the bed that changes.
+
+Without `threshold.update` the flow of the whole pile acts until the last grain has
+gone, as in the paper. With it the grains leave in rounds. After each, the bed line
+sinks by as much as the upper sides of the grains have, and the flow is solved over it;
+what is left goes on under its forces.
 """
 
 from collections.abc import Container, Iterable
@@ -38,37 +41,40 @@ from orchestrator.study.scene import BEYOND_ASKED, Scene
 from orchestrator.types import BoolArray, FloatArray
 
 MARGIN = 3.0
-"""From the outermost grains to the walls of the box, and from a face to the height at which a
-grain in flight is gone, diameters."""
+"""From the outermost grains to the walls of the box, and from a face to the height at
+which a grain in flight is gone, diameters."""
 EARLY = 0.01
-"""Part of the grains of a poured bed that may go before the first load step: a few of many hundred
-hardly lie, and load steps from their flow on would take most of the time."""
-REST = 7.0  # mean time until the grains of a lattice are at rest in a load step, sqrt(d/g')
+"""Part of the grains of a poured bed that may go before the first load step: a few of
+many hundred hardly lie, and load steps from their flow on would take most of the
+time."""
+REST = 7.0
+"""Mean time until the grains of a lattice are at rest in a load step, sqrt(d/g')."""
 IN_SPACE = 5.0
-"""Cost of a grain in space over that of one in a plane: of contacts, and of fixed grains around."""
+"""Cost of a grain in space over that of one in a plane: of contacts, and of fixed
+grains around."""
 GRAINS = "grains.csv"
-"""The grains when a bed line was drawn, in the case of the flow over it; at the end of a run of
-LIGGGHTS, in its case."""
+"""The grains when a bed line was drawn, in the case of the flow over it; at the end of
+a run of LIGGGHTS, in its case."""
 EDGE = 2.0  # length over which the edge of a bared part is rounded, d
 SPACING = 0.25  # spacing of the places at which the height of the grains is taken, d
 NEAREST = 0.25
-"""Least distance along x of a new corner from those of the bed line, d: corners that nearly
-coincide make cells that are far too short."""
+"""Least distance along x of a new corner from those of the bed line, d: corners that
+nearly coincide make cells that are far too short."""
 LEVEL = 1e-6  # a bed that is less above the flat bed lies on it, d
 FAR = 1e9
 HARDLY, STRONGER = 1.1, 2.0
-"""Of gusts whose largest stress is less than the first over the mean, the forces are compared at
-the second: those of two equal stresses say of no power, 0/0."""
+"""Of gusts whose largest stress is less than the first over the mean, the forces are
+compared at the second: those of two equal stresses say of no power, 0/0."""
 
 
 @dataclass(frozen=True)
 class Worn:
     """The n grains of a pile that wears, at one time.
 
-    `places`, shape (n, 2), has x and z of the centres, d, NaN for a grain that has gone; `left`,
-    shape (n,), the undisturbed friction velocity at which a counted grain has moved, m/s, else
-    infinite; `speed`, shape (n,), the signed local friction velocity over the undisturbed one, at
-    that time or when it was last there.
+    `places`, shape (n, 2), has x and z of the centres, d, NaN for a grain that has
+    gone; `left`, shape (n,), the undisturbed friction velocity at which a counted grain
+    has moved, m/s, else infinite; `speed`, shape (n,), the signed local friction
+    velocity over the undisturbed one, at that time or when it was last there.
     """
 
     places: FloatArray
@@ -109,7 +115,8 @@ class Worn:
 class WornFlow(Case):
     """The flow over a worn bed, after a round under the flow `before`.
 
-    In that round the grains left in the `run` of LIGGGHTS, or by peeling if there is none.
+    In that round the grains left in the `run` of LIGGGHTS, or by peeling if there is
+    none.
     """
 
     scene: Scene
@@ -173,7 +180,7 @@ Flow = FlowCase | WornFlow
 
 
 def rounds(scene: Scene) -> int:
-    """How many flows act on a pile one after another until the last of its fractions has moved."""
+    """How many flows act on a pile until the last of its fractions has moved."""
     update = scene.threshold.update
     return ceil(max(scene.threshold.fractions) / update - 1e-9) if update else 1
 
@@ -181,8 +188,8 @@ def rounds(scene: Scene) -> int:
 def goal_part(scene: Scene, flow: Flow | None) -> float:
     """The part of the counted grains that has moved when the round of a flow ends.
 
-    The last round goes on a little beyond the largest fraction that is asked for, whose interval
-    ends where half a grain more has moved.
+    The last round goes on a little beyond the largest fraction that is asked for, whose
+    interval ends where half a grain more has moved.
     """
     number = 1
     while isinstance(flow, WornFlow):
@@ -240,29 +247,18 @@ def peeled(geometry: Geometry, flow: Flow, cases: Path) -> Worn:
 
 
 def sunk(geometry: Geometry, worn: Worn) -> BedLine:
-    """The bed line over worn grains, d: as much lower as their upper sides are, averaged."""
-    line, packed, present = geometry.line, geometry.packing, worn.present
+    """The bed line over worn grains, d.
+
+    It is lower by as much as their upper sides are on average.
+    """
+    line = geometry.line
     x = np.arange(line.x[1] - EDGE, line.x[-2] + EDGE - digits.SLACK, SPACING)
-    before = _tops(packed.centres, packed.sizes / 2, x)
-    depth = before - _tops(worn.places[present], packed.sizes[present] / 2, x)
-    window = np.ones(round(EDGE / SPACING)) * SPACING / EDGE
-    depth = np.convolve(depth, window, mode="same")
-    # corners, one per diameter, where the depth changes
-    step = round(EDGE / 2 / SPACING)
-    changes = (
-        np.convolve(
-            np.abs(np.gradient(depth)) > 1e-3, np.ones(2 * step + 1), mode="same"
-        )
-        > 0
-    )
-    places = x[changes & (np.arange(len(x)) % step == 0)]
-    apart = np.abs(places[:, None] - line.x).min(axis=1) > NEAREST + digits.SLACK
-    finer = line.with_corners(
-        places[apart & (places > line.x[0]) & (places < line.x[-1])].tolist()
-    )
-    whole, ground = np.array(finer.z), min(line.z[0], line.z[-1])
+    depth = _depth(geometry, worn, x)
+    finer = line.with_corners(_bends(line, x, depth).tolist())
+    whole = np.array(finer.z)
     z = whole - np.interp(finer.x, x, depth, left=0.0, right=0.0)
-    # a form wears down to the flat bed around it, unless counted grains lie as low as that
+    ground = min(line.z[0], line.z[-1])
+    # a form wears down to the flat bed around it, unless counted grains lie as low
     low = np.maximum(line.z[1:], line.z[:-1]) <= ground + LEVEL
     low |= np.minimum(line.z[1:], line.z[:-1]) < ground - LEVEL
     if not (low & line.counted(geometry.counts)).any():
@@ -271,8 +267,31 @@ def sunk(geometry: Geometry, worn: Worn) -> BedLine:
     return replace(finer, z=tuple(np.where(inside, z, whole).tolist()))
 
 
+def _depth(geometry: Geometry, worn: Worn, x: FloatArray) -> FloatArray:
+    """How much lower the upper sides of worn grains are at some places, d, averaged."""
+    packed = geometry.packing
+    present = worn.present
+    before = _tops(packed.centres, packed.sizes / 2, x)
+    after = _tops(worn.places[present], packed.sizes[present] / 2, x)
+    window = np.ones(round(EDGE / SPACING)) * SPACING / EDGE
+    return np.convolve(before - after, window, mode="same")
+
+
+def _bends(line: BedLine, x: FloatArray, depth: FloatArray) -> FloatArray:
+    """Places of new corners, one per diameter, where the depth at `x` changes, d."""
+    step = round(EDGE / 2 / SPACING)
+    is_steep = np.abs(np.gradient(depth)) > 1e-3
+    changes = np.convolve(is_steep, np.ones(2 * step + 1), mode="same") > 0
+    places = x[changes & (np.arange(len(x)) % step == 0)]
+    apart = np.abs(places[:, None] - line.x).min(axis=1) > NEAREST + digits.SLACK
+    return np.asarray(places[apart & (places > line.x[0]) & (places < line.x[-1])])
+
+
 def _tops(centres: FloatArray, radii: FloatArray, x: FloatArray) -> FloatArray:
-    """Height of the grains' upper sides at some places, d; far below where there are none."""
+    """Height of the grains' upper sides at some places, d.
+
+    It is far below where there are no grains.
+    """
     tops = np.full(len(x), -FAR)
     for (xc, zc), radius in zip(centres.tolist(), radii.tolist(), strict=True):
         # as wide as half the way to the next: the gaps of a row do not count
@@ -284,9 +303,10 @@ def _tops(centres: FloatArray, radii: FloatArray, x: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class PileCase(GrainCase):
-    """The run of LIGGGHTS of the grains of one pile, or of those that are there in a round.
+    """The run of LIGGGHTS of the grains of one pile or of one round.
 
-    `flow` is that of the round, None over the whole pile; it goes on from the run `before`.
+    `flow` is that of the round, None over the whole pile; it goes on from the run
+    `before`.
     """
 
     scene: Scene
@@ -303,7 +323,11 @@ class PileCase(GrainCase):
 
     @property
     def needs(self) -> tuple[Case, ...]:
-        """The runs of its flow model, the one that it goes on from, and the one that pours."""
+        """The runs that it needs.
+
+        They are those of its flow model, the one that it goes on from, and the one that
+        pours its grains.
+        """
         flows = self.geometry.model.cases if self.flow is None else (self.flow,)
         return (
             *flows,
@@ -330,7 +354,8 @@ class PileCase(GrainCase):
         method = self.scene.method.grains
         width = self.geometry.bed.width
         load_steps = np.log(3.5) / np.log1p(method.load_increment) / rounds(self.scene)
-        # of a lattice the layers that may move take the time, and decks of one of four were timed
+        # of a lattice the layers that may move take the time, and decks of one of four
+        # were timed
         size, exposed = 4 * self._length * self._layers, np.nan
         if self.geometry.pouring:
             size, exposed = (
@@ -352,7 +377,10 @@ class PileCase(GrainCase):
 
     @property
     def _layers(self) -> float:
-        """Mobile layers: at most the whole bed; a pile is half its rows thick on average."""
+        """Mobile layers: at most the whole bed.
+
+        A pile is half its rows thick on average.
+        """
         bed = self.geometry.bed
         most = bed.poured_depth if self.geometry.pouring else self.geometry.line.h / 2
         return min(self.scene.method.grains.mobile_layers, most)
@@ -366,61 +394,64 @@ class PileCase(GrainCase):
     def write(self, directory: Path, cases: Path) -> None:
         """Write the grains with their forces, and the load steps of the protocol."""
         scene = self.scene
-        method = scene.method.grains
         loads, worn = self._state(cases)
-        geometry = loads.geometry
-        d = scene.grain.diameter
-        if self.before is None:
-            rising = flows(loads)
-        else:
-            reached = float(Motion.from_csv(cases / self.before.name).flow[-1])
-            # the run goes on from the flow that the one before has reached
-            thresholds = loads.leaving()
-            step = method.load_increment
-            last = thresholds[np.isfinite(thresholds)].max(initial=reached)
-            rising = deck.rising_flows(
-                reached, max(deck.BEYOND * last, reached * (1 + step)), step
-            )
-            if scene.is_poured:
-                # poured without a flow, it rests without one: some go at once that were hidden
-                rising[0] = 0.0
-        packed = geometry.packing
-        enough = int((1 - scene.last_fraction) * packed.count + 1e-9)
-        if scene.threshold.update:
-            enough = packed.count - goal(geometry, self.flow)
-        grains, (slope, ridge) = (
-            table(loads, worn),
-            geometry.packed_line.roof(MARGIN + 0.5),
-        )
-        mobile = grains.kind > deck.FIXED
-        smallest = float(grains.sizes[mobile].min())
-        density, gravity = scene.grain.density, scene.reduced_gravity
-        behind = grains.position[mobile, 0].max() + deck.AWAY * d
-        numbers = {
-            **{
-                "diameter": d,
-                "smallest": smallest,
-                "density": density,
-                "gravity": gravity,
-            },
-            **deck.protocol(
-                scene.grain,
-                method,
-                scene.threshold.displacement,
-                enough,
-                smallest,
-                scene.flow.gusts,
-            ),
-            "settle_drag": deck.POURED_DRAG if scene.is_poured else 0.0,
-            **{"slope": slope, "ceiling_x": ridge[0] * d, "ceiling_z": ridge[1] * d},
-            "behind": behind,
-        }
-        force, gusts = loads.loading.at(rising), deck.STEADY
+        rising = self._rising(loads, cases)
+        grains = table(loads, worn)
+        numbers = self._numbers(loads.geometry, grains)
+        force = loads.loading.at(rising)
+        gusts = deck.STEADY
         if scene.flow.gusts:
             gusts = in_time(scene.flow.gusts, loads, rising[1:])
-        deck.write(
-            directory, grains, numbers, rising, force, MARGIN * d, self.ranks, gusts
+        margin = MARGIN * scene.grain.diameter
+        deck.write(directory, grains, numbers, rising, force, margin, self.ranks, gusts)
+
+    def _rising(self, loads: Loads, cases: Path) -> FloatArray:
+        """The flow of the settling and of each load step, u*_0 in m/s."""
+        if self.before is None:
+            return flows(loads)
+        reached = float(Motion.from_csv(cases / self.before.name).flow[-1])
+        # the run goes on from the flow that the one before has reached
+        thresholds = loads.leaving()
+        step = self.scene.method.grains.load_increment
+        last = thresholds[np.isfinite(thresholds)].max(initial=reached)
+        highest = max(deck.BEYOND * last, reached * (1 + step))
+        rising = deck.rising_flows(reached, highest, step)
+        if self.scene.is_poured:
+            # poured without a flow, it rests without one: some that were hidden go
+            rising[0] = 0.0
+        return rising
+
+    def _numbers(self, geometry: Geometry, grains: deck.GrainTable) -> dict[str, Any]:
+        """The numbers of the deck."""
+        scene = self.scene
+        d = scene.grain.diameter
+        count = geometry.packing.count
+        enough = int((1 - scene.last_fraction) * count + 1e-9)
+        if scene.threshold.update:
+            enough = count - goal(geometry, self.flow)
+        slope, ridge = geometry.packed_line.roof(MARGIN + 0.5)
+        mobile = grains.kind > deck.FIXED
+        smallest = float(grains.sizes[mobile].min())
+        protocol = deck.protocol(
+            scene.grain,
+            scene.method.grains,
+            scene.threshold.displacement,
+            enough,
+            smallest,
+            scene.flow.gusts,
         )
+        return {
+            "diameter": d,
+            "smallest": smallest,
+            "density": scene.grain.density,
+            "gravity": scene.reduced_gravity,
+            **protocol,
+            "settle_drag": deck.POURED_DRAG if scene.is_poured else 0.0,
+            "slope": slope,
+            "ceiling_x": ridge[0] * d,
+            "ceiling_z": ridge[1] * d,
+            "behind": grains.position[mobile, 0].max() + deck.AWAY * d,
+        }
 
     def collect(self, directory: Path) -> None:
         """Check the run and write what each counted grain did to ``motion.csv``."""
@@ -462,7 +493,9 @@ class PileCase(GrainCase):
 
 
 def flows(loads: Loads) -> FloatArray:
-    """The flow of the settling, then of each load step: from before the first grain goes.
+    """The flow of the settling, then of each load step.
+
+    They begin before the first grain goes.
 
     Raises an InputError if no counted grain is held by its contacts and can leave them.
     """
@@ -479,7 +512,8 @@ def flows(loads: Loads) -> FloatArray:
         thresholds = np.sort(loads.leaving())
         first = _first(thresholds, geometry)
         if not 0 < first < np.inf or geometry.scene.forces.loaded_grains != "exposed":
-            # a bed that rolls by itself, or is blocked until its grains push: DEM decides
+            # a bed that rolls by itself, or is blocked until its grains push: DEM
+            # decides
             thresholds, first = pivots, _first(pivots, geometry)
         elif not geometry.bed.is_wedge:
             # on a bed without a free end no grain can be peeled first
@@ -501,11 +535,12 @@ def flows(loads: Loads) -> FloatArray:
 
 
 def in_time(gusts: Gusts, loads: Loads, rising: FloatArray) -> FloatArray:
-    """Force in each event and after the last over that of the largest, for `deck.write`.
+    """Force in each event and after the last over that of the largest one.
 
-    `rising` are the flows (u*_0, m/s) of the load steps; the forces of `loads` are those under the
-    largest stress. The force is a power of the stress, which is found between the mean and the
-    largest stress, or one that is `STRONGER` where the largest is hardly above the mean.
+    `rising` are the flows (u*_0, m/s) of the load steps; the forces of `loads` are
+    those under the largest stress. The force is a power of the stress, which is found
+    between the mean and the largest stress, or one that is `STRONGER` where the largest
+    is hardly above the mean.
     """
     peak = loads.geometry.scene.gust
     mean = rising / np.sqrt(peak)
@@ -522,12 +557,14 @@ def in_time(gusts: Gusts, loads: Loads, rising: FloatArray) -> FloatArray:
 
 
 def _size(loads: Loads, flows: FloatArray) -> FloatArray:
-    """Sum of the components' sizes of the forces on all grains at some flows, N, (flows,)."""
+    """Sum of the absolute components of all grains' forces, N, of shape (flows,)."""
     return np.asarray(np.abs(loads.loading.at(flows)).sum(axis=(1, 2)))
 
 
 def _first(thresholds: FloatArray, geometry: Geometry) -> float:
-    """The first of sorted flows above that of grains that lie loose, 0; 0 if there is none.
+    """The first of sorted flows above 0, which is that of loose grains.
+
+    It is 0 if there is none.
 
     Of a poured bed it is that of the first grain but a few.
     """
@@ -562,7 +599,10 @@ def table(loads: Loads, worn: Worn) -> GrainTable:
 
 @dataclass(frozen=True)
 class Method:
-    """A way to find out when the counted grains of a bed move; a subclass for each method."""
+    """A way to find out when the counted grains of a bed move.
+
+    Each method is a subclass.
+    """
 
     geometry: Geometry
 
@@ -572,7 +612,10 @@ class Method:
         return ()
 
     def motion(self, cases: Path) -> Motion:
-        """Motion of the counted grains; `cases` is the directory of the finished runs."""
+        """Motion of the counted grains.
+
+        `cases` is the directory of the finished runs.
+        """
         raise NotImplementedError
 
     def last(self, cases: Path) -> Worn:
@@ -581,16 +624,22 @@ class Method:
 
 
 class Pivot(Method):
-    """The closed form: each grain, or place on the bed line, by itself under its own stress."""
+    """The closed form.
+
+    Each grain, or place on the bed line, moves by itself under its own stress.
+    """
 
     def motion(self, cases: Path) -> Motion:
-        """Motion at the flows of Eq. 3 or 5, or at those that lift a grain off before."""
+        """Motion at the flows of Eq. 3 or 5, or at those that lift a grain before."""
         loads = self.geometry.loads(cases)
         return Motion.of_flows(rolling := loads.alone(), loads.lifting(rolling))
 
 
 class Peeling(Method):
-    """Pivots that free one another, without dynamics; a grain that lift takes off frees none."""
+    """Pivots that free one another, without dynamics.
+
+    A grain that lift takes off frees none.
+    """
 
     @property
     def cases(self) -> tuple[WornFlow, ...]:
@@ -621,7 +670,10 @@ class Dem(Method):
 
     @property
     def cases(self) -> tuple[Case, ...]:
-        """The run; on a bed that changes a run for each flow, which goes on from the last one."""
+        """The run.
+
+        A bed that changes has a run for each flow, which goes on from the last one.
+        """
         return tuple(
             case for run in self.runs for case in (run.flow, run) if case is not None
         )
@@ -680,7 +732,10 @@ class Pile(Geometry):
 
     @cached_property
     def method(self) -> Method:
-        """How its threshold is found; the scene's method is not left open (``auto``)."""
+        """How its threshold is found.
+
+        The scene's method is not left open (``auto``).
+        """
         if self.scene.forces.drag == "relative":
             return GoingOn(self)
         return METHODS[self.scene.method.kind](self)
@@ -715,15 +770,18 @@ class Pile(Geometry):
 
     @property
     def solves(self) -> "dict[str, Pile]":
-        """The pile by the name of the solved flow over the whole bed, if its flow is solved."""
+        """The pile by the name of its solved flow, if its flow is solved."""
         return {run.name: self for run in self.model.cases}
 
     def stress(self, cases: Path) -> WallStress:
-        """The stress along the whole bed; `cases` is the directory of the finished runs."""
+        """The stress along the whole bed.
+
+        `cases` is the directory of the finished runs.
+        """
         return self.model.stress(cases)
 
     def speed(self, cases: Path) -> FloatArray:
-        """Signed local friction velocity of the counted grains over the undisturbed one, (N,).
+        """Signed local friction velocity over u*_0 of the counted grains, (N,).
 
         On a bed that changes it is that of the round in which a grain moved.
         """
@@ -732,7 +790,7 @@ class Pile(Geometry):
         return np.asarray(ratio[self.packing.windward])
 
     def first(self, motion: Motion) -> tuple[float, float]:
-        """Where a motion starts, x in m, and at which undisturbed friction velocity, m/s.
+        """Where a motion starts, x in m, and at which u*_0, m/s.
 
         Grains that lie loose, and go in still fluid, say nothing of it.
         """
@@ -748,16 +806,22 @@ class Pile(Geometry):
         return float(x[at]) * self.scene.grain.diameter, float(flows[at])
 
     def pivot_thresholds(self, speed: FloatArray) -> FloatArray:
-        """Undisturbed friction velocity at which counted grains move by themselves, sorted, m/s.
+        """Friction velocities u*_0 at which counted grains move by themselves, m/s.
 
-        `speed` is the local friction velocity of each over the undisturbed one, shape (N,).
+        They are sorted.
+
+        `speed` is the local friction velocity of each over the undisturbed one, shape
+        (N,).
         """
         ratio = np.zeros(len(self.packing.sizes))
         ratio[self.packing.windward] = speed
         return np.sort(Loads(self, ratio, np.ones(len(ratio), bool)).alone())
 
     def motion(self, cases: Path) -> Motion:
-        """Motion of the counted grains; `cases` is the directory of the finished runs."""
+        """Motion of the counted grains.
+
+        `cases` is the directory of the finished runs.
+        """
         motion = self.method.motion(cases)
         if not self.goes_on:
             return motion

@@ -1,6 +1,9 @@
-"""The closed form of the single grain of a scene: its forces, its threshold, the paper's rule.
+"""The closed form of the single grain of a scene.
 
-Thousands of scenes share few grains: thresholds are computed for many grains at once, and kept.
+It has the grain's forces, its threshold, and the paper's rule.
+
+Thousands of scenes share few grains: thresholds are computed for many grains at once,
+and kept.
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,7 +26,10 @@ from orchestrator.study.scene import CELLS_OVER_Z0, Scene
 
 
 def single_grain(scene: Scene) -> SingleGrain:
-    """The grain of a scene; its entrainment angle is that of the pocket that it lies in."""
+    """The grain of a scene.
+
+    Its entrainment angle is that of the pocket that it lies in.
+    """
     grain, bed, fluid = scene.grain, scene.bed, scene.fluid
     # at a contact of two sizes the pull is that of their harmonic mean
     cohesion = grain.cohesion * 2 / (1 + bed.relative_size)
@@ -42,10 +48,12 @@ def single_grain(scene: Scene) -> SingleGrain:
 
 
 def closed_form(scene: Scene, name: str | None = None) -> Threshold:
-    """The threshold of the grain of a scene under a force law, by default the scene's own.
+    """The threshold of the grain of a scene under a force law.
 
-    Under gusts u*, Re* and the Shields number are those of the mean flow, the forces those of the
-    gust.
+    The law is by default the scene's own.
+
+    Under gusts u*, Re* and the Shields number are those of the mean flow, the forces
+    those of the gust.
     """
     at = thresholds_of(name or law_of(scene), [single_grain(scene)])[0]
     if scene.gust == 1:
@@ -59,11 +67,13 @@ def closed_form(scene: Scene, name: str | None = None) -> Threshold:
 
 
 def outer_roughness(scene: Scene) -> float | None:
-    """Roughness length (m) of the flow over the bed of a pile; None if that is the bed's own.
+    """Roughness length (m) of the flow over the bed of a pile.
 
-    Where the bed is not rough viscosity adds to its own, by the friction velocity at which a single
-    grain moves; a sublayer that is thicker than the first cells bears no turbulent flow. The flows
-    of Eqs. 2 and 4 are the paper's, over a rough wall.
+    It is None if that is the bed's own.
+
+    Where the bed is not rough viscosity adds to its own, by the friction velocity at
+    which a single grain moves; a sublayer that is thicker than the first cells bears no
+    turbulent flow. The flows of Eqs. 2 and 4 are the paper's, over a rough wall.
     """
     z0, ustar = scene.bed.roughness, closed_form(scene).friction_velocity
     outer = float(velocity.outer_roughness(z0, ustar, scene.fluid.viscosity))
@@ -100,7 +110,8 @@ def resolved(scenes: Sequence[Scene]) -> Iterator[tuple[Scene, ...]]:
     Where a scene leaves the law open, it is one that holds for its single grain. By the
     paper's rule a scene becomes two in the transition.
     """
-    # many thresholds at once take a hundredth of the time that they take one after another
+    # many thresholds at once take a hundredth of the time that they take one after
+    # another
     grains = {scene.id: single_grain(scene) for scene in scenes}
     asked: dict[str, list[SingleGrain]] = {"low": [], "high": []}
     for scene in scenes:

@@ -1,8 +1,8 @@
 """The criterion of a scene: what a grain must do to count as moved.
 
-A grain of the paper leaves its pocket. One of a natural sediment leaves it in a gust, and
-goes on after that (`orchestrator.physics.saltation`). Where a scene leaves the criterion
-and the method open, its fluid and its forces decide.
+A grain of the paper leaves its pocket. One of a natural sediment leaves it in a gust,
+and goes on after that (`orchestrator.physics.saltation`). Where a scene leaves the
+criterion and the method open, its fluid and its forces decide.
 """
 
 from typing import NamedTuple

@@ -106,7 +106,10 @@ class Part(BaseModel):
 
     @model_validator(mode="after")
     def _without_minus_zero(self) -> Self:
-        """Make one number of 0.0 and -0.0, which are equal: else they are two scenes."""
+        """Make one number of 0.0 and -0.0, which are equal.
+
+        Else they would be two scenes.
+        """
         zeros = {}
         for name, value in vars(self).items():
             if type(value) is float and value == 0.0:

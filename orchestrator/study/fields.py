@@ -81,7 +81,10 @@ class Quantity:
         return table_of(self.name) in METHOD
 
     def asked(self, scene: Scene) -> Any:
-        """Its value as a scene has it written; None where it has no effect or is left open."""
+        """Its value as a scene has it written.
+
+        It is None where it has no effect or is left open.
+        """
         if not APPLIES[self.info.scope](scene):
             return None
         return plain(self.read(scene))
@@ -134,7 +137,10 @@ def plain(value: Any) -> Any:
 
 
 def _item(item: Any) -> str:
-    """A text for an item of a list: of a sieve table a size and its part of the mass."""
+    """A text for an item of a list.
+
+    In a sieve table it is a size and its part of the mass.
+    """
     if isinstance(item, tuple):
         diameter, part = item
         return f"{1e3 * diameter:g} mm {100 * part:g} %"
@@ -175,7 +181,10 @@ APPLIES: Mapping[str, Callable[[Scene], bool]] = {
 def _quantity(table: str, name: str, declared: FieldInfo) -> Quantity:
     info = next(each for each in declared.metadata if isinstance(each, Info))
     meaning, *words = (declared.description or "").split("\n- ")
-    choices = dict(word.split(": ", 1) for word in words)
+    choices = {}
+    for word in words:
+        choice, means = " ".join(word.split()).split(": ", 1)
+        choices[choice] = means
     label = info.label or name.removesuffix("_deg").replace("_", " ")
     return Quantity(
         name=f"{table}.{name}",
@@ -233,10 +242,11 @@ OF_QUESTION = tuple(name for name, each in COLUMNS.items() if not each.is_method
 OF_METHOD = tuple(name for name, each in COLUMNS.items() if each.is_method)
 """Columns of how a scene is answered."""
 TWINS = ("z0_m", "regime")
-"""Columns that say again what others say: of the two roughness lengths, the ratio to the diameter
-tells beds apart that are alike but for the size of their grains."""
+"""Columns that say again what others say: of the two roughness lengths, the ratio to
+the diameter tells beds apart that are alike but for the size of their grains."""
 LEFT_OPEN = tuple(column for column in OF_METHOD if COLUMNS[column].info.read)
-"""Columns of the method that follow from the question where a study leaves them open."""
+"""Columns of the method that follow from the question where a study leaves them
+open."""
 
 
 def question(scene: Scene) -> dict[str, Any]:
@@ -266,7 +276,8 @@ def written(scene: Scene) -> str:
     Returns
     -------
     str
-        For each its name in the table ``[method]`` and its value; ``auto`` if there is none.
+        For each its name in the table ``[method]`` and its value; ``auto`` if there
+        is none.
     """
     texts = []
     for each in FIELDS:
@@ -279,6 +290,9 @@ def written(scene: Scene) -> str:
 
 
 def others(columns: Iterable[Hashable], *but: str) -> list[str]:
-    """The columns of fields among some, but for a few and for those that follow from others."""
+    """The columns of fields among some.
+
+    A few are left out, and those that follow from others.
+    """
     rest = set(columns) - {*but, *TWINS, *LEFT_OPEN}
     return [column for column in COLUMNS if column in rest]

@@ -56,7 +56,8 @@ GONE_VALUES: Mapping[tuple[str, str], tuple[str, str]] = {
         'write "waves", the linear theory of each wavelength, or "solve"',
     ),
 }
-"""Values that keys of study files had before: what became of them, and what to write now."""
+"""Values that keys of study files had before: what became of them, and what to write
+now."""
 
 
 def check_moved(data: Mapping[str, Any], where: str) -> None:
@@ -115,7 +116,10 @@ def by_name(data: Mapping[str, Any]) -> Tables:
 
 
 def nested(tables: Mapping[str, Table]) -> Tables:
-    """Tables by name as a scene takes them: those within the method are fields of it."""
+    """Tables by name as a scene takes them.
+
+    Those within the method are fields of it.
+    """
     whole: Tables = {}
     for name, table in tables.items():
         outer, _, inner = name.partition(".")

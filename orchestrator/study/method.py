@@ -1,4 +1,6 @@
-"""How a scene is answered: the threshold method, the solve of the flow, the grains' run.
+"""How a scene is answered.
+
+There are the threshold method, the solve of the flow, and the grains' run.
 
 All numerics are here: none of these fields changes what is asked. A scene whose method
 is ``auto`` leaves the choice to the program.
@@ -40,7 +42,8 @@ class FlowMethod(Part):
         ge=1e-6,
         le=1e3,
     )
-    """speed 10 h above the flat bed at which the flow is solved; the stress is scaled from it"""
+    """speed 10 h above the flat bed at which the flow is solved; the stress is scaled
+    from it"""
     viscosity: Viscosity | None = _solved(
         None,
         symbol="ν",
@@ -49,8 +52,8 @@ class FlowMethod(Part):
         label="viscosity of the solve",
         read="solve_viscosity",
     )
-    """kinematic viscosity of the solve, over a rough wall; by default 1e-5, or less where the first
-    cells would not be turbulent"""
+    """kinematic viscosity of the solve, over a rough wall; by default 1e-5, or less
+    where the first cells would not be turbulent"""
     first_cell_height: Length | None = _solved(
         None,
         unit="m",
@@ -58,13 +61,13 @@ class FlowMethod(Part):
         label="first cell",
         read="first_cell_height",
     )
-    """height of the cells on the bed; by default h/40, more on a rough bed and where the given
-    viscosity needs it"""
+    """height of the cells on the bed; by default h/40, more on a rough bed and where
+    the given viscosity needs it"""
     cells_per_face: int = _solved(40, ge=10, le=400)
     """cells of the mesh along each face of the pile"""
     expansion_ratio: float = _solved(1.1, ge=1.01, le=2)
-    """ratio of neighbouring cells up from the bed and away from the pile, for 40 cells along a
-    face"""
+    """ratio of neighbouring cells up from the bed and away from the pile, for 40 cells
+    along a face"""
     roughness: Roughness | None = field(
         None,
         scope="piles",
@@ -74,8 +77,8 @@ class FlowMethod(Part):
         label="roughness length of the solve",
         read="solve_roughness",
     )
-    """roughness length at which the flow is solved, which similar beds can share; by default the
-    bed's"""
+    """roughness length at which the flow is solved, which similar beds can share; by
+    default the bed's"""
     turbulence_model: Turbulence = _solved("kEpsilon")
     """OpenFOAM's turbulence model
     - kEpsilon: k-ε
@@ -105,17 +108,20 @@ class FlowMethod(Part):
 HELD_FROM = 6.0
 """Least waiting time of load steps in which the flow is held, sqrt(d/g').
 
-Shorter ones are a ramp of the flow, with other thresholds: in the map ``quiet-step`` steps
-of at most 5 % are within 5 % of long ones from here on, and at half of it up to 7 % off.
+Shorter ones are a ramp of the flow, with other thresholds: in the map ``quiet-step``
+steps of at most 5 % are within 5 % of long ones from here on, and at half of it up to 7
+% off.
 """
 
 
 class GrainMethod(Part):
     """How the grains are moved by DEM: contacts, layers that may move, load steps."""
 
-    # softer grains sink into one another by a hundredth, harder ones are harder than steel
+    # softer grains sink into one another by a hundredth, harder ones are harder than
+    # steel
     stiffness: float = _dem(1e4, symbol="K d/W", ge=1e2, le=1e9)
-    """spring constant of a contact, normal and tangential, times the diameter over the weight"""
+    """spring constant of a contact, normal and tangential, times the diameter over the
+    weight"""
     damping: float = _dem(0.1, ge=0, le=1)
     """damping ratio of a collision"""
     mobile_layers: int = field(2, scope="piles", ge=1, le=1000)
@@ -125,12 +131,13 @@ class GrainMethod(Part):
     load_increment: float = _dem(0.02, symbol="Δu*/u*", ge=1e-4, le=0.2)
     """relative rise of u* from one load step to the next"""
     waiting_time: float = _dem(10.0, unit="√(d/g′)", ge=1, le=1e4)
-    """time without a passage of the displacement criterion that ends a load step without rest"""
+    """time without a passage of the displacement criterion that ends a load step
+    without rest"""
     final_fraction: Fraction = _dem(
         0.9, label="last fraction", scope="DEM of piles", read="last_fraction"
     )
-    """fraction of the exposed grains that should have moved by the last load step, or 0.05 more
-    than the largest of `fractions` if that is more"""
+    """fraction of the exposed grains that should have moved by the last load step, or
+    0.05 more than the largest of `fractions` if that is more"""
 
 
 class Method(Part):
@@ -139,9 +146,10 @@ class Method(Part):
     kind: Literal["auto", "dem", "peeling", "pivot", "local"] = field(
         "auto", column="method", label="threshold method"
     )
-    """how the threshold is found: DEM, peeling (pivots that free one another), the pivot of each
-    grain by itself, or the closed form along the bed line, without grains and for any length; left
-    open, the program chooses one by known errors and by what each method knows
+    """how the threshold is found: DEM, peeling (pivots that free one another), the
+    pivot of each grain by itself, or the closed form along the bed line, without grains
+    and for any length; left open, the program chooses one by known errors and by what
+    each method knows
     - auto: chosen for the scene
     - dem: DEM
     - peeling: peeling

@@ -19,20 +19,20 @@ from orchestrator.types import FloatArray
 
 FEWEST = 20  # points from which their noise can be told from the shape of a bed
 APART = 0.25
-"""Distance of the points, over the height of the bed line, beyond which their differences
-are its shape: the mesh has three cells there on a slope of 15 degrees."""
+"""Distance of the points, over the height of the bed line, beyond which their
+differences are its shape: the mesh has three cells there on a slope of 15 degrees."""
 SLOPE = 0.01
-"""Slope of the noise that may be left: it moves the flow at which motion starts by 1 %, a
-slope of 0.02 by 1 to 4 %, of 0.1 by 23 to 26 % (docs/own-profile.md)."""
+"""Slope of the noise that may be left: it moves the flow at which motion starts by 1 %,
+a slope of 0.02 by 1 to 4 %, of 0.1 by 23 to 26 % (docs/own-profile.md)."""
 MEDIAN = 0.674490  # of the size of a normal variate, over its standard deviation
 
 
 def standard_deviation(x: FloatArray, z: FloatArray) -> float:
     """Standard deviation of the errors of points, from what each is off its neighbours.
 
-    A point is compared with the cubic through its two neighbours on either side, so that
-    slope and curvature of the bed do not count. The median of the sizes stands for all:
-    corners of the bed are few.
+    A point is compared with the cubic through its two neighbours on either side, so
+    that slope and curvature of the bed do not count. The median of the sizes stands for
+    all: corners of the bed are few.
 
     Parameters
     ----------

@@ -1,4 +1,6 @@
-"""The parts of what is asked: fluid, grain, bed, flow above, forces, and what counts as motion.
+"""The parts of what is asked.
+
+They are fluid, grain, bed, flow above, forces, and what counts as motion.
 
 Every part is frozen and validated. How the question is answered is in `method`.
 """
@@ -60,9 +62,12 @@ class LogNormal(Part):
         return self.smallest or self.sigma_g**-2, self.largest or self.sigma_g**2
 
     def quantile(self, part: ArrayLike, *, power: int) -> FloatArray:
-        """Diameter over the median that a part is below, of the mass (power 0) or of the number.
+        """Diameter over the median that a part is below.
 
-        By number the power is 3 where masses, 2 where areas in a plane are so distributed.
+        The part is one of the mass (power 0) or of the number.
+
+        By number the power is 3 where masses, 2 where areas in a plane are so
+        distributed.
         """
         from scipy.special import ndtr, ndtri
 
@@ -92,7 +97,9 @@ _poured = partial(field, scope="poured beds", since=True)
 
 
 class Fluid(Part):
-    """A `kind`, "water", "seawater" or "air", with `temperature_deg_c` (15), or the numbers.
+    """A kind of fluid, or its numbers.
+
+    The kinds are "water", "seawater" and "air", with `temperature_deg_c` (15).
 
     The default is the paper's fluid, which is no air of 15 °C.
     """
@@ -140,13 +147,13 @@ class Grain(Part):
     cohesion: float = field(
         0.0, unit="N/m", column="cohesion_n_m", since=True, ge=0, le=1e3
     )
-    """pull of a contact over the diameter, of two sizes over their harmonic mean; by pivots and
-    peeling alone"""
+    """pull of a contact over the diameter, of two sizes over their harmonic mean; by
+    pivots and peeling alone"""
     sizes: Sizes | None = _poured(None)
-    """mixture of a poured bed, by mass, in one plane by area: a sieve table, rows of diameter
-    (m, rising) and fraction or a CSV file with columns diameter_m and fraction, whose d50 is the
-    diameter; or log-normal, { sigma_g = 1.3, smallest = 0.6, largest = 1.7 }, cut off in d, by
-    default at two geometric standard deviations"""
+    """mixture of a poured bed, by mass, in one plane by area: a sieve table, rows of
+    diameter (m, rising) and fraction or a CSV file with columns diameter_m and
+    fraction, whose d50 is the diameter; or log-normal, { sigma_g = 1.3, smallest = 0.6,
+    largest = 1.7 }, cut off in d, by default at two geometric standard deviations"""
 
 
 class Forces(Part):
@@ -165,8 +172,8 @@ class Forces(Part):
     - wall: wall stress
     - eq10: stress of Eq. 10"""
     averaging_length: float = _pile(1 / 40, unit="h", ge=1e-4, le=100)
-    """least length of bed that a grain's stress is averaged on: the crest's own never converges
-    with the mesh"""
+    """least length of bed that a grain's stress is averaged on: the crest's own never
+    converges with the mesh"""
     loaded_grains: Literal["exposed", "all but crest", "all but toe"] = _pile("exposed")
     """grains of a pile that feel the flow's force
     - exposed: all exposed grains
@@ -179,12 +186,13 @@ class Forces(Part):
     drag: Literal["at rest", "relative"] = _poured("at rest")
     """velocity of which the drag on a grain is
     - at rest: that of the fluid, as if the grain were at rest, as in the paper
-    - relative: that of the fluid at its place less its own; by DEM of level strips, where a grain
-      counts when it goes on for 20 d after a gust"""
+    - relative: that of the fluid at its place less its own; by DEM of level strips,
+      where a grain counts when it goes on for 20 d after a gust"""
     sheltering: Literal["none", "balanced"] = _pile("none", since=True)
     """how the exposed grains of a pile share the stress of the flow
     - none: each feels the flow as if it stood alone, as in the paper
-    - balanced: drags on a patch add up to its stress, by peeling or updates anew as grains leave"""
+    - balanced: drags on a patch add up to its stress, by peeling or updates anew as
+      grains leave"""
 
 
 class Gusts(Part):
@@ -197,19 +205,22 @@ class Gusts(Part):
     duration: Annotated[
         float, Field(ge=0.05, le=1e4, exclude_if=lambda value: value == 1.0)
     ] = 1.0
-    """how long each lasts, √(d/g′); by default as an eddy of 3 d takes to pass in water"""
+    """how long each lasts, √(d/g′); by default as an eddy of 3 d takes to pass in
+    water"""
 
     def __str__(self) -> str:
-        return f"{self.events} of intensity {self.intensity:g}, {self.duration:g} √(d/g′) long"
+        long = f"{self.duration:g} √(d/g′) long"
+        return f"{self.events} of intensity {self.intensity:g}, {long}"
 
 
 class Flow(Part):
     """What flows above the bed: its top, its depth and its gusts."""
 
     gusts: Gusts | None = field(None, since=True)
-    """peaks of the turbulent stress, { intensity = 0.4, events = 100, duration = 1 }: independent,
-    log-normal events, by default none; by pivots and peeling the largest acts, by DEM of piles all
-    in each load step, each for a duration in √(d/g′), by default 1, of an eddy of 3 d in water"""
+    """peaks of the turbulent stress, { intensity = 0.4, events = 100, duration = 1 }:
+    independent, log-normal events, by default none; by pivots and peeling the largest
+    acts, by DEM of piles all in each load step, each for a duration in √(d/g′), by
+    default 1, of an eddy of 3 d in water"""
     top: Literal["open water", "closed channel", "boundary layer"] = field(
         "boundary layer", column="flow_top", label="top of the flow", since=True
     )
@@ -220,8 +231,8 @@ class Flow(Part):
     depth: Length | None = field(
         None, symbol="D", unit="m", column="depth_m", since=True
     )
-    """depth of open water or of a closed channel over the flat bed, at least three heights of forms
-    and obstacles, over a level bed three of the largest grains"""
+    """depth of open water or of a closed channel over the flat bed, at least three
+    heights of forms and obstacles, over a level bed three of the largest grains"""
 
 
 class Obstacle(Part):
@@ -273,52 +284,59 @@ class Bed(Part):
 
 
 class GrainBed(Bed):
-    """One grain on its two fixed neighbours, in an undisturbed boundary layer (paper, 3.1)."""
+    """One grain on its two fixed neighbours (section 3.1 of the paper).
+
+    The boundary layer around it is undisturbed.
+    """
 
     kind: Literal["grain"] = "grain"
 
 
 class PileBed(Bed):
-    """Grains across the flow, under a bed line of any shape (the paper's, 3.2, is a triangle)."""
+    """Grains across the flow, under a bed line of any shape.
+
+    That of the paper, section 3.2, is a triangle.
+    """
 
     kind: Literal["pile"] = field(label="bed", column="bed")
     """what the bed is made of
     - grain: one grain on its two fixed neighbours, in an undisturbed boundary layer
     - pile: grains under any bed line: a form, a train of forms, a profile"""
     height: Height = _pile(0.02, symbol="h", unit="m", column="h_m")
-    """height of the forms; that of a profile follows. A flat bed has none: with obstacles lengths
-    in h are heights of the tallest, without any they are of 20 diameters, whatever is given"""
+    """height of the forms; that of a profile follows. A flat bed has none: with
+    obstacles lengths in h are heights of the tallest, without any they are of 20
+    diameters, whatever is given"""
     shape: ShapeName = _pile(
         "triangle", column="bed_shape", since=True, choices=SHAPE_MEANINGS
     )
-    """shape of a form, which `kind` may name too; `slope_deg` is that of its windward side, of a
-    curve where it is steepest"""
+    """shape of a form, which `kind` may name too; `slope_deg` is that of its windward
+    side, of a curve where it is steepest"""
     windward: Literal["straight", "curved"] = _dune("straight", label="windward side")
     """windward side of a dune
     - straight: one slope
     - curved: half a wave of a cosine"""
     lee_slope_deg: float | None = _pile(None, unit="°", since=True, gt=0, le=60)
-    """slope of a straight lee side or a step down; by default the windward side's, 30 of a dune and
-    a step down"""
+    """slope of a straight lee side or a step down; by default the windward side's, 30
+    of a dune and a step down"""
     brink_radius: float = _dune(0.0, unit="m", ge=0, le=1e3)
     """radius with which a dune's brink is rounded; 0 leaves it sharp"""
     length: Length | None = field(
         None, unit="m", scope="beds with level parts", since=True
     )
-    """length of level bed with grains: a trapezoid's top, a flat bed, before or behind a step; by
-    default 4 h, of a flat bed 80 diameters"""
+    """length of level bed with grains: a trapezoid's top, a flat bed, before or behind
+    a step; by default 4 h, of a flat bed 80 diameters"""
     forms: int = _pile(1, since=True, ge=1, le=100)
     """number of forms in a train"""
     spacing: Length | None = _pile(None, unit="m", since=True)
     """from one form of a train to the next; by default they touch"""
     profile: File | None = _pile(None, since=True)
-    """file with the bed line, in place of a shape: columns x_m and z_m; its path is relative to the
-    study file"""
+    """file with the bed line, in place of a shape: columns x_m and z_m; its path is
+    relative to the study file"""
     smoothing: float = field(0.0, unit="m", scope="profiles", since=True, ge=0, le=1e3)
     """length over which a noisy profile is smoothed"""
     obstacles: Annotated[tuple[Obstacle, ...], List] = _pile((), since=True)
-    """fences, blocks and half-cylinders, which carry no grains: tables with `kind`, `x`, `height`
-    and, of a block, `length`"""
+    """fences, blocks and half-cylinders, which carry no grains: tables with `kind`,
+    `x`, `height` and, of a block, `length`"""
     counted: Literal["windward", "all"] | Range | None = _pile(
         None, label="counted grains", since=True, read="counts"
     )
@@ -340,11 +358,11 @@ class PileBed(Bed):
     )
     """vertical depth of a poured bed under the bed line, to a row of fixed grains"""
     width: float = _poured(0.0, unit="d", label="width of the strip", ge=0, le=50)
-    """width of a strip of poured grains with periodic sides, at least 3 of the largest; 0 is one
-    layer in the plane of the flow"""
+    """width of a strip of poured grains with periodic sides, at least 3 of the largest;
+    0 is one layer in the plane of the flow"""
     seed: int = field(0, scope="random beds and replicas", ge=0, le=10**9)
-    """which of the many random packings; of a lattice 0 is itself, any other a replica with grains
-    up to 1e-6 d aside"""
+    """which of the many random packings; of a lattice 0 is itself, any other a replica
+    with grains up to 1e-6 d aside"""
 
     @property
     def form(self) -> Shape:
@@ -363,7 +381,10 @@ class PileBed(Bed):
 
     @property
     def relief(self) -> float:
-        """Height of what the flow goes over, m: of the forms, on a flat bed of its obstacles."""
+        """Height of what the flow goes over, m.
+
+        It is that of the forms, on a flat bed that of its obstacles.
+        """
         is_flat = self.shape == "flat" and not self.profile and self.obstacles
         return max(each.height for each in self.obstacles) if is_flat else self.height
 
@@ -390,13 +411,19 @@ class PileBed(Bed):
 
     @property
     def is_triangle(self) -> bool:
-        """Whether it is the paper's bed: one triangle of two equal faces, the windward counted."""
+        """Whether it is the paper's bed.
+
+        That is one triangle of two equal faces, of which the windward one is counted.
+        """
         equal = self.shape == "triangle" and self.lee_slope == self.slope_deg
         return self.is_wedge and equal and not self.obstacles
 
     @property
     def is_wedge(self) -> bool:
-        """Whether it is one form of two straight faces, of which the windward one is counted."""
+        """Whether it is one form of two straight faces.
+
+        Grains on the windward one are counted.
+        """
         straight = self.windward == "straight" and not self.brink_radius  # of a dune
         faces = self.shape in ("triangle", "dune") and straight
         if not faces or self.forms > 1 or self.profile or self.counts != "windward":
@@ -411,7 +438,7 @@ class PileBed(Bed):
 
     @property
     def is_replica(self) -> bool:
-        """Whether it is a lattice but for shifts that matter to nothing but round-off."""
+        """Whether it is a lattice but for shifts that change round-off alone."""
         return self.packing in ("aligned", "horizontal") and self.seed > 0
 
 
@@ -429,8 +456,8 @@ class Threshold(Part):
     )
     """displacement along the bed from which a grain counts as moved"""
     criterion: Literal["auto", "leaves", "goes on"] = field("auto", since=True)
-    """what a grain must do; left open, with the method left open, too, and in another fluid than
-    the paper's, it must go on
+    """what a grain must do; left open, with the method left open, too, and in another
+    fluid than the paper's, it must go on
     - auto: by fluid, forces and method
     - leaves: leave its pocket in the flow, as in the paper
     - goes on: leave it in a gust of 2.28 times the mean stress, and hop on after it"""
@@ -445,15 +472,16 @@ class Threshold(Part):
         scope="DEM and peeling of piles",
         since=True,
     )
-    """part of the counted grains after which the flow is solved over the bed line of the remaining
-    ones, up to the last fraction; 0 keeps the first flow, as in the paper"""
+    """part of the counted grains after which the flow is solved over the bed line of
+    the remaining ones, up to the last fraction; 0 keeps the first flow, as in the
+    paper"""
 
 
 def percentile(sizes: Sizes | None, diameter: float, part: float) -> float:
     """Diameter that a part (0 ... 1) of the mass is finer than, m.
 
-    It is straight in its logarithm between classes. `diameter` is that of equal grains, where
-    `sizes` is None, or the median of a log-normal distribution, m.
+    It is straight in its logarithm between classes. `diameter` is that of equal grains,
+    where `sizes` is None, or the median of a log-normal distribution, m.
     """
     if sizes is None:
         return diameter
@@ -466,7 +494,10 @@ def percentile(sizes: Sizes | None, diameter: float, part: float) -> float:
 
 
 def extremes(sizes: Sizes | None, diameter: float) -> tuple[float, float]:
-    """The smallest and the largest grain of a mixture over one diameter; both 1 of equal grains."""
+    """The smallest and the largest grain of a mixture over one diameter.
+
+    Both are 1 of equal grains.
+    """
     if isinstance(sizes, LogNormal):
         return sizes.ends
     return (sizes[0][0] / diameter, sizes[-1][0] / diameter) if sizes else (1.0, 1.0)

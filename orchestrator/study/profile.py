@@ -26,7 +26,8 @@ MOST_CORNERS = (
     3000  # most corners of a bed line, each of which is a grid line of the flow's mesh
 )
 GAP, DENSE = 20.0, 20
-"""A step along x this many times the middle one is a gap, in a profile of so many points."""
+"""A step along x this many times the middle one is a gap, in a profile of so many
+points."""
 STEEPEST_DEG = 60.0  # slope beyond which no mesh of vertical grid lines follows the bed
 RESOLVED = 4  # corners of a smoothed line in its smoothing length
 LOWEST = 1e-6  # least of the two lengths below, over that of the line
@@ -50,15 +51,16 @@ class Profile:
         return f"{self.name} ({self.digest[:12]})"
 
     def smoothed(self, length: float) -> dict[str, Any]:
-        """Fields of a bed with the points of this file smoothed over another length, m."""
+        """Fields of a bed with the points smoothed over another length, m."""
         return _fields(read_profile(self.text, self.name, self.name, length))
 
 
 def steepest_deg(profile: Profile, height: float) -> float:
     """The steepest slope up which a bed line goes for as far as it is high.
 
-    It is that of the line's means over two stretches of `OVER` heights, one behind the other.
-    The noise of single points does not count in it, nor does a face shorter than the two.
+    It is that of the line's means over two stretches of `OVER` heights, one behind the
+    other. The noise of single points does not count in it, nor does a face shorter than
+    the two.
 
     Parameters
     ----------
@@ -143,7 +145,8 @@ class Files:
         Raises
         ------
         InputError
-            If the file is no bed line, or the table has a field that the profile replaces.
+            If the file is no bed line, or the table has a field that the profile
+            replaces.
         """
         where, name = f"{where}: bed.profile", bed["profile"]
         of_shapes = (field for shape in SHAPES.values() for field in shape.fields)
@@ -235,7 +238,9 @@ def _unreadable(error: Exception, where: str) -> InputError:
 def read_columns(
     text: str, names: tuple[str, str], where: str
 ) -> tuple[list[int], list[list[float]]]:
-    """Two columns of a CSV file with a header; blank lines and other columns are left out.
+    """Two columns of a CSV file with a header.
+
+    Blank lines and other columns are left out.
 
     Parameters
     ----------
@@ -278,7 +283,10 @@ def read_columns(
 
 
 def _header(cells: Sequence[str], names: tuple[str, str]) -> list[str]:
-    """The names of the columns in the header; a ValueError unless each is there once."""
+    """The names of the columns in the header.
+
+    It is a ValueError unless each is there once.
+    """
     header = [cell.strip() for cell in cells]
     if all(header.count(name) == 1 for name in names):
         return header
@@ -308,7 +316,8 @@ def _cell(row: Mapping[str | None, Any], name: str) -> float:
 class _Refusal:
     """How the file of a profile is refused: its place, and the line of each point.
 
-    Without lines the file is refused as a whole: points of a smoothed line are not in it.
+    Without lines the file is refused as a whole: points of a smoothed line are not in
+    it.
     """
 
     where: str
@@ -338,7 +347,8 @@ def read_profile(text: str, name: str, where: str, smoothing: float) -> Profile:
     where
         The file, for messages.
     smoothing
-        Twice the standard deviation of the Gaussian weights of a mean along x, m; 0 for none.
+        Twice the standard deviation of the Gaussian weights of a mean along x, m; 0
+        for none.
 
     Raises
     ------
@@ -361,7 +371,8 @@ def read_profile(text: str, name: str, where: str, smoothing: float) -> Profile:
     if smoothing:
         x, z = _smoothed(x, z, smoothing, max(corners, DENSE))
     _check_heights(x, z, more, refusal)
-    # to nine digits of the length: means are known no better, and the name of a bed is its corners
+    # to nine digits of the length: means are known no better, and the name of a bed is
+    # its corners
     length = np.ptp(x)
     xs = tuple(on_grid(x - x[0], length).tolist())
     zs = tuple(on_grid(z - z[0], length).tolist())

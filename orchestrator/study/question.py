@@ -1,4 +1,7 @@
-"""The question: a fluid, its grains, their bed, the flow above, and what counts as motion."""
+"""The question.
+
+It has a fluid, its grains, their bed, the flow above, and what counts as motion.
+"""
 
 from itertools import pairwise
 from math import acos, cos, degrees, radians
@@ -32,10 +35,11 @@ BUILDABLE_DEG = (1.0, 60.0)
 LEAST_HEIGHT = 5.0
 """Least height of forms, in grains."""
 LEAST_DEPTH = 3.0
-"""Least depth of a flow, in heights of forms and obstacles: mesh rows are level at half of it. Over
-a level bed, where no flow is solved, it is in the largest grains."""
+"""Least depth of a flow, in heights of forms and obstacles: mesh rows are level at half
+of it. Over a level bed, where no flow is solved, it is in the largest grains."""
 LEAST_WIDTH = 3.0
-"""Least width of a strip, in its largest grains: none touches another from both sides."""
+"""Least width of a strip, in its largest grains: none touches another from both
+sides."""
 ROUGHEST = 1 / 3
 """Largest z0 over the diameter of the bed's grains; measured are up to 1/7."""
 LEAST_UPDATE = 0.02
@@ -43,17 +47,20 @@ LEAST_UPDATE = 0.02
 LARGEST_RATIO = 10.0
 """Largest ratio of a mixture's grains: the time of DEM rises with its square."""
 OFF_SIEVE = 1e-5
-"""Relative difference of the d50 of a sieve table from the diameter: messages and tables
-print it with six digits."""
+"""Relative difference of the d50 of a sieve table from the diameter: messages and
+tables print it with six digits."""
 OFF_MEDIAN = 0.01
-"""Relative difference of a log-normal mixture's d50 from the diameter, of which Shields numbers and
-a roughness length of d/30 are made."""
+"""Relative difference of a log-normal mixture's d50 from the diameter, of which Shields
+numbers and a roughness length of d/30 are made."""
 OUT = "leave it out"
 POURED = 'leave it out, or bed.packing = "poured"'
 
 
 class Question(Part):
-    """What is asked of nature; a `pydantic.ValidationError` names each field that is wrong."""
+    """What is asked of nature.
+
+    A `pydantic.ValidationError` names each field that is wrong.
+    """
 
     fluid: Fluid = Fluid()
     grain: Grain
@@ -85,7 +92,10 @@ class Question(Part):
 
     @property
     def unknown_to_dem(self) -> str:
-        """What of the question DEM does not know, in words; empty where it knows all."""
+        """What of the question DEM does not know, in words.
+
+        It is empty where DEM knows all.
+        """
         if self.is_turned:
             return f"DEM does not know how {self.forces.law} turns the grain"
         if self.grain.cohesion:
@@ -96,7 +106,10 @@ class Question(Part):
 
     @property
     def gust(self) -> float:
-        """Stress that moves the grains over the mean stress of the flow: 1 without gusts."""
+        """Stress that moves the grains over the mean stress of the flow.
+
+        It is 1 without gusts.
+        """
         gusts = self.flow.gusts
         return peak_over_mean(gusts.intensity, gusts.events) if gusts else 1.0
 
@@ -128,7 +141,9 @@ class Question(Part):
 
     @property
     def pocket_cosine(self) -> float:
-        """Cosine of the angle at which a single grain leaves its pocket; above 1 it falls through.
+        """Cosine of the angle at which a single grain leaves its pocket.
+
+        Above 1 the grain falls through.
 
         Its neighbours' centres are 2 d cos(beta) apart and (D + d)/2 from its own.
         """
@@ -360,5 +375,6 @@ def _check_depth(flow: Flow, bed: PileBed, largest: float) -> None:
             raise UnfitError("flow.depth", what, f"at least {least:.4g} m")
         return
     if depth < LEAST_DEPTH * bed.highest:
-        what = f"{depth:g} m is less than {LEAST_DEPTH:g} heights of the forms or obstacles"
+        heights = f"{LEAST_DEPTH:g} heights of the forms or obstacles"
+        what = f"{depth:g} m is less than {heights}"
         raise UnfitError("flow.depth", what, "raise it")

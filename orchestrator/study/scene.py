@@ -23,16 +23,17 @@ VISCOUS_CELLS = 2.5
 CELLS_OVER_Z0 = 2.5
 """First cell over z0: its centre is not within the roughness."""
 MOST_POURED_STIFFNESS = 1e5
-"""K d/W of a deck on a poured bed, ten times that of the pouring: grains that lie in one another by
-1e-3 d are thrown apart by stiffer springs."""
+"""K d/W of a deck on a poured bed, ten times that of the pouring: grains that lie in
+one another by 1e-3 d are thrown apart by stiffer springs."""
 NARROWEST_OVER_D = 0.1
 NARROWEST_OVER_CELL = 0.05
-"""Least distance of two points of a profile, over the diameter and over the height of the first
-cell. Nearer ones make columns of cells in which the flow does not converge: on a triangle of 15 deg
-a second point at 0.05 of the first cell moves thresholds by 1 to 2 %, at 0.0002 by half."""
+"""Least distance of two points of a profile, over the diameter and over the height of
+the first cell. Nearer ones make columns of cells in which the flow does not converge:
+on a triangle of 15 deg a second point at 0.05 of the first cell moves thresholds by 1
+to 2 %, at 0.0002 by half."""
 BEYOND_ASKED = 0.05
-"""Part of the grains beyond the largest fraction asked for that a run of DEM goes on: half a grain
-of ten."""
+"""Part of the grains beyond the largest fraction asked for that a run of DEM goes on:
+half a grain of ten."""
 LEFT_OPEN_METHOD = 'leave it out, or method.kind = "pivot"'
 CLOSED = ("pivot", "local")
 """Methods without contacts: nothing that moves changes the bed."""
@@ -40,7 +41,10 @@ LEFT_OPEN = 'method.kind = "auto", which takes one that does'
 
 
 class Scene(Question):
-    """One point of a study; a `pydantic.ValidationError` names each field that is wrong."""
+    """One point of a study.
+
+    A `pydantic.ValidationError` names each field that is wrong.
+    """
 
     method: Method = Method()
 
@@ -70,8 +74,8 @@ class Scene(Question):
     def last_fraction(self) -> float:
         """Fraction of a pile's grains at which a run of DEM ends.
 
-        It goes on beyond the largest fraction that is asked for: there the interval ends where half
-        a grain more has moved, of ten grains or more.
+        It goes on beyond the largest fraction that is asked for: there the interval
+        ends where half a grain more has moved, of ten grains or more.
         """
         final = self.method.grains.final_fraction
         asked = min(max(self.threshold.fractions) + BEYOND_ASKED, 1.0)
@@ -106,7 +110,7 @@ class Scene(Question):
 
     @cached_property
     def _eddy_viscosity(self) -> float:
-        """Eddy viscosity of the undisturbed flow of the solve over the height, kappa u*_0, m/s."""
+        """Eddy viscosity of the undisturbed flow over the height, kappa u*_0, m/s."""
         assert isinstance(self.bed, PileBed)
         height = 10 * self.bed.relief
         speed = self.method.flow.speed
@@ -114,7 +118,7 @@ class Scene(Question):
 
 
 def _check(scene: Scene) -> None:
-    """Raise an `UnfitError` for the first field of the method that does not fit the question."""
+    """Raise an `UnfitError` for the first field that does not fit the question."""
     _check_kind(scene)
     by_dem = scene.method.kind == "dem"
     if scene.method.kind == "auto" and not scene.unknown_to_dem:
@@ -170,7 +174,8 @@ def _check_flow(scene: Scene, bed: PileBed) -> None:
     if scene.flow.depth is None and not bed.is_level:
         lid = scene.method.flow.lid * bed.relief
         if lid < LEAST_DEPTH * bed.highest:
-            what = f"{lid:g} m is less than {LEAST_DEPTH:g} heights of the forms or obstacles"
+            least = f"{LEAST_DEPTH:g} heights of the forms or obstacles"
+            what = f"{lid:g} m is less than {least}"
             raise UnfitError("method.flow.lid", what, "raise it")
     if scene.flow.top != "boundary layer" and scene.method.flow.model == "waves":
         what = "linear theory has no top"
@@ -211,9 +216,9 @@ def default_first_cell_height(
 ) -> float:
     """Height of the first cell on the bed of a pile, m.
 
-    The finer the better, but its centre z_e must not lie in the roughness, and where the eddy
-    viscosity is below the molecular one, `viscous` = nu/(kappa u*_0), the flow is not turbulent.
-    h/4 is the end.
+    The finer the better, but its centre z_e must not lie in the roughness, and where
+    the eddy viscosity is below the molecular one, `viscous` = nu/(kappa u*_0), the flow
+    is not turbulent. h/4 is the end.
     """
     least = max(height / 40, CELLS_OVER_Z0 * roughness, VISCOUS_CELLS * viscous)
     return rounded(min(least, height / 4))
@@ -222,8 +227,8 @@ def default_first_cell_height(
 def roughness_length(text: str, diameter: float, mixture: Sizes | None = None) -> float:
     """A roughness in metres from a part of the diameter (m) such as ``"d/30"``.
 
-    In a mixture d is the median; ``"d84/30"`` is a part of the diameter that 84 % of the mass are
-    finer than.
+    In a mixture d is the median; ``"d84/30"`` is a part of the diameter that 84 % of
+    the mass are finer than.
     """
     form = r"\s*d([1-9]\d)?\s*/\s*(\d+(?:\.\d+)?)\s*"
     match = re.fullmatch(form, text, re.ASCII)
@@ -233,5 +238,6 @@ def roughness_length(text: str, diameter: float, mixture: Sizes | None = None) -
     size = diameter
     if match[1]:
         size = percentile(mixture, diameter, int(match[1]) / 100)
-    # rounded, so that d/10 of one grain and d/30 of another are one length and share a flow
+    # rounded, so that d/10 of one grain and d/30 of another are one length and share a
+    # flow
     return float(f"{size / float(match[2]):.12g}")

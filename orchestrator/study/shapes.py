@@ -1,7 +1,10 @@
-"""The shapes of a form on the bed: what each is called, which fields it has, and its corners.
+"""The shapes of a form on the bed.
 
-The corners of a form, shape (n, 2), go downstream from its foot at the origin to its toe, m. A new
-shape is one entry of `SHAPES`; mesh, packing, checks, labels and the study file follow.
+Each has a name, its fields, and its corners.
+
+The corners of a form, shape (n, 2), go downstream from its foot at the origin to its
+toe, m. A new shape is one entry of `SHAPES`; mesh, packing, checks, labels and the
+study file follow.
 """
 
 from collections.abc import Callable
@@ -15,9 +18,11 @@ from orchestrator.physics.measured import rushil_aspect, rushil_form
 from orchestrator.types import FloatArray
 
 CHORDS, ARC_DEG = 40, 2.0
-"""Chords of a windward side that is a curve, and the bend between two of a rounded brink."""
+"""Chords of a windward side that is a curve, and the bend between two of a rounded
+brink."""
 GAUSSIAN_END = 3.5
-"""Where a Gaussian hill is cut, standard deviations: it is let down by 0.2 % of its height."""
+"""Where a Gaussian hill is cut, standard deviations: it is let down by 0.2 % of its
+height."""
 
 
 class Form(Protocol):
@@ -82,7 +87,10 @@ def _trapezoid(bed: Form) -> FloatArray:
 
 
 def _dune(bed: Form) -> FloatArray:
-    """A windward side, straight or curved, and a slip face; its brink sharp or rounded."""
+    """A windward side, straight or curved, and a slip face.
+
+    Its brink is sharp or rounded.
+    """
     if bed.windward == "curved":
         t = np.linspace(0, 1, CHORDS + 1)
         face = bed.height / tan(radians(bed.slope_deg))
@@ -97,7 +105,10 @@ def _dune(bed: Form) -> FloatArray:
 
 
 def _rounded(corners: FloatArray, radius: float) -> FloatArray:
-    """A dune with an arc in place of its brink, which touches the line before and behind it."""
+    """A dune with an arc in place of its brink.
+
+    It touches the line before and behind it.
+    """
     brink = len(corners) - 2
     steps = np.diff(corners, axis=0)
     rise = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))

@@ -1,4 +1,6 @@
-"""Where a study comes from: a preset by its name or a file, and the bytes it was read from.
+"""Where a study comes from.
+
+It is a preset by its name or a file, and the bytes it was read from.
 
 Nothing here imports a library: a finished study is told from its bytes in a tenth of a
 second.
@@ -37,8 +39,8 @@ class Source:
     def described(self, root: Path) -> dict[str, object]:
         """The source as JSON, for a directory of results.
 
-        The path of the study file is relative to that directory: a copy of both together
-        is a study of its own.
+        The path of the study file is relative to that directory: a copy of both
+        together is a study of its own.
         """
         file = os.path.relpath(self.file, root)
         return {

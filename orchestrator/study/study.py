@@ -1,7 +1,7 @@
 """A study file: the tables of what is asked, of the method, and axes, read into scenes.
 
-The tables at the top hold for every scene. Each ``[[group]]`` overrides some of them, and its
-``axes`` span a grid: every combination of the listed values is a scene.
+The tables at the top hold for every scene. Each ``[[group]]`` overrides some of them,
+and its ``axes`` span a grid: every combination of the listed values is a scene.
 """
 
 import difflib
@@ -48,10 +48,11 @@ TIME_LIMIT_S = 3600.0
 BED = {"kind": "grain", "roughness": "d/30"}
 """Fields of a bed that a file may leave out."""
 POURED_LAYERS = 4
-"""Mobile layers of a poured bed: the fewest that are near the reference (docs/poured.md)."""
+"""Mobile layers of a poured bed: the fewest that are near the reference
+(docs/poured.md)."""
 LEVEL_HEIGHT = 20.0
-"""Diameters that stand for the height of a level bed. Its length is four heights by default: level
-beds of all grains are alike."""
+"""Diameters that stand for the height of a level bed. Its length is four heights by
+default: level beds of all grains are alike."""
 NO_TOLERANCE = 'leave it out; method.kind = "dem" answers by DEM'
 MOST_SCENES = 100_000
 MOST_BYTES = 2**24
@@ -87,12 +88,17 @@ class _Tables(Part):
 
 
 class Erosion(Part):
-    """What `orchestrator erosion` asks of a stockpile: winds and the threshold of its surface."""
+    """What `orchestrator erosion` asks of a stockpile.
+
+    It is the winds and the threshold of its surface.
+    """
 
     fastest_mile: Annotated[tuple[Wind, ...], List, Field(min_length=1)] = (20.0,)
-    """fastest mile of each time between two disturbances, wind at 10 m, m/s; by default a gale"""
+    """fastest mile of each time between two disturbances, wind at 10 m, m/s; by default
+    a gale"""
     threshold: float | str | None = None
-    """friction velocity, m/s, or a material in the table of AP-42; by default the closed form"""
+    """friction velocity, m/s, or a material in the table of AP-42; by default the
+    closed form"""
 
 
 class _Group(_Tables):
@@ -192,7 +198,8 @@ def _values_of(scenes: Sequence[Scene]) -> dict[str, list[float]]:
         each = [getattr(getattr(scene, part), field, None) for scene in scenes]
         # what is left open is no number, and a bed of one grain has no lee side
         values[name] = [value for value in each if value is not None]
-    # the diameter of a sieve table follows from its rows, the slope of a profile from its points
+    # the diameter of a sieve table follows from its rows, the slope of a profile from
+    # its points
     single = [
         scene.grain for scene in scenes if not isinstance(scene.grain.sizes, tuple)
     ]
@@ -204,7 +211,7 @@ def _values_of(scenes: Sequence[Scene]) -> dict[str, list[float]]:
 
 
 def _values_in(tables: Mapping[str, Table]) -> dict[str, list[float]]:
-    """The values of the fields `ASKED` in the tables of one scene, which may be wrong."""
+    """The values of the fields `ASKED` in tables of one scene, maybe wrong ones."""
     given = {name: dict(tables.get(name, {})) for name in PARTS}
     with suppress(InputError):
         given["fluid"] = fluids.numbers_of(given["fluid"])
@@ -268,8 +275,8 @@ def load(source: str | Path, tolerance: float | None = None) -> Study:
 def parse(text: str, *, name: str, where: str, files: Files | None = None) -> Study:
     """Make a study of the text of a TOML file.
 
-    Only scenes that cannot be built are refused; a plan refuses those beyond the methods'
-    limits.
+    Only scenes that cannot be built are refused; a plan refuses those beyond the
+    methods' limits.
 
     Parameters
     ----------
@@ -373,7 +380,10 @@ def _axes(file: "_File", table: "_Group", where: str) -> dict[str, list[Any]]:
 def _scenes(
     tables: Tables, axes: Mapping[str, list[Any]], where: str, files: Files
 ) -> Iterator[Scene]:
-    """A scene for each combination of the axes' values; each must be a scene of its own."""
+    """A scene for each combination of the axes' values.
+
+    Each must be a scene of its own.
+    """
     for name in axes:
         if table_of(name) not in PARTS:
             first = name.partition(".")[0]
@@ -415,8 +425,8 @@ def make_scene(
 ) -> Scene:
     """Validate the tables of one scene.
 
-    A part of the diameter such as d/30 is worked out, and so are the d50 of a sieve table, the
-    numbers of a fluid's kind and those of a fidelity.
+    A part of the diameter such as d/30 is worked out, and so are the d50 of a sieve
+    table, the numbers of a fluid's kind and those of a fidelity.
 
     Parameters
     ----------
@@ -498,7 +508,10 @@ def _read_files(tables: Tables, files: Files, where: str) -> None:
 
 
 def _write_lengths(grain: Table, bed: Table, is_level: bool) -> None:
-    """Write the lengths that follow from the grains: d50, height of a level bed, roughness."""
+    """Write the lengths that follow from the grains.
+
+    They are d50, the height of a level bed, and the roughness.
+    """
     # values of a wrong type or range are left to the validation of the scene
     with suppress(ValidationError, KeyError, TypeError, OverflowError):
         mixture = MIXTURE.validate_python(grain.get("sizes"))
@@ -520,7 +533,10 @@ def value_of(scene: Scene, name: str) -> Any:
 
 
 def changed(scene: Scene, fields: Mapping[str, Any]) -> Scene:
-    """A scene with some fields changed; an `InputError` for a value that a field cannot have."""
+    """Make a scene with some fields changed.
+
+    It is an `InputError` for a value that a field cannot have.
+    """
     tables = {name: dict(attrgetter(name)(scene)) for name in PARTS}
     # the tables within the method stand beside it
     for name in PARTS:
@@ -535,7 +551,10 @@ def changed(scene: Scene, fields: Mapping[str, Any]) -> Scene:
 
 
 def _not_toml(error: str, text: str, where: str) -> InputError:
-    """The refusal of a file that is no TOML, with how to write the number in its line."""
+    """The refusal of a file that is no TOML.
+
+    It says how to write the number in its line.
+    """
     remedy = ""
     place = re.search(r"\(at line (\d+), column \d+\)", error)
     if place:
@@ -583,7 +602,10 @@ def _explained(error: ValidationError, where: str) -> InputError:
 
 
 def _gone(name: str, value: Any, where: str) -> InputError | None:
-    """The refusal of a key or a value that study files had before; None for any other."""
+    """The refusal of a key or a value that study files had before.
+
+    It is None for any other.
+    """
     if name in GONE_KEYS:
         what, remedy = GONE_KEYS[name]
         return InputError(what, f"{where}: {name}", remedy)
@@ -604,7 +626,8 @@ def _not_accepted(value: Any, message: str, place: str) -> InputError:
 def _meant(names: Sequence[str], keys: Sequence[str]) -> str:
     """The key that an unknown one is nearest to, as a question.
 
-    `names` is the path of the unknown key, `keys` are those of the file or of the group.
+    `names` is the path of the unknown key, `keys` are those of the file or of the
+    group.
     """
     tables: dict[str, type[Part]] = {**PARTS, "erosion": Erosion}
     here = ".".join(names[:-1])

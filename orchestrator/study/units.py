@@ -1,7 +1,7 @@
 """Numbers as users write them: how they are spelt, and in which unit they are likely.
 
-A study file and the command `threshold` ask the same questions. No library of numbers is
-imported here, so that the command line starts at once.
+A study file and the command `threshold` ask the same questions. No library of numbers
+is imported here, so that the command line starts at once.
 """
 
 import math
@@ -81,13 +81,13 @@ UNITS = (
     Unit("fluid.gravity", 50.0, math.inf, "{0:g} m/s2: did you mean {0:g} cm/s2", 0.01),
 )
 COHESIVE_BELOW = (6e-5, 1e-4)
-"""Diameter below which cohesion is no longer small against the weight, in liquids and in
-gases, m."""
+"""Diameter below which cohesion is no longer small against the weight, in liquids and
+in gases, m."""
 USUAL_PA_S = ((1e-4, 0.1), (3e-6, 1e-4))
 """Usual dynamic viscosities of liquids and of gases, Pa s."""
 HIGHEST, LONGEST = 500.0, 1e4
-"""Height and length of a profile above which it is likelier in millimetres, m: the largest
-dunes are 500 m high."""
+"""Height and length of a profile above which it is likelier in millimetres, m: the
+largest dunes are 500 m high."""
 
 WIDEST = 0.5  # diameter in a sieve table from which it is likelier in millimetres, m
 
@@ -128,7 +128,9 @@ def whole_number(text: str) -> int:
 
 
 def meant(text: str) -> str:
-    """How to write a number that has a decimal comma or a unit; empty for any other text.
+    """How to write a number that has a decimal comma or a unit.
+
+    It is empty for any other text.
 
     Examples
     --------
@@ -156,8 +158,8 @@ def questions(
     Parameters
     ----------
     values
-        The values of fields at some points, by the fields' names in a study file. Fields
-        of the fluid and of the grain have one value for each point.
+        The values of fields at some points, by the fields' names in a study file.
+        Fields of the fluid and of the grain have one value for each point.
     names
         What the questions call the fields; one that is missing has its own name.
     form
@@ -179,7 +181,7 @@ def questions(
 
 
 def _of_cohesion(values: Mapping[str, Sequence[float]]) -> list[str]:
-    """A remark on the smallest of the grains that their cohesion holds, if there is one."""
+    """A remark on the smallest grain that its cohesion holds, if there is one."""
     names = ("grain.diameter", "fluid.density", "grain.cohesion")
     grains = {*zip(*(values.get(name, ()) for name in names), strict=False)}
     held = []

@@ -114,7 +114,8 @@ def with_methods(scenes: pd.DataFrame, methods: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     scenes
-        The table ``scenes``, in which a scene has a row for each group that asks for it.
+        The table ``scenes``, in which a scene has a row for each group that asks for
+        it.
     methods
         The table ``methods``.
 
@@ -256,7 +257,7 @@ def _harmless(text: str) -> str:
 
 
 def _as_it_was(text: Any) -> Any:
-    """A text of a table without the apostrophe that it was written behind, if it was."""
+    """A text of a table without the apostrophe that it was written behind."""
     if isinstance(text, str) and re.match(f"'{FORMULA}", text):
         return text[1:]
     return text

@@ -10,7 +10,7 @@ Contradictions = dict[tuple[str, float], str]
 
 
 def with_agreement(checks: pd.DataFrame, thresholds: pd.DataFrame) -> pd.DataFrame:
-    """Add to the checks by DEM the intervals of the answers, and whether the two overlap.
+    """Add the intervals of the answers to the checks, and whether the two overlap.
 
     Parameters
     ----------
@@ -18,14 +18,14 @@ def with_agreement(checks: pd.DataFrame, thresholds: pd.DataFrame) -> pd.DataFra
         A row for each pile and fraction that DEM checks, with ``shields_dem_low`` and
         ``shields_dem_high``.
     thresholds
-        The answers, with ``shields_low`` and ``shields_high``. They hold the known error
-        of the fidelity.
+        The answers, with ``shields_low`` and ``shields_high``. They hold the known
+        error of the fidelity.
 
     Returns
     -------
     DataFrame
-        The checks with these two columns and with ``agree``. An end that is not known is
-        open. Two answers agree also where neither reaches the fraction.
+        The checks with these two columns and with ``agree``. An end that is not known
+        is open. Two answers agree also where neither reaches the fraction.
     """
     if checks.empty:
         return checks

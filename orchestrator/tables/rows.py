@@ -31,9 +31,9 @@ from orchestrator.types import BoolArray, FloatArray, Row
 POINT = ("alpha_deg", "beta_deg", "d_m", "z0_over_d", "nu_m2_s", "force_law", "regime")
 """Columns by which a scene is found in a figure; tables of results have them too."""
 PER_E_FOLD = 0.06
-"""Relative rise of tau_c with each e-fold of the flow's z0, at most: triangles of 15 and
-30 deg under solved flows, z0/h from 2.5e-4 to 8e-3, at 10 to 70 % of the grains; 0.03 in
-the mean."""
+"""Relative rise of tau_c with each e-fold of the flow's z0, at most: triangles of 15
+and 30 deg under solved flows, z0/h from 2.5e-4 to 8e-3, at 10 to 70 % of the grains;
+0.03 in the mean."""
 ENDS = ("", "_low", "_high")
 """Endings of the columns of a threshold and of its interval."""
 SMOOTHED = {
@@ -60,7 +60,8 @@ WAY_UP = (
     "ustar_three_quarters",
     "ustar_top",
 )
-"""Columns of u*/u*_0 at equal parts of the way along the bed from the foot to the top."""
+"""Columns of u*/u*_0 at equal parts of the way along the bed from the foot to the
+top."""
 
 
 def point(scene: Scene) -> Row:
@@ -239,7 +240,7 @@ def _single_grains_by_dem(
 
 
 def _speeds(scene: Scene, ustar: float) -> Row:
-    """Columns of the speeds of an undisturbed flow that has a friction velocity (m/s)."""
+    """Columns of the speeds of an undisturbed flow of a friction velocity (m/s)."""
     flow = scene.flow
     fluid = scene.fluid
     speeds = measurable_speeds(
@@ -536,13 +537,11 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
     Yields
     ------
     dict
-        A row for each fraction. The model's interval is of the choices that all fidelities
-        share.
+        A row for each fraction. The model's interval is of the choices that all
+        fidelities share.
     """
     pile = answer.pile
-    motion = answer.motion
     scene = pile.scene
-    error = answer.decision.error_estimate
     place = point(scene)
     pivots = pile.pivot_thresholds(answer.speed)
     first_x, first_ustar0 = answer.first
@@ -553,7 +552,7 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
         model = spread.spread(answer.decision.asked, fraction)
         value = shields(scene, found.tau)
         smooth = _smooth_bed(scene, found.ustar0)
-        low, high = _interval(scene, found, error, smooth)
+        low, high = _interval(scene, found, answer.decision.error_estimate, smooth)
         yield {
             "scene_id": answer.scene_id,
             **place,
@@ -578,9 +577,9 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
             "first_ustar0_high_m_s": first_high,
             "pivot_x_m": checked_x,
             "pivot_first_m_s": checked_ustar0,
-            "pivot_ustar0_m_s": pivots[_needed(fraction, motion.count) - 1],
-            "count": motion.count,
-            "highest_fraction": motion.fraction[-1],
+            "pivot_ustar0_m_s": pivots[_needed(fraction, answer.motion.count) - 1],
+            "count": answer.motion.count,
+            "highest_fraction": answer.motion.fraction[-1],
             "share_carried_off": found.carried_off,
             "share_against_flow": found.against_the_flow,
             "row_hold": answer.row_hold,
@@ -628,8 +627,8 @@ def _interval(
     """Ends of the interval of a Shields number; an end that is not known is NaN.
 
     It holds load steps and count, at least what is within the known error of the level,
-    and how far the z0 of the flow is from that of a bed that is not rough (`smooth`). It
-    is not known without a known error.
+    and how far the z0 of the flow is from that of a bed that is not rough (`smooth`).
+    It is not known without a known error.
     """
     if error is None:
         return np.nan, np.nan
@@ -668,9 +667,9 @@ def size_class(answer: Answer) -> Iterator[Row]:
     """Find the threshold of each size class of a mixture.
 
     It is that at which a fraction of its grains has moved; for the hiding of equal
-    mobility, a part that falls with the size. Grains that no free way leads out of their
-    places count in no class. The stress at d50, over which those of the classes are, lies
-    between the two classes beside it.
+    mobility, a part that falls with the size. Grains that no free way leads out of
+    their places count in no class. The stress at d50, over which those of the classes
+    are, lies between the two classes beside it.
 
     Parameters
     ----------
@@ -685,34 +684,16 @@ def size_class(answer: Answer) -> Iterator[Row]:
     pile = answer.pile
     if not pile.pouring:
         return
-    motion = answer.motion
-    all_sizes = pile.packing.sizes[pile.packing.windward]
-    classes = []
-    for each in threshold.classes(all_sizes):
-        is_free = each.chosen & pile.is_free
-        if is_free.any():
-            classes.append(each._replace(chosen=is_free))
+    classes = _free_classes(pile)
     sizes = np.array([each.size for each in classes])
-    mobility = sizes**-threshold.EQUAL_MOBILITY
     for fraction in pile.scene.threshold.fractions:
-        level = threshold.first_level(motion, fraction)
-        has_moved = None if level is None else motion.moved_by(level)
+        level = threshold.first_level(answer.motion, fraction)
+        has_moved = None if level is None else answer.motion.moved_by(level)
         found = [answer.at(fraction, each.chosen) for each in classes]
-        taus = np.array([at.tau for at in found])
-        median = threshold.at_size(1.0, sizes, taus)
-        mobile_taus = np.full(len(classes), np.nan)
-        for place, each in enumerate(classes):
-            part = fraction * mobility[place]
-            if part <= 1:
-                mobile_taus[place] = answer.at(part, each.chosen).tau
-        mobile_median = threshold.at_size(1.0, sizes, mobile_taus)
-        hidden = mobile_taus / mobile_median / sizes
+        median = threshold.at_size(1.0, sizes, np.array([at.tau for at in found]))
+        hidden = _equal_mobility(answer, classes, fraction)
         for each, at, of_mobility in zip(classes, found, hidden, strict=True):
             count = int(each.chosen.sum())
-            moved = (np.nan, np.nan, np.nan)
-            if has_moved is not None:
-                of_class = int(has_moved[each.chosen].sum())
-                moved = (of_class / count, *threshold.of_all(of_class, count))
             tau = np.array([at.tau, at.tau_low, at.tau_high])
             wilcock_crowe = measured.wilcock_crowe_hiding(each.size) / each.size
             yield {
@@ -721,7 +702,7 @@ def size_class(answer: Answer) -> Iterator[Row]:
                 "size_over_d": each.size,
                 "count": count,
                 "few": count < FEW_GRAINS,
-                **_with_ends("class_moved", moved),
+                **_with_ends("class_moved", _moved_of(each, has_moved)),
                 "ustar0_m_s": at.ustar0,
                 **_with_ends("shields_own", shields(pile.scene, tau) / each.size),
                 **_with_ends("hiding", tau / median / each.size),
@@ -729,6 +710,42 @@ def size_class(answer: Answer) -> Iterator[Row]:
                 "hiding_wilcock_crowe": float(wilcock_crowe),
                 "hiding_egiazaroff": float(measured.egiazaroff_hiding(each.size)),
             }
+
+
+def _free_classes(pile: Pile) -> list[threshold.SizeClass]:
+    """The size classes of the counted grains that are free to leave."""
+    sizes = pile.packing.sizes[pile.packing.windward]
+    classes = []
+    for each in threshold.classes(sizes):
+        is_free = each.chosen & pile.is_free
+        if is_free.any():
+            classes.append(each._replace(chosen=is_free))
+    return classes
+
+
+def _equal_mobility(
+    answer: Answer, classes: list[threshold.SizeClass], fraction: float
+) -> FloatArray:
+    """The hiding of each class at a part of its grains that falls with its size."""
+    sizes = np.array([each.size for each in classes])
+    parts = fraction * sizes**-threshold.EQUAL_MOBILITY
+    taus = np.full(len(classes), np.nan)
+    for place, each in enumerate(classes):
+        if parts[place] <= 1:
+            taus[place] = answer.at(parts[place], each.chosen).tau
+    median = threshold.at_size(1.0, sizes, taus)
+    return np.asarray(taus / median / sizes)
+
+
+def _moved_of(
+    each: threshold.SizeClass, has_moved: BoolArray | None
+) -> tuple[float, float, float]:
+    """The part of a class that has moved, with its interval; NaN if none is known."""
+    if has_moved is None:
+        return (np.nan, np.nan, np.nan)
+    count = int(each.chosen.sum())
+    moved = int(has_moved[each.chosen].sum())
+    return (moved / count, *threshold.of_all(moved, count))
 
 
 def _with_ends(name: str, values: Iterable[float]) -> Row:

@@ -27,7 +27,8 @@ CARRIED_OFF = 0.1
 ROW_HOLD = 1.05
 """u*_0 of the first grain in its row, over that of the grain alone, that is told."""
 KEPT_TO = 0.1
-"""n/N to which a balance of the whole bed holds; at 0.3 theta is 2 to 3.5 times that."""
+"""n/N to which a balance of the whole bed holds; at 0.3 theta is 2 to 3.5 times
+that."""
 SIMILAR = ["layout", "lifted", "alpha_deg", "force_law", "fraction"]
 """Piles that agree in these scatter alike: their grains lie alike, and lifted ones
 collide or do not."""
@@ -38,13 +39,13 @@ POURED = ["width", "sizes", "poured_depth"]
 
 
 def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame:
-    """Add the scatter over seeds to thresholds of piles, and widen their intervals by it.
+    """Add the scatter over seeds to thresholds of piles, and widen intervals by it.
 
     Half the range over the seeds, relative to their mean, is computed for each set of
-    piles that differ in the seed alone: random gaps, or perturbed replicas of a lattice.
-    A pile gets the largest of those that are `SIMILAR`; where the study ran no seeds,
-    none, and its interval stays. The interval then holds the mean, from which a pile may
-    be off by that much; it is open above from 100 %.
+    piles that differ in the seed alone: random gaps, or perturbed replicas of a
+    lattice. A pile gets the largest of those that are `SIMILAR`; where the study ran no
+    seeds, none, and its interval stays. The interval then holds the mean, from which a
+    pile may be off by that much; it is open above from 100 %.
 
     Parameters
     ----------
@@ -153,8 +154,8 @@ def with_usable(
 def _flow_reynolds(rows: pd.DataFrame) -> "pd.Series[float]":
     """Speed times depth over nu of the undisturbed flow at the threshold of each row.
 
-    Of a channel its mean speed over its depth, of a boundary layer over a pile the speed
-    at 10 h. NaN for a single grain in a boundary layer, which has no depth.
+    Of a channel its mean speed over its depth, of a boundary layer over a pile the
+    speed at 10 h. NaN for a single grain in a boundary layer, which has no depth.
     """
     nu = rows["nu_m2_s"]
     depth = rows["depth_m"].astype(float)
@@ -267,7 +268,7 @@ def _held_row(row: Mapping[Any, Any]) -> Iterator[str]:
 
 
 def _reasons_of_bed(row: Mapping[Any, Any]) -> Iterator[str]:
-    """Reasons against how the grains of a pile lie, and against a balance that is kept."""
+    """Reasons against how the grains of a pile lie and against a kept balance."""
     is_strip = (row.get("width") or 0) > 0
     is_plane = row.get("packing") == "poured" and not is_strip
     if is_plane and pd.isna(row.get("sizes")):
@@ -281,19 +282,26 @@ def _reasons_of_bed(row: Mapping[Any, Any]) -> Iterator[str]:
 
 
 def _reached(row: Mapping[Any, Any]) -> str:
-    """How many grains of a pile have moved by the end, and whether the run was to end there."""
+    """How many grains of a pile have moved by the end of its run.
+
+    It is also said whether the run was to end there.
+    """
     if "count" not in row:
         return "the grain has not moved"
     highest = row.get("highest_fraction", 0.0)
     said = f"at most {highest:.0%} of {row['count']} grains moved"
     last = row.get("final_fraction")
     if last is not None and highest >= last - 1e-9:
-        said += f", since the run ends at method.grains.final_fraction = {last:g} (raise it)"
+        end = f"method.grains.final_fraction = {last:g}"
+        said += f", since the run ends at {end} (raise it)"
     return said
 
 
 def _open_ends(row: Mapping[Any, Any]) -> Iterator[str]:
-    """Why the interval of a threshold that was reached has no upper end; empty if it has one."""
+    """Why the interval of a threshold that was reached has no upper end.
+
+    It is empty if the interval has one.
+    """
     low = row.get("shields_low", np.nan)
     high = row.get("shields_high", np.nan)
     if np.isnan(low) or not np.isnan(high) or np.isnan(row["shields"]):
