@@ -1,4 +1,7 @@
-"""Files of heights on a raster: XYZ, ESRI ASCII grid, GeoTIFF and STL; maps as GeoTIFF."""
+"""Files of heights on a raster, and maps as GeoTIFF.
+
+Heights are read from XYZ, ESRI ASCII grid, GeoTIFF and STL.
+"""
 
 import io
 import warnings
@@ -322,7 +325,7 @@ def _geotiff_axes(
 def _geotiff_corner(
     tags: Mapping[int, Any], where: str
 ) -> tuple[float, float, float, float]:
-    """Place of the first pixel's corner, or of its middle, and steps along x and y, m."""
+    """Place of the first pixel's corner or middle, and steps along x and y, m."""
     if TRANSFORMATION in tags:
         step_x, turn_x, _, x0, turn_y, down, _, y0 = tags[TRANSFORMATION][:8]
         if turn_x or turn_y:

@@ -31,12 +31,14 @@ FEWEST = 8
 """Fewest nodes of a raster along each axis."""
 FLAT_RIM = 0.02
 TAPERED_RIM = 0.2
-"""Largest height of the rim over that of the form which is flat, and which is tapered."""
+"""Largest height of the rim over that of the form which is flat, and which is
+tapered."""
 TAPER = 10.0
 """Width over which the rim is tapered, over its largest height."""
 SPIKE_STEPS = 3.0
 SPIKE_RELIEF = 0.05
-"""Steps of the raster, and part of the height, which a bad cell is off its neighbours."""
+"""Steps of the raster, and part of the height, which a bad cell is off its
+neighbours."""
 STEEPEST_DEG = 60.0
 """Slope beyond which no mesh of upright columns follows the bed."""
 FORM_NODES = 12
@@ -44,7 +46,8 @@ FORM_NODES = 12
 LONGEST, HIGHEST = 2e4, 500.0
 """Extent and height of a surface above which it is likelier in millimetres, m."""
 OF_GROUND = 0.01
-"""Height over that of the form from which a place is a part of it, not of the ground."""
+"""Height over that of the form from which a place is a part of it, not of the
+ground."""
 NOISE = 4.0
 """Standard deviations of the rim's heights within which a place is ground, too."""
 STEPS_OF_SHAPE = 160
@@ -57,7 +60,9 @@ HORNS = 0.8
 
 @dataclass(frozen=True)
 class Surface:
-    """Heights of a bed on a raster with equal steps, two surfaces with one digest are one.
+    """Heights of a bed on a raster with equal steps.
+
+    Two surfaces with one digest are one.
 
     Attributes
     ----------
@@ -109,7 +114,10 @@ class Surface:
 
     @cached_property
     def is_form(self) -> BoolArray:
-        """Whether each node is a part of the form, not of the ground, of shape (ny, nx)."""
+        """Whether each node is a part of the form, of shape (ny, nx).
+
+        All others are of the ground.
+        """
         from scipy.ndimage import binary_opening
 
         off = np.abs(self.z - self.level)
@@ -256,7 +264,10 @@ def surface_of(
     tags: Tags | None = None,
     noise: float = 0.0,
 ) -> Surface:
-    """Make a surface of its heights, with its digest; the parameters are its attributes."""
+    """Make a surface of its heights, with its digest.
+
+    The parameters are its attributes.
+    """
     relief = float(z.max() - level)
     of_rim = float(on_grid(noise, relief, 6))
     digest = sha256(f"{spread:g} {of_rim!r}".encode())
@@ -378,7 +389,10 @@ def _check_size(raster: Raster, where: str) -> None:
 
 
 def _outside(raster: Raster, where: str) -> BoolArray:
-    """The cells without a height that reach the edge; a hole is refused with its place."""
+    """The cells without a height that reach the edge.
+
+    A hole is refused with its place.
+    """
     from scipy.ndimage import label
 
     is_empty = ~np.isfinite(raster.z)
@@ -417,7 +431,7 @@ def _check_relief(relief: float, depth: float, where: str) -> None:
 
 
 def _check_cells(raster: Raster, above: FloatArray, where: str) -> None:
-    """Refuse single cells that stand off all their neighbours, and forms of few cells."""
+    """Refuse single cells off all their neighbours, and forms of few cells."""
     from scipy.ndimage import median_filter
 
     relief = float(above.max())
@@ -471,7 +485,10 @@ def _taper(raster: Raster, is_outside: BoolArray, width: float) -> FloatArray:
 
 
 def _check_slopes(surface: Surface, where: str) -> None:
-    """Refuse slopes that no mesh follows, after the noise of single cells is taken out."""
+    """Refuse slopes that no mesh follows.
+
+    The noise of single cells is taken out before.
+    """
     from scipy.ndimage import gaussian_filter
 
     along_x, along_y = surface.steps
@@ -590,7 +607,7 @@ def barchan(height: float, slope_deg: float) -> Surface:
 
 
 def _axes(half_x: float, half_y: float) -> tuple[FloatArray, FloatArray]:
-    """Axes about the origin over a base of these half widths, with some ground around."""
+    """Axes about the origin over a base of some half widths, with ground around."""
     step = 2 * min(half_x, half_y) / STEPS_OF_SHAPE
     axes = []
     for half in (half_x, half_y):
