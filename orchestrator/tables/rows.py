@@ -544,9 +544,7 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
     scene = pile.scene
     place = point(scene)
     pivots = pile.pivot_thresholds(answer.speed)
-    first_x, first_ustar0 = answer.first
-    first_low, first_high = _first_interval(answer)
-    checked_x, checked_ustar0 = answer.checked
+    starts = _starts(answer)
     for fraction in scene.threshold.fractions:
         found = answer.at(fraction)
         model = spread.spread(answer.decision.asked, fraction)
@@ -571,12 +569,7 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
             "ustar0_m_s": found.ustar0,
             "u_e_m_s": found.ustar0 * pile.model.lid_speed_ratio,
             **_speeds(scene, found.ustar0),
-            "first_x_m": first_x,
-            "first_ustar0_m_s": first_ustar0,
-            "first_ustar0_low_m_s": first_low,
-            "first_ustar0_high_m_s": first_high,
-            "pivot_x_m": checked_x,
-            "pivot_first_m_s": checked_ustar0,
+            **starts,
             "pivot_ustar0_m_s": pivots[_needed(fraction, answer.motion.count) - 1],
             "count": answer.motion.count,
             "highest_fraction": answer.motion.fraction[-1],
@@ -587,6 +580,21 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
             **_smoothing(answer),
             "case": pile.runs[-1].name if pile.runs else None,
         }
+
+
+def _starts(answer: Answer) -> Row:
+    """Columns of where motion starts, by the method and by the pivots."""
+    first_x, first_ustar0 = answer.first
+    low, high = _first_interval(answer)
+    pivot_x, pivot_ustar0 = answer.checked
+    return {
+        "first_x_m": first_x,
+        "first_ustar0_m_s": first_ustar0,
+        "first_ustar0_low_m_s": low,
+        "first_ustar0_high_m_s": high,
+        "pivot_x_m": pivot_x,
+        "pivot_first_m_s": pivot_ustar0,
+    }
 
 
 def _first_interval(answer: Answer) -> tuple[float, float]:
