@@ -4,7 +4,6 @@ import os
 import warnings
 from html import escape
 from pathlib import Path
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,28 +17,32 @@ from orchestrator.errors import InputError, OrchestratorError, SolverError
 from orchestrator.report.results import Results
 from orchestrator.runs.workspace import Workspace
 from orchestrator.study import study
+from orchestrator.study.units import meant
 
 FIRST = (
     "d_m",
     "alpha_deg",
-    "rho_f_kg_m3",
-    "force_law",
     "fraction",
-    "shields",
-    "shields_low",
-    "shields_high",
-    "shields_closed_form",
-    "shields_dem",
-    "ustar0_m_s",
-    "ustar_closed_form_m_s",
-    "ustar_m_s",
     "wind_10m_m_s",
-    "current_1m_m_s",
     "mean_velocity_m_s",
+    "stress_pa",
+    "ustar0_m_s",
+    "ustar0_low_m_s",
+    "ustar0_high_m_s",
+    "measured_ustar0_m_s",
+    "shields",
     "usable",
     "why_not",
 )
-"""Columns of `Opened.thresholds` that come before all others, those that it has."""
+"""Columns of `Opened.thresholds` that come before all others, those that have values.
+
+A gas has no mean velocity and a liquid no wind, so that these are at most twelve.
+"""
+OF_GRAINS = {
+    "ustar0_m_s": ("ustar_m_s", "ustar_closed_form_m_s"),
+    "shields": ("shields_dem", "shields_closed_form"),
+}
+"""Columns of single grains, by DEM and by the closed form, for those of piles."""
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
@@ -152,7 +155,10 @@ def threshold(
 def _column(name: str, values: Any) -> "NDArray[Any]":
     """The values of a parameter as an array: numbers, for a roughness also texts."""
     what = f"{values!r} is neither a number nor an array of numbers"
-    refusal = InputError(what, name)
+    remedy = ""
+    if isinstance(values, str):
+        remedy = meant(values)
+    refusal = InputError(what, name, remedy)
     try:
         array = np.asarray(values)
         if name == "roughness" and array.dtype.kind in "UO":
@@ -235,6 +241,45 @@ def open(directory: str | Path) -> "Opened":
     return Opened(Results(asked, planned, tables.read(space, "tables"), space.cases))
 
 
+class Plot:
+    """The figures that a study gives to Python.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+    """
+
+    def __init__(self, results: Results) -> None:
+        self._results = results
+
+    def __repr__(self) -> str:
+        """What it has."""
+        return ".plot.shields(), the extended Shields diagram"
+
+    def shields(self) -> "Figure":
+        """Draw the extended Shields diagram of the page.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure.
+
+        Raises
+        ------
+        OrchestratorError
+            If the study has no thresholds.
+        """
+        from orchestrator.report import shields, style
+
+        with style.settings():
+            for figure in shields.draw(self._results):
+                if figure.canvas:
+                    return figure.canvas
+        directory = self._results.cases.parent
+        raise OrchestratorError("there is nothing to draw", str(directory))
+
+
 class Opened:
     """A study that was run; `run` and `open` make one.
 
@@ -249,7 +294,7 @@ class Opened:
     tables
         Every table by its name, with SI units in the names of columns.
     plot
-        ``plot.shields()`` draws the extended Shields diagram.
+        Its figures, a `Plot`.
     """
 
     def __init__(self, results: Results) -> None:
@@ -258,18 +303,27 @@ class Opened:
         self.page = self.directory / report.PAGE
         self.title = results.study.title
         self.tables = dict(results.tables)
-        self.plot = SimpleNamespace(shields=self._shields)
+        self.plot = Plot(results)
 
     @property
     def thresholds(self) -> pd.DataFrame:
         """The thresholds of the piles, or else of single grains, beside their scenes.
 
-        First come the columns that tell points apart, then threshold, speeds, and its
-        use.
+        First come the twelve columns that matter: what tells points apart, the flow,
+        its interval, the measured one, the Shields number, and whether it is usable.
+        Where it is, ``why_not`` is NaN.
         """
         piles = self._results.joined("pile_threshold")
         rows = piles if len(piles) else self._results.joined("single_grain")
-        first = [name for name in FIRST if name in rows]
+        if rows.empty:
+            return rows
+        first: list[str] = []
+        for name in FIRST:
+            names = (name, *OF_GRAINS.get(name, ()))
+            known = [one for one in names if one in rows and rows[one].notna().any()]
+            first += known[:1]
+        # a usable threshold has no reason against it: NaN, which dropna drops
+        rows = rows.assign(why_not=rows["why_not"].replace("", np.nan))
         return rows[[*first, *rows.columns.difference(first, sort=False)]]
 
     @property
@@ -288,7 +342,7 @@ class Opened:
             f"{len(self._results.scenes)} scenes; {usable}",
             f"page: {self.page}",
             f"tables: {', '.join(self.tables)}",
-            "in words: .answer; as a table: .thresholds",
+            f"in words: .answer; as a table: .thresholds; drawn: {self.plot}",
         ]
         return "\n".join(lines)
 
@@ -319,13 +373,3 @@ class Opened:
             return self._results.cases / names[0]
         what = f"{len(names)} cases begin with {name!r}"
         raise InputError(what, str(self.directory), "see the column case")
-
-    def _shields(self) -> "Figure":
-        """The extended Shields diagram of the page."""
-        from orchestrator.report import shields, style
-
-        with style.settings():
-            for figure in shields.draw(self._results):
-                if figure.canvas:
-                    return figure.canvas
-        raise OrchestratorError("there is nothing to draw", str(self.directory))

@@ -142,7 +142,7 @@ def test_the_notebook_says_what_a_run_of_it_says(tmp_path: Path) -> None:
     place = {"metadata": {"path": str(tmp_path)}}
     nbclient.NotebookClient(again, resources=place, kernel_name="python3").execute()
     assert _said(again) == _said(written)
-    assert "Grains of 0.2 mm to 0.5 mm, slopes of 10°" in " ".join(_said(again))
+    assert "Grains of 0.2 mm to 0.5 mm, a slope of 10°" in " ".join(_said(again))
     rows = orchestrator.open(tmp_path / "dune").thresholds
     exact = rows["ustar_closed_form_m_s"]
     assert ((rows["ustar_low_m_s"] <= exact) & (exact <= rows["ustar_high_m_s"])).all()

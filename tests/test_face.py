@@ -1,5 +1,6 @@
 """The public Python face: what it gives is what commands and tables say."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -76,13 +77,12 @@ def test_a_study_from_its_file_to_a_figure(tmp_path: Path) -> None:
     assert rows["d_m"].tolist() == [7e-4, 1e-3]
     assert rows["usable"].all()
     assert set(opened.tables) == {"scenes", "methods", "single_grain"}
-    assert [*rows][:5] == [
-        "d_m",
-        "alpha_deg",
-        "rho_f_kg_m3",
-        "force_law",
-        "shields_closed_form",
-    ]
+    first = [*rows][:12]
+    assert first[:3] == ["d_m", "alpha_deg", "wind_10m_m_s"]
+    assert {"usable", "why_not", "shields_dem", "ustar_m_s"} < {*first}
+    assert rows["why_not"].isna().all()
+    assert "shields" in repr(opened.plot)
+    assert repr(opened.plot) in repr(opened)
     assert all(
         "Grains of 0.7 mm to 1 mm" in said
         for said in (opened.answer, opened._repr_html_())
@@ -94,3 +94,22 @@ def test_a_study_from_its_file_to_a_figure(tmp_path: Path) -> None:
         opened.case("flow")
     (ax,) = opened.plot.shields().axes
     assert ax.get_xscale() == "log"
+
+
+def test_numbers_with_units_are_refused_with_what_to_write() -> None:
+    for text, written in {"0.25 mm": "0.00025", "0,25": "0.25"}.items():
+        with pytest.raises(InputError, match=f"write {written}"):
+            orchestrator.threshold(text)
+
+
+def test_the_page_opens_files_as_it_says(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root = Path(orchestrator.__file__).parent.parent
+    page = (root / "docs" / "python.md").read_text("utf-8")
+    (code,) = re.findall(r"```python\n(import meshio.*?)```", page, re.DOTALL)
+    monkeypatch.chdir(root)
+    exec(code, {})
+    *_, counted, columns = capsys.readouterr().out.splitlines()
+    assert int(counted.split()[0]) > 1000
+    assert columns == "['column', 'meaning']"

@@ -18,6 +18,8 @@ OPTIONS = {
     for name in (*PARAMETERS, "fluid", "temperature", "law", "criterion")
 }
 """Options of the command line, by the parameters of `face.threshold`."""
+BED_SLOPE = "--bed-slope"
+"""Option of the slope of a channel."""
 FORM = (
     "write a number in SI units, or FIRST:LAST:COUNT such as 1e-4:2e-3:20; "
     "a z0 may be d/30"
@@ -34,6 +36,12 @@ CRITERION_HELP = (
     "what a grain must do: goes on, which is to leave its pocket in a gust and to hop "
     "on after it; leaves, its pocket; default: leaves in the paper's fluid and by the "
     "law paper, goes on in all others"
+)
+
+
+BED_SLOPE_HELP = (
+    "slope at which a channel falls, such as 0.005, whatever its sign: depth and mean "
+    "velocity at which its uniform flow starts motion"
 )
 
 
@@ -64,6 +72,7 @@ def add(commands: Any) -> None:
     command.add_argument(
         "--criterion", default=BY_FLUID, metavar="NAME", help=CRITERION_HELP
     )
+    command.add_argument(BED_SLOPE, type=number, metavar="S", help=BED_SLOPE_HELP)
     form = command.add_mutually_exclusive_group()
     text = "an object for each law by its name"
     form.add_argument("--json", action="store_true", help=text)
@@ -94,6 +103,10 @@ def _run(options: argparse.Namespace) -> int:
         text = getattr(options, name)
         if text is not None:
             axes[name] = values(name, text)
+    if "slope_deg" in axes and min(map(float, axes["slope_deg"])) < 0:
+        what = "below 0: the flow goes up a positive slope"
+        remedy = f"a river's slope, which falls with the flow, is {BED_SLOPE} 0.005"
+        raise InputError(what, OPTIONS["slope_deg"], remedy)
     count = math.prod(map(len, axes.values()))
     if count > MOST_POINTS:
         what = f"the ranges have {count} points together, more than {MOST_POINTS}"
@@ -111,6 +124,10 @@ def _run(options: argparse.Namespace) -> int:
     )
     if questions:
         print(f"orchestrator: {'; '.join(questions)}", file=sys.stderr)
+    if options.bed_slope is not None:
+        from orchestrator.calculator import river  # it loads numpy
+
+        river.add_depth(table, options.bed_slope, "depth" in axes)
     cells = zip(*(column.tolist() for column in table.values()), strict=True)
     rows = [dict(zip(table, row, strict=True)) for row in cells]
     if options.csv:

@@ -12,6 +12,7 @@ from orchestrator.physics.beside import FIELD, GOES_ON
 from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.report.card import Card, Number, Worth, decimals
 from orchestrator.report.subjects import (
+    DEPTH,
     MEAN,
     STRESS,
     USTAR,
@@ -105,16 +106,40 @@ def in_unit(row: Row, ustar: float, told: Quantity) -> float:
         return ustar
     if told is STRESS:
         return float(row["rho_f_kg_m3"]) * ustar**2
-    depth = row["depth_m"]
+    depth = depth_at(row, ustar)
+    if told is DEPTH:
+        return depth
     speeds = measurable_speeds(
         ustar,
         roughness=float(row["z0_m"]),
         fluid_density=float(row["rho_f_kg_m3"]),
         viscosity=float(row["nu_m2_s"]),
-        depth=known(depth),
+        depth=depth,
         closed=row.get("flow_top") == "closed channel",
     )
     return float(speeds[told.column()])
+
+
+def depth_at(row: Row, ustar: float) -> float:
+    """Find the depth of a flow.
+
+    Parameters
+    ----------
+    row
+        A threshold with the columns of its scene.
+    ustar
+        Undisturbed friction velocity, m/s.
+
+    Returns
+    -------
+    float
+        The given depth, or that of a channel which falls by ``bed_slope``, m; NaN
+        without either.
+    """
+    slope = known(row.get("bed_slope"))
+    if slope > 0:
+        return ustar**2 / (float(row["g_m_s2"]) * slope)
+    return known(row["depth_m"])
 
 
 def measured_ustar(row: Row, ustar: float) -> float:
@@ -147,6 +172,8 @@ def is_level(row: Row) -> bool:
 def place_of(quantity_: Quantity, row: Row) -> str:
     """Where a quantity of a row's flow is measured, in words."""
     if quantity_ is MEAN:
+        if known(row.get("bed_slope")) > 0:
+            return f"of a wide channel that falls by {row['bed_slope']:g}"
         return f"over a depth of {row['depth_m']:g} m"
     if quantity_ is WIND and not is_level(row) and row["bed"] == "pile":
         return "10 m above the flat ground upwind"
@@ -199,11 +226,13 @@ def numbers_of_grain(
     notes = {
         WIND: "10 m above bare, level ground",
         MEAN: place_of(MEAN, row) if told is MEAN else "",
+        DEPTH: "of the uniform flow whose weight along the slope is that stress",
         USTAR: "the pull of the flow on the ground, written as a speed",
         STRESS: f"that pull on each square metre; Shields number, the stress over the "
         f"weight of one layer of grains: {theta:.3g}",
     }
-    shown = [each for each in (told, USTAR, STRESS) if each is not STRESS]
+    second = DEPTH if known(row.get("bed_slope")) > 0 else USTAR
+    shown = [each for each in (told, second, STRESS) if each is not STRESS]
     numbers = []
     for each in (*dict.fromkeys(shown), STRESS):
         ends = (low, high, measured)

@@ -62,6 +62,7 @@ class Quantity(NamedTuple):
 WIND = Quantity("wind_10m", "m/s", "wind", "wind", "10 m above the ground")
 MEAN = Quantity("mean_velocity", "m/s", "flow", "mean velocity", "over the depth")
 STRESS = Quantity("stress", "Pa", "flow", "stress", "of the flow on the bed")
+DEPTH = Quantity("depth", "m", "flow", "depth", "of the flow")
 USTAR = Quantity("ustar0", "m/s", "flow", "friction velocity", "of the flow upstream")
 
 

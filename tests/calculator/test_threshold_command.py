@@ -372,3 +372,30 @@ def test_a_criterion_that_is_none_and_a_grain_that_never_goes_on_are_refused(
     assert not records[1]["bridged"]["valid"]
     assert "not reached" in records[1]["bridged"]["why_not"]
     assert records[1]["bridged"]["shields"] is None
+
+
+def test_a_river_has_a_depth_and_a_velocity(run: Run) -> None:
+    """The stress of a wide channel is its weight along the slope, rho g h S."""
+    gravel = ["--diameter", "0.03", "--density", "2650", *WATER]
+    code, text, _ = run(*gravel, "--bed-slope", "0.005")
+    assert code == 0
+    assert "depth; of the uniform flow" in text
+    falling = _json(run(*gravel, "--bed-slope", "-0.005", "--json"))
+    rising = _json(run(*gravel, "--bed-slope", "0.005", "--json"))
+    assert falling == rising
+    answer = falling["bridged-gravel"]
+    row = run(*gravel, "--bed-slope", "0.005", "--csv")[1].splitlines()
+    heads = row[0].split(",")
+    values = dict(zip(heads, row[1].split(","), strict=True))
+    weight = float(values["rho_f_kg_m3"]) * 9.81 * float(values["depth_m"]) * 0.005
+    assert weight == pytest.approx(float(values["stress_pa"]), rel=1e-6)
+    assert answer["mean_velocity"] > 1
+    for words, said in {
+        ("--slope", "-0.29"): "--bed-slope 0.005",
+        ("--bed-slope", "0.5"): "is not between 0 and 0.05",
+        ("--bed-slope", "0.005", "--depth", "1"): "leave --depth out",
+    }.items():
+        code, _, err = run(*gravel, *words)
+        assert code == 2
+        assert said in err
+    assert "a gas has no depth" in run(*D, "--bed-slope", "0.005")[2]
