@@ -40,6 +40,7 @@ add to them. The [glossary](glossary.md) explains the words.
 |---|---|---|
 | `title` | the file's name | a line for the page |
 | `time_limit` | {TIME_LIMIT_S:g} | wall time after which a run of a solver counts as hung, s |
+| `units_confirmed` | false | numbers that are usual in another unit are meant: nothing is asked about them, and a profile beyond 10 km or 500 m of height is not refused |
 | `seeds` | none | number of beds that differ in their seed alone; also of a group |
 | `tolerance` | none | relative error that τ_c may have: [ladder.md](ladder.md) |
 | `cluster` | none | settings of a queue: [cluster.md](cluster.md) |

@@ -111,6 +111,7 @@ class _File(_Tables):
         default=TIME_LIMIT_S, gt=0, le=1e8
     )  # s, at most three years
     tolerance: Annotated[float | None, AfterValidator(_not_zero), Field(lt=1)] = None
+    units_confirmed: bool = False
     cluster: Table = Field(default={})
     profiles: dict[str, str] = Field(default={})
     erosion: Erosion = Erosion()
@@ -140,6 +141,8 @@ class Study:
     erosion: Erosion  # winds and threshold of `orchestrator erosion`
     text: str  # the file itself, and the texts of the files that it names
     source: Source | None = None  # None: the text came from elsewhere
+    units_confirmed: bool = False
+    """Whether numbers that are usual in another unit are meant as they are."""
 
     @property
     def file(self) -> str:
@@ -159,15 +162,11 @@ class Study:
     def questions(self) -> tuple[str, ...]:
         """Questions on numbers that are usual in another unit; of a preset none."""
         asked = units.questions(_values_of(self.scenes), {})
-        profiles = {}
-        for scene in self.scenes:
-            if isinstance(scene.bed, PileBed) and scene.bed.profile:
-                profiles[scene.bed.profile] = scene.bed.height
-        for profile, height in profiles.items():
-            asked += units.of_profile(profile.name, profile.x[-1], height)
         for sizes in dict.fromkeys(scene.grain.sizes for scene in self.scenes):
             if isinstance(sizes, tuple):
                 asked += units.of_sieve([diameter for diameter, _ in sizes])
+        if self.units_confirmed:
+            asked = [one for one in asked if "?" not in one]  # remarks are left
         if not asked:
             return ()
         texts = [path.read_text(encoding="utf-8") for path in presets().values()]
@@ -306,16 +305,34 @@ def parse(text: str, *, name: str, where: str, files: Files | None = None) -> St
     if files is None:
         files = Files(Path(where).parent)
     files.carried = dict(file.profiles)
+    groups = _groups(file, where, files)
+    if not file.units_confirmed:
+        _check_profiles(groups)
     return Study(
         name=name,
         title=file.title or name,
-        groups=_groups(file, where, files),
+        groups=groups,
         time_limit_s=file.time_limit,
         tolerance=file.tolerance,
         cluster=file.cluster,
         erosion=file.erosion,
         text=text + files.added,
+        units_confirmed=file.units_confirmed,
     )
+
+
+def _check_profiles(groups: Sequence[Group]) -> None:
+    """Refuse profiles that are likelier in millimetres."""
+    for group in groups:
+        for scene in group.scenes:
+            bed = scene.bed
+            if not isinstance(bed, PileBed) or not bed.profile:
+                continue
+            asked = units.of_profile(bed.profile.name, bed.profile.x[-1], bed.height)
+            if asked:
+                confirmed = "write units_confirmed = true at the top of the study file"
+                remedy = f"divide x_m and z_m by 1000, or {confirmed} if it is so large"
+                raise InputError(asked, f"{group.where}: bed.profile", remedy)
 
 
 def _groups(file: _File, where: str, files: Files) -> tuple[Group, ...]:

@@ -213,13 +213,13 @@ def _of_fluid(
     return []
 
 
-def of_profile(name: str, length: float, height: float) -> list[str]:
-    """A question on a bed line of a length and a height (m) that no bed has."""
+def of_profile(name: str, length: float, height: float) -> str:
+    """A question on a bed line of a length and a height (m) that no bed has, or nothing."""
     if length <= LONGEST and height <= HIGHEST:
-        return []
+        return ""
     meant = f"{length / 1e3:.4g} m long and {height / 1e3:.4g} m high"
     what = f"{length:.4g} m long and {height:.4g} m high"
-    return [f"{name} is {what}: did you mean mm, {meant}? Divide x_m and z_m by 1000"]
+    return f"{name} is {what}: did you mean mm, {meant}?"
 
 
 def of_sieve(diameters: Sequence[float]) -> list[str]:

@@ -12,6 +12,7 @@ from orchestrator.calculator.cli import OPTIONS
 from orchestrator.errors import InputError
 from orchestrator.experiments import surfaces
 from orchestrator.study import study, units
+from orchestrator.study.parts import PileBed
 from orchestrator.study.source import presets
 
 WATER = "fluid.kind = 'water'\n"
@@ -118,21 +119,46 @@ def test_a_study_and_the_command_ask_alike() -> None:
     assert len(asked) == 5
 
 
-def test_a_profile_in_millimetres_is_asked_about(tmp_path: Path) -> None:
+def test_a_profile_in_millimetres_is_refused_unless_its_unit_is_confirmed(
+    tmp_path: Path,
+) -> None:
     x = np.linspace(0, 60, 301)
     z = 1.5 * (1 - np.cos(2 * np.pi * x / 60))
+    text = f"{SAND}bed = {{ kind = 'pile', profile = 'scan.csv' }}\n"
     file = tmp_path / "t.toml"
-    file.write_text(f"{SAND}bed = {{ kind = 'pile', profile = 'scan.csv' }}\n")
-    for scale, count in ((1.0, 0), (1e3, 1)):
+
+    def scaled(scale: float) -> None:
         rows = [f"{scale * a:.3f},{scale * b:.4f}" for a, b in zip(x, z, strict=True)]
         (tmp_path / "scan.csv").write_text("\n".join(["x_m,z_m", *rows]))
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            questions = study.load(file).questions
-        assert [str(one.message) for one in caught] == [*questions]
-        assert len(questions) == count
-    what = "scan.csv is 6e+04 m long and 3000 m high: did you mean mm, 60 m long and 3 m high?"
-    assert questions[0].startswith(what)
+
+    file.write_text(text)
+    scaled(1.0)
+    assert study.load(file).questions == ()
+    scaled(1e3)
+    what = (
+        r"t\.toml: bed\.profile: scan\.csv is 6e\+04 m long and 3000 m high: did you mean "
+        r"mm, 60 m long and 3 m high\? \(divide x_m and z_m by 1000, or write "
+        r"units_confirmed = true"
+    )
+    with pytest.raises(InputError, match=what):
+        study.load(file)
+    file.write_text(f"units_confirmed = true\n{text}")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        confirmed = study.load(file)
+    assert confirmed.questions == ()
+    bed = confirmed.scenes[0].bed
+    assert isinstance(bed, PileBed)
+    assert bed.height == pytest.approx(3000.0)
+
+
+def test_confirmed_units_leave_remarks_and_silence_questions() -> None:
+    text = "grain = { diameter = 5e-5, density = 2.65 }\nfluid.kind = 'air'\n"
+    asked = study.parse(text, name="t", where="t").questions
+    assert ["g/cm3" in one for one in asked] == [True, False]
+    confirmed = study.parse(f"units_confirmed = true\n{text}", name="t", where="t")
+    assert confirmed.questions == asked[1:]
+    assert "cohesion" in asked[1]
 
 
 @pytest.mark.parametrize(
