@@ -235,6 +235,8 @@ def method_of(scene: Scene) -> tuple[str, str]:
         return method, f"the study asks for the method {method}"
     unknown = scene.unknown_to_dem
     if not isinstance(bed, PileBed):
+        if scene.threshold.criterion == GOES_ON:
+            return "pivot", HOPS
         if unknown:
             return "pivot", f"by the closed form: {unknown}"
         return "dem", "by DEM: a single grain"

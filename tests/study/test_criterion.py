@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import orchestrator
+from orchestrator import plan
 from orchestrator.calculator.table import thresholds
 from orchestrator.errors import InputError
 from orchestrator.fidelity.decision import decide
@@ -145,3 +146,20 @@ def _by_calculator(fluid: str, sizes: list[float]) -> np.ndarray:
         }
     )
     return np.asarray(table["shields"][table["answer"]])
+
+
+@pytest.mark.parametrize("bed", ["", PILE, CURVED])
+@pytest.mark.parametrize("tolerance", ["", "tolerance = 0.2\n"])
+def test_a_criterion_that_is_written_is_answered_as_where_it_is_left_open(
+    bed: str, tolerance: str
+) -> None:
+    asked = ("", '[threshold]\ncriterion = "goes on"\n')
+    answers = []
+    for threshold in asked:
+        text = tolerance + SAND + WATER + bed + threshold
+        made = study.parse(text, name="one", where="one")
+        plan.make(made)
+        answers.append(decide(made.scenes[0], made.tolerance))
+    left, written = answers
+    assert written.scene == left.scene
+    assert (written.fidelity, written.why) == (left.fidelity, left.why)
