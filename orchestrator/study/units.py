@@ -214,7 +214,7 @@ def _of_fluid(
 
 
 def of_profile(name: str, length: float, height: float) -> str:
-    """A question on a bed line of a length and a height (m) that no bed has, or nothing."""
+    """A question on a bed line of a length and a height (m) that no bed has."""
     if length <= LONGEST and height <= HIGHEST:
         return ""
     meant = f"{length / 1e3:.4g} m long and {height / 1e3:.4g} m high"
