@@ -49,6 +49,8 @@ ENOUGH = 1.5
 """Factor over all sets within which a model would be made the default."""
 LEVEL = 0.01
 """Slope below which a bed is drawn as a level one."""
+BAND = 0.8
+"""Part of the height of a set in a figure over which its models stand."""
 WINDWARD = (0.095, 0.605)
 """Part of the hump's chord on which its stress is compared.
 
@@ -515,8 +517,8 @@ least mean stress at which one grain that has left its pocket keeps hopping afte
 a gust, in closed form; `leaves and goes on` asks as well that the gust turns it over \
 its neighbour."""
 SHIELDS_TEXT = """\
-Measured thresholds and those of the models. The Galileo number has no threshold in \
-it: both axes are independent."""
+Measured thresholds and those of the models, in water (solid) and in air (dotted). The \
+Galileo number has no threshold in it: both axes are independent."""
 MEMORY_TEXT = """\
 Figures that are quoted from memory count in no score. They stand here beside the \
 last model."""
@@ -529,8 +531,9 @@ def _sections(rows: pd.DataFrame, scored: pd.DataFrame) -> list[Section]:
     chart = Figure("factors", title, FACTORS_TEXT, (), factors(scored))
     of_points = "Thresholds of level beds"
     points = Figure("shields", of_points, SHIELDS_TEXT, (), diagram(rows))
-    wide = scored.pivot(index="set", columns="model", values="factor").reset_index()
-    wide = wide[["set", *(model.name for model in MODELS)]]
+    wide = scored.pivot(index="set", columns="model", values="factor")
+    wide = wide.loc[scored["set"].unique(), [model.name for model in MODELS]]
+    wide = wide.reset_index()
     is_from_memory = (rows["sure"] != READ) & (rows["model"] == MODELS[-1].name)
     memory = rows.loc[is_from_memory, ["set", "source", "measured", "value", "ratio"]]
     return [
@@ -621,13 +624,13 @@ def factors(scored: pd.DataFrame) -> Canvas:
         Median, and 10 to 90 % of the rows, in a row for each set.
     """
     sets = list(dict.fromkeys(scored["set"]))
-    canvas = style.canvas(0.42 * len(sets) + 1.0)
+    canvas = style.canvas(0.6 * len(sets) + 1.0)
     ax = canvas.subplots()
     middle = (len(MODELS) - 1) / 2
     for number, model in enumerate(MODELS):
         part = scored[scored["model"] == model.name]
         colour = COLOURS[number]
-        offset = 0.18 * (number - middle)
+        offset = BAND / len(MODELS) * (number - middle)
         y = [sets.index(name) + offset for name in part["set"]]
         ends = part["ratio_10"], part["ratio_90"]
         ax.hlines(y, *ends, color=colour, lw=2.5, alpha=0.5)
@@ -669,11 +672,20 @@ def diagram(rows: pd.DataFrame) -> Canvas:
         part = measured[measured["set"] == name]
         shown = {"ms": 3, "color": "0.6", "label": name}
         ax.plot(part["galileo"], part["measured"], mark, **shown)
+    is_gas = level["rho_f_kg_m3"] < GAS_BELOW
     for model, colour in zip(MODELS, COLOURS, strict=True):
         part = level[level["model"] == model.name].sort_values("galileo")
-        ax.plot(part["galileo"], part["value"], color=colour, label=model.name)
+        gas = is_gas.loc[part.index]
+        in_water = part[~gas]
+        in_air = part[gas]
+        shown = {"color": colour, "label": model.name}
+        ax.plot(in_water["galileo"], in_water["value"], **shown)
+        ax.plot(in_air["galileo"], in_air["value"], ":", color=colour)
     ax.set(xscale="log", yscale="log")
     ax.set(xlabel="Galileo number", ylabel="Shields number $θ$")
     style.plain_ticks(ax.yaxis)
-    style.legends(canvas, [], ax.get_lines())
+    named = [
+        line for line in ax.get_lines() if not str(line.get_label()).startswith("_")
+    ]
+    style.legends(canvas, [], named)
     return canvas

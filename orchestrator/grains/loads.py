@@ -34,7 +34,7 @@ from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import LIFT_OFF, root, thresholds_of
 from orchestrator.runs.files import state_of
 from orchestrator.study.closed_form import closed_form, single_grain
-from orchestrator.study.criterion import GOES_ON, going_on, peak_of
+from orchestrator.study.criterion import GOES_ON, hopping_on, peak_of
 from orchestrator.study.declare import UnfitError
 from orchestrator.study.parts import PileBed, Range
 from orchestrator.study.scene import Scene
@@ -790,12 +790,14 @@ class Loads:
             shape (N,). A grain that cannot hop has no gust, and goes on when it leaves.
         """
         scene = self.geometry.scene
-        slopes = self._slopes_deg
-        found = going_on(scene, slopes, np.zeros(len(slopes)))
-        can_hop = np.isfinite(found.goes_on)
+        packed = self.geometry.packing
+        sizes = packed.sizes[packed.windward]
+        found, can_hop = hopping_on(scene, self._slopes_deg, sizes)
         excess = (scene.grain.density / scene.fluid.density - 1) * scene.fluid.gravity
-        shields = np.where(can_hop, found.goes_on, 0.0)
-        ustar = np.sqrt(shields * excess * scene.grain.diameter)
+        # a trajectory without an end has no threshold: the grain is not reached
+        known = np.where(np.isnan(found), np.inf, found)
+        shields = np.where(can_hop, known, 0.0)
+        ustar = np.sqrt(shields * excess * scene.grain.diameter * sizes)
         # the loads have the scene's own gusts already
         over = np.where(can_hop, np.sqrt(peak_of(scene) / scene.gust), 1.0)
         return self._undisturbed(ustar), over

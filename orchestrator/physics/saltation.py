@@ -81,9 +81,10 @@ class Rebound:
         Coefficients of the speed, and of its part normal to the bed, over the speed of
         impact.
     trapped
-        Energy below which the grain stays where it is, in weights times diameters.
+        Energy below which a grain on its like stays where it is, in weights times
+        diameters.
     level
-        Height of the centre of a grain on the bed above the zero level of the flow, d.
+        Height of its centre above the zero level of the flow, d.
 
     Examples
     --------
@@ -120,6 +121,65 @@ class Rebound:
         whole = np.maximum(self.whole[0] - self.whole[1] * sine, 0) * speed
         normal = np.maximum(self.normal[0] - self.normal[1] * sine, 0) * speed
         return whole, np.minimum(normal, whole)
+
+    def on(self, relative_size: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Compute what traps grains on a bed of others, and how high they lie on it.
+
+        Both change as `on_layer` says from those of a grain on its like. The rebound
+        itself is taken to be alike: no measurement of unlike grains is known.
+
+        Parameters
+        ----------
+        relative_size
+            Diameter of each grain over that of the grains of its bed.
+
+        Returns
+        -------
+        trapped, level
+            Energy below which each stays, in its weights times diameters, and height of
+            its centre above the zero level, in its diameters; of the same shape.
+
+        Examples
+        --------
+        >>> trapped, level = BEADS.on(np.array([0.5, 1.0, 2.0]))
+        >>> print(trapped.round(3), level.round(3))
+        [0.24 0.12 0.04] [0.721 0.7   0.63 ]
+        """
+        rest, barrier = on_layer(relative_size)
+        of_like, barrier_of_like = on_layer(np.array(1.0))
+        trapped = self.trapped * (barrier / barrier_of_like)
+        level = (self.level + (rest - of_like)) / relative_size
+        return trapped, np.maximum(level, 0.0)
+
+
+def on_layer(relative_size: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Compute where grains lie on a close-packed layer of others, and what holds them.
+
+    A sphere of D on three of K lies ``sqrt((D + K)^2/4 - K^2/3)`` above their centres.
+    On its way out it rises to between the saddle of two, ``sqrt((D + K)^2/4 - K^2/4)``,
+    and the top of one, ``(D + K)/2``; the mean of both is taken.
+
+    Parameters
+    ----------
+    relative_size
+        Diameter of each grain over that of the layer's, D/K.
+
+    Returns
+    -------
+    rest, barrier
+        Height of its centre at rest above those of the layer, in K, and how much higher
+        it must rise, in D; of the same shape.
+
+    Examples
+    --------
+    >>> rest, barrier = on_layer(np.array(1.0))
+    >>> print(rest.round(4), barrier.round(4))
+    0.8165 0.1165
+    """
+    reach = (relative_size + 1) / 2
+    rest = np.sqrt(np.maximum(reach**2 - 1 / 3, 0.0))
+    saddle = np.sqrt(np.maximum(reach**2 - 1 / 4, 0.0))
+    return np.asarray(rest), np.asarray(((saddle + reach) / 2 - rest) / relative_size)
 
 
 BEADS = Rebound(whole=(0.87, 0.72), normal=(0.30, 0.15), trapped=0.12, level=0.7)
@@ -160,6 +220,8 @@ class Grains:
         Fall of the surface of an open uniform flow, the sine of its slope. The flow's
         own weight drives it then, and its depth is ``theta (s - 1)/fall`` diameters. It
         is 0 in a flow that is much deeper than a grain.
+    relative_size
+        Diameter of the grain over that of the grains of its bed.
 
     Examples
     --------
@@ -173,6 +235,7 @@ class Grains:
     slope_deg: FloatArray
     roughness: FloatArray
     fall: FloatArray
+    relative_size: FloatArray
 
     def __init__(
         self,
@@ -181,11 +244,19 @@ class Grains:
         slope_deg: ArrayLike = 0.0,
         roughness: ArrayLike = 1 / SAND_GRAIN,
         fall: ArrayLike = 0.0,
+        relative_size: ArrayLike = 1.0,
     ) -> None:
-        given = np.broadcast_arrays(galileo, density_ratio, slope_deg, roughness, fall)
+        numbers = {
+            "galileo": galileo,
+            "density_ratio": density_ratio,
+            "slope_deg": slope_deg,
+            "roughness": roughness,
+            "fall": fall,
+            "relative_size": relative_size,
+        }
+        given = np.broadcast_arrays(*numbers.values())
         flat = [np.ravel(array).astype(float) for array in given]
-        names = ("galileo", "density_ratio", "slope_deg", "roughness", "fall")
-        for name, array in zip(names, flat, strict=True):
+        for name, array in zip(numbers, flat, strict=True):
             # the dataclass is frozen
             object.__setattr__(self, name, array)
 
@@ -201,6 +272,7 @@ class Grains:
         roughness: ArrayLike | None = None,
         gravity: ArrayLike = GRAVITY,
         fall: ArrayLike = 0.0,
+        relative_size: ArrayLike = 1.0,
     ) -> Self:
         """Make the numbers of grains of given sizes.
 
@@ -220,6 +292,8 @@ class Grains:
             Acceleration of gravity, m/s2.
         fall
             Fall of the surface of an open uniform flow, as in `Grains`.
+        relative_size
+            Diameter of the grain over that of the grains of its bed.
 
         Returns
         -------
@@ -231,7 +305,7 @@ class Grains:
         excess = (ratio - 1) * np.asarray(gravity, float)
         galileo = np.sqrt(excess * d**3) / np.asarray(viscosity, float)
         z0 = d / SAND_GRAIN if roughness is None else np.asarray(roughness, float)
-        return cls(galileo, ratio, slope_deg, z0 / d, fall)
+        return cls(galileo, ratio, slope_deg, z0 / d, fall, relative_size)
 
     def __len__(self) -> int:
         """Number of grains."""
@@ -256,6 +330,7 @@ class Grains:
             self.slope_deg[places],
             self.roughness[places],
             self.fall[places],
+            self.relative_size[places],
         )
 
 
@@ -306,13 +381,13 @@ class _Flow:
         grains: Grains,
         shields: FloatArray,
         gust: "Gust",
-        level: float,
+        rebound: Rebound,
     ) -> None:
-        """Make them for Shields numbers, and a height of grains over the zero level."""
+        """Make them for Shields numbers, a gust and a law of rebound."""
         s = grains.density_ratio
         inertia = s / (s + ADDED_MASS)
         slope = np.radians(grains.slope_deg)
-        self.level = level
+        self.trapped, self.level = rebound.on(grains.relative_size)
         self.viscosity = np.sqrt(s) / grains.galileo
         self.ustar = np.sqrt(s * shields)
         self.peak_ustar = self.ustar * np.sqrt(gust.peak)
@@ -331,8 +406,7 @@ class _Flow:
     def keep(self, mask: BoolArray) -> None:
         """Keep some of the grains."""
         for name, value in vars(self).items():
-            if name != "level":
-                setattr(self, name, value[mask])
+            setattr(self, name, value[mask])
 
     def pull(
         self,
@@ -481,9 +555,9 @@ def fate(
     """
     count = len(grains)
     theta = np.broadcast_to(np.asarray(shields, float), count)
+    flow = _Flow(grains, theta, gust, rebound)
     if speed is None:
-        speed = np.sqrt(2 * EXCESS * rebound.trapped)
-    flow = _Flow(grains, theta, gust, rebound.level)
+        speed = np.sqrt(2 * EXCESS * flow.trapped)
     launch = np.broadcast_to(np.asarray(speed, float), count)
     angle = np.radians(angle_deg)
     motion = _Motion(np.zeros(count), launch * np.cos(angle), launch * np.sin(angle))
@@ -518,7 +592,7 @@ def fate(
             sine = np.clip(np.nan_to_num(-normal / impact), 0.0, 1.0)
         whole, up = rebound.after(impact, sine)
         on = np.sqrt(whole**2 - up**2) * np.sign(along)
-        is_trapped = lands & ((whole**2 / 2 < rebound.trapped) | (on < 0))
+        is_trapped = lands & ((whole**2 / 2 < flow.trapped) | (on < 0))
         after_gust = lands & (clock >= flow.gust_end)
         now = np.array([on, up])
         is_no_weaker = np.all(now >= last * (1 - SETTLED), axis=0)
@@ -892,7 +966,7 @@ def tabulated(grains: Grains, *, at_most: bool = False) -> Thresholds:
         places = np.log([grains.galileo, grains.density_ratio])
     points = (*places, grains.slope_deg)
     is_inside = np.isclose(grains.roughness * SAND_GRAIN, 1, rtol=1e-6, atol=0)
-    is_inside &= grains.fall <= 0
+    is_inside &= (grains.fall <= 0) & (grains.relative_size == 1)
     table = _table()[2:] if at_most else _table()[:2]
     corners = []
     for nodes, point in zip(axes, points, strict=True):

@@ -5,6 +5,7 @@ and goes on after that (`orchestrator.physics.saltation`). Where a scene leaves 
 criterion and the method open, its fluid and its forces decide.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -33,7 +34,7 @@ def goes_on(scene: Scene) -> bool:
     -------
     bool
         Whether it asks for that, or leaves criterion and method open in a fluid that is
-        not the paper's, with forces of which going on is known.
+        not the paper's, with equal grains and forces of which going on is known.
     """
     criterion = scene.threshold.criterion
     if criterion != AUTO:
@@ -42,7 +43,9 @@ def goes_on(scene: Scene) -> bool:
         return False
     if (scene.fluid.density, scene.fluid.viscosity) == PAPER:
         return False
-    return not why_not_going_on(scene)
+    is_of_its_like = scene.grain.sizes is None and scene.bed.relative_size == 1
+    is_alone = scene.forces.sheltering != "balanced"
+    return is_of_its_like and is_alone and not why_not_going_on(scene)
 
 
 class GoingOn(NamedTuple):
@@ -89,8 +92,49 @@ def peak_of(scene: Scene) -> float:
     return scene.gust if scene.flow.gusts else saltation.PEAK
 
 
-def going_on(scene: Scene, slopes_deg: ArrayLike, steady: ArrayLike) -> GoingOn:
-    """Find the mean stresses at which equal grains of a scene leave and go on.
+def hoppers(
+    scene: Scene,
+    slopes_deg: ArrayLike,
+    sizes: ArrayLike = 1.0,
+) -> saltation.Grains:
+    """Make the grains of a scene as they hop over its bed.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    slopes_deg
+        Slopes that the flow goes up, degrees.
+    sizes
+        Diameters over that of the scene's grain.
+
+    Returns
+    -------
+    Grains
+        The grains, of the broadcast shape, raveled. A bed of many grains is of those of
+        the scene's diameter, its median.
+    """
+    grain = scene.grain
+    fluid = scene.fluid
+    over = np.asarray(sizes, float)
+    return saltation.Grains.of(
+        grain.diameter * over,
+        density=grain.density,
+        fluid_density=fluid.density,
+        viscosity=fluid.viscosity,
+        slope_deg=slopes_deg,
+        roughness=scene.bed.roughness,
+        gravity=fluid.gravity,
+        relative_size=scene.bed.relative_size * over,
+    )
+
+
+def hopping_on(
+    scene: Scene,
+    slopes_deg: ArrayLike,
+    sizes: ArrayLike,
+) -> tuple[FloatArray, BoolArray]:
+    """Find the mean stresses at which the grains of a bed hop on after a gust.
 
     Parameters
     ----------
@@ -98,43 +142,31 @@ def going_on(scene: Scene, slopes_deg: ArrayLike, steady: ArrayLike) -> GoingOn:
         The scene.
     slopes_deg
         Slopes that the flow goes up, degrees, shape (n,).
-    steady
-        Shields numbers of a steady flow that turn the grains over, shape (n,).
+    sizes
+        Diameters over that of the scene's grain, shape (n,).
 
     Returns
     -------
-    GoingOn
-        The stresses.
+    shields, can_hop
+        Shields numbers of each grain by its own diameter, and whether it can hop, shape
+        (n,).
     """
-    grain = scene.grain
-    fluid = scene.fluid
-    rounded = np.round(np.asarray(slopes_deg, float), 6)
-    slopes, place = np.unique(rounded, return_inverse=True)
-    hoppers = saltation.Grains.of(
-        grain.diameter,
-        density=grain.density,
-        fluid_density=fluid.density,
-        viscosity=fluid.viscosity,
-        slope_deg=slopes,
-        roughness=scene.bed.roughness,
-        gravity=fluid.gravity,
-    )
-    peak = peak_of(scene)
-    usual = saltation.tabulated(hoppers)
-    weakest = saltation.tabulated(hoppers, at_most=True)
-    further = usual.initiation(peak)[place]
-    can = saltation.hops(hoppers)[place]
-    alone = np.asarray(steady, float)
-    found = saltation.motion(alone, further, can, peak)
-    highest = saltation.motion(alone, weakest.initiation(peak)[place], can, peak)
-    return GoingOn(
-        shields=found.shields,
-        leaves=np.where(can, alone / peak, alone),
-        goes_on=np.where(can, further, np.nan),
-        at_most=np.where(can, highest.shields, np.nan),
-        cessation=np.where(can, usual.cessation[place], alone),
-        hops_decide=found.goes_on,
-    )
+    pairs = np.round(np.column_stack(np.broadcast_arrays(slopes_deg, sizes)), 6)
+    unlike, place = np.unique(pairs, axis=0, return_inverse=True)
+    rows = tuple((float(slope), float(size)) for slope, size in unlike)
+    shields, can_hop = _initiation(scene, rows)
+    return shields[place.ravel()], can_hop[place.ravel()]
+
+
+@lru_cache(maxsize=64)
+def _initiation(
+    scene: Scene,
+    rows: tuple[tuple[float, float], ...],
+) -> tuple[FloatArray, BoolArray]:
+    """The same for rows of slope and size; a pile asks for them several times."""
+    grains = hoppers(scene, *np.array(rows).T)
+    shields = saltation.tabulated(grains).initiation(peak_of(scene))
+    return shields, saltation.hops(grains)
 
 
 def of_single_grain(scene: Scene) -> GoingOn:
@@ -151,4 +183,19 @@ def of_single_grain(scene: Scene) -> GoingOn:
         The stresses, arrays of shape (1,).
     """
     steady = np.atleast_1d(closed_form(scene).shields) * scene.gust
-    return going_on(scene, [scene.bed.slope_deg], steady)
+    grains = hoppers(scene, scene.bed.slope_deg)
+    peak = peak_of(scene)
+    usual = saltation.tabulated(grains)
+    weakest = saltation.tabulated(grains, at_most=True)
+    further = usual.initiation(peak)
+    can = saltation.hops(grains)
+    found = saltation.motion(steady, further, can, peak)
+    highest = saltation.motion(steady, weakest.initiation(peak), can, peak)
+    return GoingOn(
+        shields=found.shields,
+        leaves=np.where(can, steady / peak, steady),
+        goes_on=np.where(can, further, np.nan),
+        at_most=np.where(can, highest.shields, np.nan),
+        cessation=np.where(can, usual.cessation, steady),
+        hops_decide=found.goes_on,
+    )

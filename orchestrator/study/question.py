@@ -185,16 +185,11 @@ def why_not_going_on(question: Question) -> str:
     law = question.forces.law
     if law in (PAPER, *LAWS_OF["transition"]):
         return f"the law {law} is of grains that leave their pockets"
-    if question.grain.sizes is not None:
-        return "hops of a mixture are not known"
-    if question.bed.relative_size != 1:
-        return "hops over a bed of other grains are not known"
-    if question.grain.cohesion > 0:
-        return "hops with cohesion are not known"
-    if question.forces.sheltering == "balanced":
-        return "grains that share the stress are counted as they leave"
     if question.threshold.update > 0:
-        return "on a bed that changes grains are counted as they leave"
+        return (
+            "on a bed that changes (threshold.update) stress and slope of a grain are of "
+            "one round, and its hops pass over the bed of the next"
+        )
     return ""
 
 

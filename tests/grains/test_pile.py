@@ -12,6 +12,7 @@ from orchestrator.grains.loads import Loads
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile, flows
 from orchestrator.grains.threshold import at_size, classes, sampled, within
+from orchestrator.physics import saltation
 from orchestrator.report import poured
 from orchestrator.report.results import Results
 from orchestrator.study import study
@@ -294,6 +295,49 @@ def test_classes_of_equal_mobility_move_in_parts_of_the_inverse_square(
         found = rows[column] * rows["size_over_d"]
         middle = at_size(1.0, rows["size_over_d"].to_numpy(), np.array(taus))
         np.testing.assert_allclose(found, np.array(taus) / middle, rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["mixed", "strip"])
+@pytest.mark.parametrize("sheltering", ["none", "balanced"])
+def test_grains_of_poured_beds_leave_in_a_gust_and_go_on_by_their_own_sizes(
+    name: str, sheltering: str, request: pytest.FixtureRequest
+) -> None:
+    results: Results = request.getfixturevalue(name)
+    cases = results.cases
+    fields: dict[str, object] = {"forces.sheltering": sheltering}
+    if sheltering == "balanced":
+        fields["forces.exposure"] = "protrusion"
+    scene = changed(_pile(results, "pivot").scene, fields)
+    leaves = Pile(scene, cases).motion(cases).flows
+    pile = Pile(changed(scene, {"threshold.criterion": "goes on"}), cases)
+    both = pile.motion(cases).flows
+    # the flow at which one grain of each size hops on, over its local friction velocity
+    sizes = pile.packing.sizes[pile.packing.windward]
+    x, z = pile.tangents[pile.packing.windward].T
+    ratio = np.abs(pile.speed(cases))
+    further = []
+    for size, slope, over in zip(
+        sizes, np.degrees(np.arctan2(z, x)), ratio, strict=True
+    ):
+        grain = saltation.Grains.of(
+            1e-3 * size,
+            density=2650.0,
+            fluid_density=1000.0,
+            viscosity=1e-6,
+            slope_deg=slope,
+            roughness=scene.bed.roughness,
+            relative_size=size,
+        )
+        assert saltation.hops(grain).all()
+        shields = saltation.tabulated(grain).initiation(saltation.PEAK)[0]
+        further.append(np.sqrt(shields * 1.65 * 9.81 * 1e-3 * size) / over)
+        if len(further) == 5:
+            break
+    in_gust = leaves[:5] / np.sqrt(saltation.PEAK)
+    expected = np.maximum(in_gust, further)
+    np.testing.assert_allclose(both[:5], expected, rtol=1e-4)
+    by_hops = pile.hops_decide(cases)
+    np.testing.assert_array_equal(by_hops[:5], in_gust < further)
 
 
 @pytest.mark.parametrize("name", ["mixed", "strip"])

@@ -21,6 +21,7 @@ from orchestrator.physics.saltation import (
     Thresholds,
     fate,
     hops,
+    on_layer,
     settling,
     submerged,
     tabulated,
@@ -346,6 +347,45 @@ def test_beyond_the_table_thresholds_are_computed() -> None:
     direct, table = thresholds(grains), tabulated(grains)
     np.testing.assert_array_equal(table.steady, direct.steady)
     np.testing.assert_array_equal(table.cessation, direct.cessation)
+
+
+@pytest.mark.parametrize("size", [0.5, 1.0, 2.0])
+def test_a_grain_rests_on_three_others_and_rises_over_them(size: float) -> None:
+    """The centres of the layer are the corners of a triangle of side 1."""
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, np.sqrt(0.75)]])
+    reach = (size + 1) / 2
+    above = {}
+    for name, at in {
+        "pocket": corners.mean(axis=0),
+        "saddle": corners[:2].mean(axis=0),
+        "top": corners[0],
+    }.items():
+        away = np.linalg.norm(corners - at, axis=1)
+        above[name] = np.sqrt(reach**2 - away.min() ** 2)
+    rest, barrier = on_layer(np.array(size))
+    assert rest == pytest.approx(above["pocket"], rel=1e-12)
+    rise = (above["saddle"] + above["top"]) / 2 - above["pocket"]
+    assert barrier == pytest.approx(rise / size, rel=1e-12)
+
+
+def test_unlike_grains_go_on_at_stresses_nearer_to_each_other_than_their_weights() -> (
+    None
+):
+    """Measured exponents of theta_i ~ (D_i/D_50)^p are -0.67 to -0.98."""
+    size = np.array([0.5, 0.7, 1.0, 1.4, 2.0])
+    exponents = []
+    for galileo, ratio in ((38.8, 2208.0), (127.0, 2.65), (1422.0, 2.65)):
+        grains = Grains(
+            galileo * size**1.5, ratio, roughness=1 / 30 / size, relative_size=size
+        )
+        found = tabulated(grains)
+        alone = tabulated(Grains(galileo, ratio))
+        of_like = found.initiation(2.28)[2]
+        # the table is within 2 % of what is computed
+        assert of_like == pytest.approx(alone.initiation(2.28)[0], rel=0.02)
+        shields = found.initiation(2.28)
+        exponents.append(np.polyfit(np.log(size), np.log(shields), 1)[0])
+    assert exponents == pytest.approx([-0.81, -1.08, -0.72], abs=0.05)
 
 
 def test_initiation_is_the_larger_of_two() -> None:

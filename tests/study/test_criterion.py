@@ -13,13 +13,22 @@ from orchestrator.fidelity.decision import decide
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import PileCase
 from orchestrator.study import study
-from orchestrator.study.criterion import goes_on
+from orchestrator.study.criterion import goes_on, of_single_grain
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import changed
 
 SAND = "[grain]\ndensity = 2650.0\ndiameter = 3.5e-4\n"
 WATER = '[fluid]\nkind = "water"\n'
 PILE = "[bed]\nkind = 'pile'\nslope_deg = 15.0\n"
+STRIP = """[bed]
+kind = "flat"
+packing = "poured"
+length = 0.007
+width = 6.0
+"""
+MIXTURE = f"[grain.sizes]\nsigma_g = 1.3\n{STRIP}"
+SHARING = '[forces]\nexposure = "protrusion"\nsheltering = "balanced"\n'
+BOTH = '[threshold]\ncriterion = "goes on"\n'
 CURVED = "[bed]\nkind = 'dune'\nslope_deg = 10.0\nwindward = 'curved'\n"
 
 
@@ -39,7 +48,16 @@ def _scene(text: str) -> Scene:
         (SAND + WATER + '[threshold]\ncriterion = "leaves"\n', False),
         (SAND + '[threshold]\ncriterion = "goes on"\n', True),
         (SAND + WATER + '[forces]\nlaw = "paper"\n', False),
-        (SAND + "cohesion = 1e-5\n" + WATER, False),
+        # as `threshold` does: cohesion holds a grain in its pocket, not in its hops
+        (SAND + "cohesion = 1e-5\n" + WATER, True),
+        # unlike grains, and those that share the stress, by request alone
+        (SAND + WATER + "[bed]\nrelative_size = 2.0\n", False),
+        (SAND + WATER + MIXTURE, False),
+        (SAND + WATER + STRIP, True),
+        (SAND + WATER + STRIP + SHARING, False),
+        (SAND + WATER + MIXTURE + BOTH, True),
+        (SAND + WATER + STRIP + SHARING + BOTH, True),
+        (SAND + WATER + "[bed]\nrelative_size = 2.0\n" + BOTH, True),
         (SAND + WATER + "[flow]\ngusts = { intensity = 0.4, events = 9 }\n", False),
     ],
 )
@@ -54,14 +72,41 @@ def test_fluid_forces_and_method_decide_where_nothing_is_asked(
     [
         ('[forces]\nlaw = "low"\n', "the law low is of grains that leave"),
         ('[method]\nkind = "dem"\n', 'method.kind = "pivot"'),
-        ("[bed]\nrelative_size = 2.0\n", "over a bed of other grains"),
+        (
+            PILE + "[threshold]\nupdate = 0.1\n",
+            "on a bed that changes (threshold.update) stress and slope of a grain",
+        ),
     ],
 )
 def test_a_criterion_that_a_scene_cannot_have_is_refused(text: str, word: str) -> None:
-    asked = SAND + '[threshold]\ncriterion = "goes on"\n' + text
+    asked = SAND + (text if "[threshold]" in text else text + BOTH)
+    asked = asked.replace("[threshold]\nupdate", BOTH + "update")
     with pytest.raises(InputError, match=r"threshold.criterion") as refused:
         _scene(asked)
     assert word in str(refused.value)
+
+
+def test_cohesion_holds_a_grain_in_its_pocket_but_not_in_its_hops() -> None:
+    air = '[fluid]\nkind = "air"\n'
+    loose = of_single_grain(_scene(SAND + air))
+    sticky = of_single_grain(_scene(SAND + "cohesion = 5e-4\n" + air))
+    assert sticky.goes_on == loose.goes_on
+    assert sticky.cessation == loose.cessation
+    assert sticky.leaves[0] > 2 * loose.leaves[0]
+    assert sticky.shields == sticky.leaves
+    assert not sticky.hops_decide[0]
+    # and is the answer of `threshold`
+    at_once = thresholds(
+        {
+            "diameter": [3.5e-4],
+            "density": [2650.0],
+            "fluid_density": [1.225],
+            "viscosity": [1.4607e-5],
+            "cohesion": [5e-4],
+        }
+    )
+    found = at_once["shields"][at_once["answer"]]
+    assert found == pytest.approx(sticky.shields, rel=1e-6)
 
 
 def test_what_answers_a_bed_whose_grains_go_on() -> None:
