@@ -144,10 +144,10 @@ def test_an_interval_is_of_strips_that_differ_in_nothing_else_than_the_tested() 
         row |= {"fraction": scene.threshold.fractions[0]}
         return beside.interval(beside.kind_of(row), 30.0)[2]
 
-    assert rows(strip) == 80
+    assert rows(strip) == 81
     for name, value in SPANNED.items():
         depth = {"flow.depth": 2.0} if name == "flow.top" else {}
-        assert rows(changed(strip, {name: value, **depth})) == 80, name
+        assert rows(changed(strip, {name: value, **depth})) == 81, name
     for name, value in UNTESTED.items():
         try:
             other = changed(strip, {name: value})

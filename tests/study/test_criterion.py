@@ -89,7 +89,7 @@ def test_a_criterion_that_a_scene_cannot_have_is_refused(text: str, word: str) -
 def test_cohesion_holds_a_grain_in_its_pocket_but_not_in_its_hops() -> None:
     air = '[fluid]\nkind = "air"\n'
     loose = of_single_grain(_scene(SAND + air))
-    sticky = of_single_grain(_scene(SAND + "cohesion = 5e-4\n" + air))
+    sticky = of_single_grain(_scene(SAND + "cohesion = 2e-3\n" + air))
     assert sticky.goes_on == loose.goes_on
     assert sticky.cessation == loose.cessation
     assert sticky.leaves[0] > 2 * loose.leaves[0]
@@ -102,7 +102,7 @@ def test_cohesion_holds_a_grain_in_its_pocket_but_not_in_its_hops() -> None:
             "density": [2650.0],
             "fluid_density": [1.225],
             "viscosity": [1.4607e-5],
-            "cohesion": [5e-4],
+            "cohesion": [2e-3],
         }
     )
     found = at_once["shields"][at_once["answer"]]
