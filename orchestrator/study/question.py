@@ -187,8 +187,8 @@ def why_not_going_on(question: Question) -> str:
         return f"the law {law} is of grains that leave their pockets"
     if question.threshold.update > 0:
         return (
-            "on a bed that changes (threshold.update) stress and slope of a grain are of "
-            "one round, and its hops pass over the bed of the next"
+            "on a bed that changes (threshold.update) stress and slope of a grain "
+            "are of one round, and its hops pass over the bed of the next"
         )
     return ""
 
