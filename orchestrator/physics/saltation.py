@@ -143,7 +143,7 @@ class Rebound:
         --------
         >>> trapped, level = BEADS.on(np.array([0.5, 1.0, 2.0]))
         >>> print(trapped.round(3), level.round(3))
-        [0.24 0.12 0.04] [0.721 0.7   0.63 ]
+        [0.362 0.12  0.037] [0.724 0.7   0.634]
         """
         rest, barrier = on_layer(relative_size)
         of_like, barrier_of_like = on_layer(np.array(1.0))
