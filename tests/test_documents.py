@@ -2,6 +2,7 @@
 
 import copy
 import re
+import runpy
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -55,6 +56,24 @@ def test_the_page_of_commands_has_every_command_and_preset() -> None:
         for name in re.findall(r"`([\w-]+)`", row)
     }
     assert presets == named - {"erosion"}
+
+
+def test_the_page_of_columns_is_written_from_the_program() -> None:
+    page = ROOT / "docs" / "columns.md"
+    written = runpy.run_path(str(page.with_suffix(".py")))["text"]()
+    assert page.read_text(encoding="utf-8") == written
+
+
+def test_the_gallery_shows_presets_with_small_pictures() -> None:
+    text = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    presets = {path.stem for path in (ROOT / "orchestrator").glob("*/presets/*.toml")}
+    shown = re.findall(r"(?m)^## ([\w-]+)$", text)
+    assert len(shown) > 10
+    assert set(shown) <= presets
+    for preset in shown:
+        picture = ROOT / "docs" / "figures" / f"gallery-{preset}.png"
+        assert f"(figures/{picture.name})" in text
+        assert picture.stat().st_size < 100_000
 
 
 def _linked(page: Path) -> set[Path]:

@@ -1,0 +1,56 @@
+"""Writes docs/columns.md from the meanings of columns in the program.
+
+python docs/columns.py > docs/columns.md
+"""
+
+from orchestrator import tables
+
+TABLES = {
+    "scenes": "a scene: the values of its fields",
+    "methods": "a scene: how it was answered, and why",
+    "single_grain": "a single grain: its threshold",
+    "pile_threshold": "a pile and a fraction n/N: its threshold",
+    "pile_curve": "a pile and a load step: the part of the grains that has moved",
+    "pile_grain": "a grain of a pile: where it lies and when it moved",
+    "size_class": "a size class of a mixture and a fraction: its threshold, hiding",
+    "form": "a form of a train and a fraction: its threshold",
+    "flow": "a solved flow",
+    "wall_stress": "a place on the bed of a solved flow",
+    "check": "a threshold that DEM answered too, as a check of a fast method",
+}
+"""Tables of a study, with what a row is."""
+HEAD = """\
+# Columns of the tables
+
+`results/NAME/tables/` has the tables of a study as CSV files; `study.tables` has them in Python. A study has those tables that belong to its
+question. The names of columns end with their SI units: `_m` is metres, `_m_s` metres per second, `_pa` pascals, `_deg` degrees. A column
+without a unit is a number, a text or a truth value. An empty cell means that there is no such value. `columns.csv` beside the tables
+explains the columns that they have.
+
+This page is written by `python docs/columns.py` from the descriptions in the program.
+
+## Tables
+
+| table | a row is |
+|---|---|
+"""
+END = """
+## Where to go next
+
+- [glossary.md](glossary.md): the terms.
+- [python.md](python.md): the tables in Python.
+"""
+
+
+def text() -> str:
+    """Write the page."""
+    lines = [f"| `{name}` | {row} |" for name, row in TABLES.items()]
+    lines += ["", "## Columns", "", "| column | meaning |", "|---|---|"]
+    for column, meaning in sorted(tables.COLUMNS.items()):
+        told = meaning.replace("*", r"\*").replace("|", r"\|").replace("<", r"\<")
+        lines.append(f"| `{column}` | {told} |")
+    return HEAD + "\n".join(lines) + "\n" + END
+
+
+if __name__ == "__main__":
+    print(text(), end="")

@@ -1,0 +1,122 @@
+"""The page docs/gallery.md and its pictures, from runs of the presets.
+
+python tools/gallery.py DIRECTORY
+
+DIRECTORY holds the results of each preset below, in a directory of its name, as
+`orchestrator study PRESET --out DIRECTORY/PRESET > DIRECTORY/PRESET.txt` writes them; `stockpile`
+is run by `orchestrator erosion`. The pictures are drawn by chromium from the figures of the runs.
+"""
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from PIL import Image, ImageChops
+
+ROOT = Path(__file__).parents[1]
+PICTURES = ROOT / "docs" / "figures"
+SHOWN = {
+    "first-look": "bed-alpha15.svg",
+    "dune": "where.svg",
+    "ripples": "bed-alpha12.svg",
+    "fence": "where.svg",
+    "stockpile": "erosion.svg",
+    "cone": "stress.svg",
+    "hills": "hills.svg",
+    "poured": "poured-dem.svg",
+    "mixture": "hiding.svg",
+    "shields": "shields.svg",
+    "paper": "fractions-reynolds-alpha15.svg",
+}
+"""The figure that is shown of each preset."""
+WIDE = 900  # pixels
+COLOURS = 64
+HEAD = """\
+# Gallery of results
+
+Each section has a preset, the answer that its command prints, and a picture of its page. A preset is a
+study file: copy it, change a value and run the copy. This page is made by `python tools/gallery.py`
+from runs of the presets.
+"""
+END = """\
+## Where to go next
+
+- [commands.md](commands.md): all presets.
+- [study-file.md](study-file.md): the fields of a study file.
+- [result-page.md](result-page.md): how to read the page of a study.
+"""
+
+
+def main(directory: Path) -> None:
+    """Write the page and its pictures."""
+    sections = [section(directory, preset) for preset in SHOWN]
+    text = "\n".join([HEAD, *sections, END])
+    (ROOT / "docs" / "gallery.md").write_text(text, encoding="utf-8")
+
+
+def section(directory: Path, preset: str) -> str:
+    """The section of a preset; its picture is drawn."""
+    figure = directory / preset / "figures" / SHOWN[preset]
+    draw(figure, PICTURES / f"gallery-{preset}.png")
+    (file,) = ROOT.glob(f"orchestrator/*/presets/{preset}.toml")
+    answer = (directory / f"{preset}.txt").read_text(encoding="utf-8")
+    card = shortened(answer)
+    question = card.splitlines()[0]
+    command = "erosion" if preset == "stockpile" else "study"
+    lines = [
+        f"## {preset}",
+        "",
+        f"`orchestrator {command} {preset}`, file [{file.name}](../{file.relative_to(ROOT)})",
+        "",
+        "```",
+        card,
+        "```",
+        "",
+        f"![{preset}: {question}](figures/gallery-{preset}.png)",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def shortened(answer: str) -> str:
+    """The card of an answer: what stands before its tables, without the name of the page."""
+    lines = []
+    for line in answer.splitlines():
+        is_table = line.startswith(("all rows", "measured", "  measured", "/"))
+        if is_table:
+            break
+        lines.append(line.rstrip())
+    return "\n".join(lines).strip()
+
+
+def draw(figure: Path, picture: Path) -> None:
+    """Make a small PNG of an SVG figure."""
+    with tempfile.TemporaryDirectory() as scratch:
+        shot = Path(scratch) / "shot.png"
+        page = Path(scratch) / "page.html"
+        style = f"body {{ margin: 0 }} img {{ width: {WIDE}px }}"
+        page.write_text(
+            f"<style>{style}</style><img src='{figure.absolute().as_uri()}'>"
+        )
+        subprocess.run(
+            [
+                *("chromium", "--headless", "--no-sandbox", "--disable-gpu"),
+                *("--disable-background-networking", "--hide-scrollbars"),
+                *(f"--user-data-dir={scratch}/profile", f"--window-size={WIDE},2400"),
+                *(f"--screenshot={shot}", page.as_uri()),
+            ],
+            check=True,
+            capture_output=True,
+        )
+        whole = Image.open(shot).convert("RGB")
+        empty = Image.new("RGB", whole.size, "white")
+        box = ImageChops.difference(whole, empty).getbbox()
+        if box is None:
+            raise SystemExit(f"{figure}: chromium drew nothing")
+        shown = whole.crop((0, 0, WIDE, box[3]))
+        shown.quantize(COLOURS).save(picture, optimize=True)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
