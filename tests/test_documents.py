@@ -12,7 +12,7 @@ import nbformat
 import pytest
 
 import orchestrator
-from orchestrator import __version__, cli, plan
+from orchestrator import __version__, cli, plan, tables
 from orchestrator.study import study
 from tests.conftest import Command
 
@@ -130,6 +130,10 @@ INSTEAD = {
     r"fidelity levels?": "fidelity",
     r"every level, keeps": "fidelity",
     r"add up by their squares": "combine as the root of the sum of their squares",
+    r"level rows": "horizontal rows",
+    r"all levels share": "all methods share",
+    r"Shields stress": "Shields number",
+    r"aligned rows": "rows along the slope",
 }
 
 
@@ -139,10 +143,16 @@ def test_a_page_uses_the_words_of_the_glossary(page: Path) -> None:
     assert [word for word in INSTEAD if re.search(word, text)] == []
 
 
+def test_columns_and_fields_use_the_words_of_the_glossary() -> None:
+    for column, meaning in tables.COLUMNS.items():
+        assert [word for word in INSTEAD if re.search(word, meaning)] == [], column
+
+
 def test_the_glossary_has_the_words_that_pages_use() -> None:
     text = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
     words = ["method", "fidelity", "reference", "core-s", "deck", "floor", "preset"]
     words += ["digest", "criterion", "answer card", "engine", "threshold stress"]
+    words += ["protocol", "level", "row", "aligned"]
     assert [word for word in words if f"| {word} |" not in text] == []
 
 

@@ -348,7 +348,7 @@ class PileBed(Bed):
     packing: Packing = _pile("aligned")
     """pattern of the pile's grains
     - aligned: rows along the slope
-    - horizontal: level rows
+    - horizontal: horizontal rows, which make stairs of the faces
     - disordered: rows along the slope with random gaps
     - poured: poured by LIGGGHTS into a mould of the bed line, settled and cut to it"""
     disorder: float = field(0.02, unit="d", scope="disordered piles", ge=1e-6, le=0.2)
