@@ -31,7 +31,7 @@ calibration: setup  ## measure the fidelity levels and the maps anew, for the pa
 	cp results/budget/tables/budget.csv orchestrator/fidelity/calibration/
 	$(PYTHON) tools/tested.py results/validate/tables/measured.csv > tested.csv
 	mv tested.csv orchestrator/physics/tested.csv
-	cp results/ladder/figures/speed-against-accuracy.png docs/ladder.png
+	$(PYTHON) tools/errors.py
 	cp results/stability/figures/maps.png docs/stability.png
 
 docs:  ## make the site of the documents, site/README.html, which reads offline
