@@ -1,10 +1,11 @@
 """Grains that go on, by LIGGGHTS: the part of a bed that does, against the stress of the flow.
 
-python tools/going.py DIRECTORY [NAME ...] > docs/measured/going.csv
+python tools/going.py DIRECTORY [NAME[:SEED] ...]
 
-Each of the `SETS` has as many strips as there are `SEEDS`, of some 240 exposed grains, in five to
+Each of the `SETS` has as many strips as there are `SEEDS`, of some 240 exposed grains, in three to
 ten minutes of one core each. The cases in DIRECTORY run by hand as they lie; those that are done
-are not run again. A row is a load step.
+are not run again. The load steps of the strips that are asked for, by default of all, take the place
+of theirs in `TABLE`; then the figure is drawn anew. Without a DIRECTORY it is drawn alone.
 """
 
 import sys
@@ -13,13 +14,25 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure as Canvas
 
 from orchestrator.grains.going import GOING, GoingCase
 from orchestrator.grains.loads import Geometry
+from orchestrator.physics.constants import GRAVITY
+from orchestrator.physics.curves import Air, iversen_white, soulsby_whitehouse
+from orchestrator.report import style
 from orchestrator.runs import case as cases
 from orchestrator.runs import engine
 from orchestrator.study.scene import Scene
 
+DOCS = Path(__file__).parents[1] / "docs"
+TABLE = DOCS / "measured" / "going.csv"
+"""A row for each load step. ``cut`` says by what the strips were cut: the heights of the centres of
+their grains, as until 2026, or their tops."""
+FIGURE = DOCS / "figures" / "going.svg"
+DRAWN = ("air 0.25 mm", "air 0.5 mm", "water 1 mm", "water 5 mm")
+FIELD = (0.0110, 0.0129)
+"""Thresholds of Martin and Kok 2018 at 0.40 to 0.53 mm, drawn in air at 0.5 mm."""
 SEEDS = (1, 2, 3)
 AIR = {"density": 1.2, "viscosity": 1.5e-5}
 WATER = {"density": 1000.0, "viscosity": 1e-6}
@@ -113,19 +126,73 @@ def run(case: GoingCase, directory: Path) -> pd.DataFrame:
     )
 
 
-def main(directory: Path, names: list[str]) -> pd.DataFrame:
-    """Run the sets, and collect their load steps."""
+def asked(texts: list[str]) -> list[tuple[str, int]]:
+    """Names and seeds of the strips that are asked for."""
+    strips = []
+    for text in texts or list(SETS):
+        name, _, seed = text.partition(":")
+        seeds = (int(seed),) if seed else SEEDS
+        strips += [(name, each) for each in seeds]
+    return strips
+
+
+def main(directory: Path, strips: list[tuple[str, int]]) -> pd.DataFrame:
+    """Run strips, and put their load steps into the table."""
     directory.mkdir(parents=True, exist_ok=True)
-    tables = []
-    for name in names:
-        for seed in SEEDS:
-            rows = run(GoingCase(scene_of(SETS[name], seed)), directory)
-            rows.insert(0, "set", name)
-            tables.append(rows)
-            print(name, seed, file=sys.stderr)
-    return pd.concat(tables, ignore_index=True)
+    table = pd.read_csv(TABLE)
+    for name, seed in strips:
+        rows = run(GoingCase(scene_of(SETS[name], seed)), directory)
+        rows.insert(0, "set", name)
+        former = (table["set"] == name) & (table["seed"] == seed)
+        table = pd.concat([table[~former], rows.assign(cut="tops")])
+        print(name, seed, file=sys.stderr)
+    return table.sort_values(["set", "seed", "shields"], ignore_index=True)
+
+
+def measured(name: str) -> float:
+    """The measured threshold of a set, by a curve: of wind tunnels, or of flumes."""
+    given = SETS[name]
+    d = np.array(given["diameter"])
+    fluid = given["fluid"]
+    excess = 2650.0 / fluid["density"] - 1
+    if fluid is AIR:
+        air = Air(2650.0, fluid["density"], fluid["viscosity"])
+        ustar = iversen_white(d, air)
+        return float(ustar**2 / (excess * GRAVITY * d))
+    dstar = d * (excess * GRAVITY / fluid["viscosity"] ** 2) ** (1 / 3)
+    return float(soulsby_whitehouse(dstar))
+
+
+def draw(table: pd.DataFrame) -> Canvas:
+    """Draw the part that goes on against the stress, a panel for each set."""
+    canvas = style.canvas(4.6)
+    axes = canvas.subplots(2, 2, sharey=True)
+    for ax, name in zip(axes.flat, DRAWN, strict=True):
+        rows = table[table["set"] == name]
+        for _, strip in rows.groupby("seed"):
+            part = 100 * strip["went_on"] / strip["exposed"]
+            look = "o-" if (strip["cut"] == "tops").all() else "o:"
+            ax.plot(strip["shields"], part, look, color="#0072b2", ms=3)
+        alone = rows["closed_form"].iloc[0]
+        one = ax.axvline(alone, color="#c24e00", label="one grain, closed form")
+        curved = measured(name)
+        curve = ax.axvline(curved, color="0.3", ls="--", label="measured, curve")
+        if name == "air 0.5 mm":
+            label = "measured, three sites in the field"
+            field = ax.axvspan(*FIELD, color="0.88", zorder=0, label=label)
+        ax.set(title=name, xscale="log")
+        style.plain_ticks(ax.xaxis)
+    for ax in axes[:, 0]:
+        ax.set_ylabel("grains that go on, %")
+    for ax in axes[1]:
+        ax.set_xlabel("Shields number $θ$")
+    style.legends(canvas, [one, curve, field], [])
+    return canvas
 
 
 if __name__ == "__main__":
-    found = main(Path(sys.argv[1]), sys.argv[2:] or list(SETS))
-    found.to_csv(sys.stdout, index=False, float_format="%.5g")
+    if sys.argv[1:]:
+        found = main(Path(sys.argv[1]), asked(sys.argv[2:]))
+        found.to_csv(TABLE, index=False, float_format="%.5g")
+    with style.settings():
+        FIGURE.write_bytes(style.svg(draw(pd.read_csv(TABLE))))
