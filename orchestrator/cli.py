@@ -21,6 +21,7 @@ from orchestrator.runs.cluster import SYSTEMS, Queue
 from orchestrator.study.units import number, whole_number
 
 if TYPE_CHECKING:
+    from orchestrator.experiments.experiment import Experiment
     from orchestrator.experiments.surfaces import SurfaceStudy
     from orchestrator.pipeline import Finished
 
@@ -31,6 +32,8 @@ OF_SURFACES = {
 """Commands on beds in three dimensions, and the modules of their experiments."""
 
 
+TRUTH = ("ridge", "turn", "interval", "piles", "askervein")
+"""Comparisons of flows over beds in three dimensions."""
 COMMANDS = {
     "study": "run the missing cases of a study, and write its page",
     "status": "list the cases that are done, running or failed, and why",
@@ -167,6 +170,10 @@ def parser() -> argparse.ArgumentParser:
         if name == "report":
             text = "draw the folded figures too"
             command.add_argument("--all", action="store_true", help=text)
+        if name == "validate":
+            text = "flows over beds in three dimensions alone: all, or one comparison"
+            parts = ("all", *TRUTH)
+            command.add_argument("--surfaces", choices=parts, help=text)
         if name == "study":
             _add_study_options(command)
             calculator.add(commands)
@@ -210,6 +217,11 @@ def _study(options: Namespace) -> int:
             print("every case was done already; no solver was started", file=sys.stderr)
             print(*answered, sep="\n")
             return 0
+    if getattr(options, "surfaces", None):
+        truth = import_module("orchestrator.experiments.surface_truth")
+        names = TRUTH if options.surfaces == "all" else (options.surfaces,)
+        out = options.out or Path("results") / "surfaces"
+        return _experiment(options, truth.experiment(names), out)
     from orchestrator import pipeline, plan
     from orchestrator.study.study import load
 
@@ -233,17 +245,22 @@ def _study(options: Namespace) -> int:
         queue = Queue(options.cluster, study.cluster) if options.cluster else None
         return _end(pipeline.run(study, out, workers=workers, queue=queue))
     module = import_module(f"orchestrator.experiments.{options.command}")
-    experiment = module.experiment(*studies, out)
+    return _experiment(options, module.experiment(*studies, out), out)
+
+
+def _experiment(options: Namespace, experiment: "Experiment", out: Path) -> int:
+    """Run an experiment, or say what it would run."""
+    from orchestrator import plan
+
     if options.plan:
-        print(*plan.expected(experiment.planned, cases, workers), sep="\n")
+        cases = out.absolute() / "cases"
+        print(*plan.expected(experiment.planned, cases, options.workers), sep="\n")
         return 0
-    return _end(experiment.run(out, workers=workers))
+    return _end(experiment.run(out, workers=options.workers))
 
 
 def _surface(options: Namespace, study: "SurfaceStudy") -> int:
     """Run a study, or the experiment on erosion, of beds in three dimensions."""
-    from orchestrator import plan
-
     for name in ("cluster", "tolerance"):
         if getattr(options, name, None) is not None:
             what = "a bed in three dimensions has none"
@@ -252,12 +269,7 @@ def _surface(options: Namespace, study: "SurfaceStudy") -> int:
         warnings.warn(question, stacklevel=1)
     module = import_module(OF_SURFACES[options.command])
     out = options.out or Path("results") / study.name
-    experiment = module.experiment(study, out)
-    if options.plan:
-        cases = out.absolute() / "cases"
-        print(*plan.expected(experiment.planned, cases, options.workers), sep="\n")
-        return 0
-    return _end(experiment.run(out, workers=options.workers))
+    return _experiment(options, module.experiment(study, out), out)
 
 
 def finished(options: Namespace) -> tuple[str, Path] | None:

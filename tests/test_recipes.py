@@ -9,7 +9,7 @@ from orchestrator.grains import cells, pile
 from tests import recipes
 from tests.recipes import Inputs
 
-KINDS = {"cells", "flow", "pile", "poured", "worn"}
+KINDS = {"cells", "flow", "pile", "poured", "surface", "worn"}
 
 
 def _kinds(names: Iterable[str]) -> set[str]:

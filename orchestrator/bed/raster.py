@@ -24,6 +24,8 @@ LARGEST = 2**28
 """Most bytes of a file."""
 UNEVEN = 1e-3
 """Largest difference of two steps of an axis, over the step."""
+STL_HEAD, STL_TRIANGLE = 84, 50
+"""Bytes of the head of a binary STL file, and of each of its triangles."""
 SCALE, TIE_POINT, TRANSFORMATION = 33550, 33922, 34264
 KEYS, KEY_NUMBERS, KEY_TEXTS, NODATA = 34735, 34736, 34737, 42113
 """Tags of a GeoTIFF (OGC 19-008r4), and GDAL's for cells without a height."""
@@ -60,6 +62,9 @@ def read_surface(path: Path, where: str) -> Surface:
     InputError
         If the file is no surface, with the place and the remedy.
     """
+    if not path.is_file():
+        remedy = "a path in a study file is relative to that file"
+        raise InputError("there is no such file", where, remedy)
     content = read_bytes(path, LARGEST, where)
     ending = path.suffix.lower()
     if ending in (".tif", ".tiff"):
@@ -69,6 +74,7 @@ def read_surface(path: Path, where: str) -> Surface:
     elif ending in (".xyz", ".csv", ".txt"):
         raster = _of_points(decoded(content, where), path.name, where)
     elif ending == ".stl":
+        _check_stl(content, where)
         raster = _of_triangles(path, where)
     else:
         what = f"the ending {ending!r} is of no surface"
@@ -223,6 +229,16 @@ def _of_triangles(path: Path, where: str) -> Raster:
     of_places = LinearNDInterpolator(points[:, :2] - start[:2], points[:, 2])
     heights = of_places(*np.meshgrid(east, north))
     return Raster(path.name, start[0] + east, start[1] + north, heights)
+
+
+def _check_stl(content: bytes, where: str) -> None:
+    """Refuse a file that is no whole STL: its reader would write pages of its own."""
+    triangles = int.from_bytes(content[80:84], "little")
+    is_binary = len(content) == STL_HEAD + STL_TRIANGLE * triangles
+    is_text = content.lstrip()[:5] == b"solid" and b"endsolid" in content
+    if not (is_binary or is_text):
+        remedy = "is it an STL file of a surface, seen from above?"
+        raise InputError("it is no whole STL file", where, remedy)
 
 
 def _seen_from_above(path: Path, where: str) -> FloatArray:

@@ -19,7 +19,7 @@ from orchestrator.types import BoolArray, FloatArray
 
 Tags = Mapping[int, tuple[float, ...] | str]
 """Tags of a GeoTIFF by their numbers."""
-SPREAD_OF_RASTER = 1.25
+SPREAD_OF_RASTER = 0.75
 SPREAD_OF_SHAPE = 0.5
 """Standard deviation of the smoothing over the length of a cell, of the flow's mesh."""
 NODES_OF_SPREAD = 4.0

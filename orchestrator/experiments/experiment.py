@@ -14,6 +14,7 @@ from orchestrator.fidelity.decision import written
 from orchestrator.pipeline import Finished
 from orchestrator.plan import Plan
 from orchestrator.report import page, style
+from orchestrator.report.card import lines
 from orchestrator.report.page import Section
 from orchestrator.runs import case
 from orchestrator.runs.files import Folder
@@ -148,9 +149,13 @@ class Experiment:
         for name, error in failed.items():
             if self.failing is None or name in self.failing:
                 failures[name] = error
-        untitled = [section.text for section in sections if not section.title]
-        answer = "\n".join(text.replace("\n\n", "\n") for text in untitled)
-        return Finished(space.page, len(todo), failures, answer)
+        said = []
+        for section in sections:
+            if section.card is not None:
+                said += [*lines(section.card), ""]
+            if not section.title:
+                said.append(section.text.replace("\n\n", "\n"))
+        return Finished(space.page, len(todo), failures, "\n".join(said).rstrip())
 
     def _todo(self, cases: Path) -> dict[str, case.Case]:
         """The runs that are missing, but for those that have ended by a verdict."""

@@ -20,6 +20,7 @@ from matplotlib.figure import Figure as Canvas
 from orchestrator import plan
 from orchestrator.bed.raster import geotiff
 from orchestrator.bed.surface import OF_GROUND, Surface
+from orchestrator.experiments import surface_card
 from orchestrator.experiments.erosion import given_threshold
 from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs
 from orchestrator.experiments.surfaces import SurfaceScene, SurfaceStudy
@@ -53,8 +54,6 @@ STARTS = "starts, m/s"
 FIRST_LEAVES = "first leaves, m/s"
 """Columns of directions: wind in which motion starts, and the first grains leave."""
 WIND = "wind at 10 m, m/s,"
-LITTLE = 0.005
-"""Share of the surface that is not worth a word."""
 MOST_SHARE = 0.95
 """Share of the surface up to which it is drawn against the wind."""
 ASKED_SHARES = (0.1, 0.5)
@@ -209,6 +208,16 @@ class Direction:
         return self.shares().wind_for(onset.STARTS)
 
     @property
+    def leaves(self) -> float | None:
+        """Wind in which the first grains leave without gusts, m/s; None if that is one.
+
+        It is the wind in which motion starts where no grain goes on.
+        """
+        if LEAVES not in self.faces or self.faces[LEAVES].equals(self.faces[MOVES]):
+            return None
+        return self.shares(LEAVES).wind_for(onset.STARTS)
+
+    @property
     def word(self) -> str:
         """The direction in names of files."""
         return f"{self.from_deg:g}"
@@ -323,52 +332,6 @@ class Answer:
             wind = np.array([each.shares().wind_for(share)])
             total += float(onset.hours(wind, each.from_deg, self.rose)[0])
         return total
-
-    def sentences(self, source: str) -> Iterator[str]:
-        """The answer in words; `source` says where a given threshold is from."""
-        first = self.easiest
-        row = first.row()
-        digits = max(0, int(np.ceil(1 - np.log10(self.cell_m))))
-        place = f"x = {row['x_m']:.{digits}f} m, y = {row['y_m']:.{digits}f} m"
-        what = f"grains of {1e3 * self.ground.grain.diameter:.3g} mm"
-        if self.ground.threshold is not None:
-            what = f"u*ₜ {self.ground.threshold:.3g} m/s{source}"
-        told = (
-            f"On the surface ({self.name}; {what}) motion starts in a wind of "
-            f"{row[STARTS]:.3g} m/s at 10 m from {first.from_deg:g}°, first at "
-            f"{place}, {row['z_m']:.3g} m high; on flat ground in "
-            f"{self.ground.flat:.3g} m/s."
-        )
-        for share in ASKED_SHARES:
-            told += f" {share:.0%} of the surface moves at {row[_of(share)]:.3g} m/s."
-        yield told
-        if len(self.directions) > 1:
-            last = max(self.directions, key=lambda each: each.starts)
-            yield (
-                f"From {last.from_deg:g}° motion starts at {last.starts:.3g} m/s, "
-                f"of the {len(self.directions)} directions the highest."
-            )
-        if LEAVES in first.faces and self.ground.is_natural:
-            yield (
-                "Motion is that of grains that leave in a gust and go on after it; "
-                "without gusts grains leave their pockets at "
-                f"{row[FIRST_LEAVES]:.3g} m/s."
-            )
-        if self.rose is not None:
-            half, tenth, some = (self.hours_of(s) for s in (0.5, 0.1, onset.STARTS))
-            yield (
-                f"By the wind rose some of it moves {some:.0f} hours a year, a tenth "
-                f"{tenth:.0f} hours, half of it {half:.0f} hours."
-            )
-        said = "; ".join(self.smooth.said)
-        yield f"The surface is {said}: {self.smooth.relief:.4g} m high in the flow."
-        loose = max(each.loose for each in self.directions)
-        if loose > LITTLE:
-            angle = 90 - self.ground.grain.entrainment_angle_deg
-            yield (
-                f"{loose:.0%} of it is steeper than {angle:g}° of the pockets of its "
-                "grains, which lie loose there: it is left out."
-            )
 
 
 def _of(share: float) -> str:
@@ -562,14 +525,16 @@ def sections(found: Sequence[Answer], source: str) -> list[Section]:
     listed: list[Section] = []
     for number, answer in enumerate(found, 1):
         listed += _sections(answer, f"-{number}" if len(found) > 1 else "", source)
-    listed[0] = replace(listed[0], tables=[tables(found)["directions"]])
+    table = tables(found)["directions"]
+    card = surface_card.card(found, source)
+    listed[0] = replace(listed[0], tables=[table], card=card)
     return [*listed, Section("How sure it is", words["sure"])]
 
 
 def _sections(answer: Answer, end: str, source: str) -> Iterator[Section]:
     """The sections of one surface; the names of its figures have the ending."""
     words = TEXTS["surface"]
-    told = "\n\n".join(answer.sentences(source))
+    told = "\n\n".join(surface_card.sentences(answer, source))
     first = answer.easiest.first
     mark = (float(first["x_m"]), float(first["y_m"]))
     several = len(answer.directions) > 1

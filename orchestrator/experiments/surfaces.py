@@ -4,9 +4,7 @@ Such a bed has no packing of grains: each of its faces has one exposed grain in 
 pocket. What a grain by grain answer needs is refused here.
 """
 
-import itertools
 import math
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -32,28 +30,35 @@ from orchestrator.physics.threshold import (
 from orchestrator.runs.files import digest_file
 from orchestrator.study import units
 from orchestrator.study.declare import List, Part
+from orchestrator.study.keys import Table
 from orchestrator.study.method import Turbulence
 from orchestrator.study.parts import Fluid, Forces
 from orchestrator.study.profile import decoded, read_bytes
 from orchestrator.study.rose import Rose, read_rose
 from orchestrator.study.scene import roughness_length
 from orchestrator.study.source import Source, find
+from orchestrator.study.study import (
+    MOST_BYTES,
+    at_points,
+    check_once,
+    meant,
+    not_accepted,
+    tables_of,
+)
 
 Shape = Literal["cone", "oval", "barchan"]
-Table = dict[str, Any]
 Positive = Annotated[float, Field(gt=0, le=1e4)]
 Wind = Annotated[float, Field(gt=0, le=150)]
 KIND = "surface"
 MOST_FLOWS = 360
-MOST_BYTES = 2**22
 LARGEST_ROSE = 2**22
-"""Most bytes of a study file and of a wind rose."""
+"""Most bytes of a wind rose."""
 OVAL_LENGTH = 3.0
 """Length of the flat top of an oval over its height, where none is given."""
 OF_GRAINS = {
     "bed": (
         *("packing", "counted", "mobile_layers", "disorder", "poured_depth", "width_d"),
-        *("seed", "obstacles", "forms", "spacing", "profile", "lee_slope_deg"),
+        *("seed", "forms", "spacing", "profile", "lee_slope_deg"),
     ),
     "grain": ("sizes", "stiffness", "damping"),
     "forces": ("exposure", "sheltering", "stress", "averaging_length", "loaded_grains"),
@@ -93,7 +98,7 @@ class SurfaceBed(Part):
     """width of an oval's flat top along x, m; by default one height"""
     smoothing_cells: Annotated[float, Field(ge=0.25, le=10)] | None = None
     """standard deviation over which heights are smoothed, in cells of the flow's mesh;
-    by default 1.25 of a file and 0.5 of a shape"""
+    by default 0.75 of a file and 0.5 of a shape"""
     roughness: Annotated[float, Field(ge=1e-12, le=10)]
     """roughness length of the bed, m, or a part of the diameter, "d/30" """
     entrainment_angle_deg: float = Field(default=60.0, ge=1, le=60)
@@ -211,6 +216,8 @@ PARTS: Mapping[str, type[Part]] = {
     "forces": SurfaceForces,
     "method.flow": SurfaceMethod,
 }
+"""Those of them that a scene has."""
+TABLES: Mapping[str, type[Part]] = {**PARTS, "erosion": SurfaceErosion}
 """The tables of a study file on a surface."""
 
 
@@ -294,15 +301,12 @@ def load(source: str | Path) -> SurfaceStudy | None:
         With the file, the field and the remedy.
     """
     path = find(source)
-    content = read_bytes(path, MOST_BYTES * 4, str(source))
-    try:
-        tables = tomllib.loads(decoded(content, str(source)))
-    except (ValueError, RecursionError):
-        return None  # it is refused as every other study file
+    content = read_bytes(path, MOST_BYTES, str(source))
+    where = str(path)
+    tables = tables_of(decoded(content, str(source)), where)
     bed = tables.get("bed")
     if not isinstance(bed, dict) or bed.get("kind") != KIND:
         return None
-    where = str(path)
     try:
         file = _File.model_validate(tables)
     except ValidationError as error:
@@ -361,14 +365,13 @@ def _scenes(file: _File, files: _Files) -> Iterator[SurfaceScene]:
     for key in file.axes:
         table, _, name = key.rpartition(".")
         if table not in PARTS or name not in PARTS[table].model_fields:
-            remedy = 'write "flow.from_deg" = [0, 90, 180, 270]'
+            remedy = meant(key.split("."), [], PARTS)
             raise InputError("no field of a surface", f"{where}: axes.{key}", remedy)
-    for point in itertools.product(*file.axes.values()):
-        tables = _tables(file, where)
-        for key, value in zip(file.axes, point, strict=True):
-            table, _, name = key.rpartition(".")
-            tables[table][name] = value
-        yield _scene(tables, files)
+    points: dict[SurfaceScene, tuple[Any, ...]] = {}
+    for point, tables in at_points(_tables(file, where), file.axes):
+        scene = _scene(tables, files)
+        check_once(points, scene, point, where)
+        yield scene
 
 
 def _tables(file: _File, where: str) -> dict[str, Table]:
@@ -491,12 +494,14 @@ def _explained(error: ValidationError, where: str, table: str) -> InputError:
     if first["type"] == "missing":
         return InputError("is missing", place, "add it to the file")
     if first["type"] == "extra_forbidden":
+        if path[-1] == "obstacles":
+            remedy = (
+                "leave it out; the preset stockpile has fences on sections of piles"
+            )
+            return InputError("a surface has no fences", place, remedy)
         if path[-1] in OF_GRAINS.get(table, ()):
-            what = "a surface has no grains that are packed, nor a plane"
-            return InputError(what, place, 'leave it out, or bed.kind = "pile"')
-        return InputError("unknown key", place, "known keys: docs/surface.md")
-    value = first.get("input")
-    remedy = first["msg"].lower()
-    if isinstance(value, str):
-        remedy = units.meant(value) or remedy
-    return InputError(f"{value!r} is not accepted", place, remedy)
+            remedy = 'leave it out, or bed.kind = "pile"'
+            return InputError("beds in a plane alone have it", place, remedy)
+        keys = [*_File.model_fields] if not table and len(path) == 1 else []
+        return InputError("unknown key", place, meant(name.split("."), keys, TABLES))
+    return not_accepted(first.get("input"), first["msg"], place)

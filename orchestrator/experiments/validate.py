@@ -15,6 +15,7 @@ from matplotlib.figure import Figure as Canvas
 
 from orchestrator import plan
 from orchestrator.errors import InputError
+from orchestrator.experiments import surface_truth
 from orchestrator.experiments.experiment import Experiment, Results, Runs
 from orchestrator.experiments.sphere import speed_of, sphere
 from orchestrator.experiments.strips import PERCENTILES, ROUGH, Strips
@@ -541,6 +542,7 @@ def _sections(rows: pd.DataFrame, scored: pd.DataFrame) -> list[Section]:
         Section(title, SETS_TEXT, (chart,), [nearest.reset_index(), wide]),
         Section("Thresholds", THRESHOLDS_TEXT, (points,), [scored]),
         Section("From memory", MEMORY_TEXT, (), [memory]),
+        surface_truth.section(surface_truth.stored()),
     ]
 
 

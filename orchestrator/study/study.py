@@ -101,6 +101,10 @@ class Erosion(Part):
     closed form"""
 
 
+TABLES: Mapping[str, type[Part]] = {**PARTS, "erosion": Erosion}
+"""The tables of a study file."""
+
+
 class _Group(_Tables):
     name: str = ""
 
@@ -293,10 +297,7 @@ def parse(text: str, *, name: str, where: str, files: Files | None = None) -> St
     InputError
         With the field and the remedy.
     """
-    try:
-        data = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise _not_toml(str(error), text, where) from None
+    data = tables_of(text, where)
     _check_keys(data, where)
     try:
         file = _File.model_validate(data)
@@ -333,6 +334,27 @@ def _check_profiles(groups: Sequence[Group]) -> None:
                 confirmed = "write units_confirmed = true at the top of the study file"
                 remedy = f"divide x_m and z_m by 1000, or {confirmed} if it is so large"
                 raise InputError(asked, f"{group.where}: bed.profile", remedy)
+
+
+def tables_of(text: str, where: str) -> dict[str, Any]:
+    """Read the tables of a TOML file.
+
+    Parameters
+    ----------
+    text
+        The file.
+    where
+        Its path, for messages.
+
+    Raises
+    ------
+    InputError
+        With the line, and how to write the number in it.
+    """
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise _not_toml(str(error), text, where) from None
 
 
 def _groups(file: _File, where: str, files: Files) -> tuple[Group, ...]:
@@ -408,19 +430,66 @@ def _scenes(
             what = "not a table and a field of it"
             raise InputError(what, f"{where}: axes.{first}", remedy)
     points: dict[str, tuple[Any, ...]] = {}
+    for point, made in at_points(tables, axes):
+        scene = _scene_at(made, where, files)
+        check_once(points, scene.id, point, where)
+        yield scene
+
+
+def at_points(
+    tables: Mapping[str, Table], axes: Mapping[str, list[Any]]
+) -> Iterator[tuple[tuple[Any, ...], Tables]]:
+    """Write each combination of the axes' values into the tables of a file.
+
+    Parameters
+    ----------
+    tables
+        The tables by their names.
+    axes
+        The values by the names of their fields, such as ``grain.diameter``.
+
+    Yields
+    ------
+    point
+        The values.
+    tables
+        The tables with them.
+    """
     for point in itertools.product(*axes.values()):
         made = {name: dict(table) for name, table in tables.items()}
         for name, value in zip(axes, point, strict=True):
             table, _, field = name.rpartition(".")
             made[table][field] = value
-        scene = _scene_at(made, where, files)
-        same = points.setdefault(scene.id, point)
-        if same is not point:
-            one = ", ".join(map(str, same))
-            other = ", ".join(map(str, point))
-            what = f"{one} and {other} are one scene"
-            raise InputError(what, f"{where}: axes", "list each value once")
-        yield scene
+        yield point, made
+
+
+def check_once(
+    points: dict[Any, tuple[Any, ...]], scene: Any, point: tuple[Any, ...], where: str
+) -> None:
+    """Refuse a scene that the axes have a second time.
+
+    Parameters
+    ----------
+    points
+        The values of the axes by the scenes before, to which this one is added.
+    scene
+        The scene, or its id.
+    point
+        Its values.
+    where
+        The file, for messages.
+
+    Raises
+    ------
+    InputError
+        With both values.
+    """
+    same = points.setdefault(scene, point)
+    if same is not point:
+        one = ", ".join(map(str, same))
+        other = ", ".join(map(str, point))
+        what = f"{one} and {other} are one scene"
+        raise InputError(what, f"{where}: axes", "list each value once")
 
 
 def _scene_at(tables: Tables, where: str, files: Files) -> Scene:
@@ -611,11 +680,11 @@ def _explained(error: ValidationError, where: str) -> InputError:
     if first["type"] == "missing":
         return InputError(MISSING, place, "add it to the file")
     if first["type"] != "extra_forbidden":
-        return _not_accepted(value, first["msg"], place)
+        return not_accepted(value, first["msg"], place)
     if branch == "grain" and names[-1] in PileBed.model_fields:
         remedy = 'a pile has it: kind = "pile"'
         return InputError("a bed of one grain has none", place, remedy)
-    return InputError(UNKNOWN, place, _meant(names, keys))
+    return InputError(UNKNOWN, place, meant(names, keys, TABLES))
 
 
 def _gone(name: str, value: Any, where: str) -> InputError | None:
@@ -632,21 +701,48 @@ def _gone(name: str, value: Any, where: str) -> InputError | None:
     return None
 
 
-def _not_accepted(value: Any, message: str, place: str) -> InputError:
-    """The refusal of a value, in the words of a study file."""
+def not_accepted(value: Any, message: str, place: str) -> InputError:
+    """Refuse a value, in the words of a study file.
+
+    Parameters
+    ----------
+    value
+        The value.
+    message
+        What pydantic says of it.
+    place
+        The file and the field.
+
+    Returns
+    -------
+    InputError
+        The refusal.
+    """
     remedy = message.lower().replace("dictionary", "table").replace("tuple", "list")
     if isinstance(value, str):
         remedy = units.meant(value) or remedy
     return InputError(f"{value!r} is not accepted", place, remedy)
 
 
-def _meant(names: Sequence[str], keys: Sequence[str]) -> str:
-    """The key that an unknown one is nearest to, as a question.
+def meant(
+    names: Sequence[str], keys: Sequence[str], tables: Mapping[str, type[Part]]
+) -> str:
+    """Find the key that an unknown one is nearest to.
 
-    `names` is the path of the unknown key, `keys` are those of the file or of the
-    group.
+    Parameters
+    ----------
+    names
+        The path of the unknown key.
+    keys
+        The keys of the file or of the group.
+    tables
+        The tables that they may be in.
+
+    Returns
+    -------
+    str
+        A question; where no key is near, the page that lists all.
     """
-    tables: dict[str, type[Part]] = {**PARTS, "erosion": Erosion}
     here = ".".join(names[:-1])
     written = {}
     for key in keys:
@@ -655,7 +751,8 @@ def _meant(names: Sequence[str], keys: Sequence[str]) -> str:
     for table in reversed([*tables]):
         for field in tables[table].model_fields:
             written[field] = f"{table}.{field}"
-    written["fidelity"] = FIDELITY
+    if "method" in tables:
+        written["fidelity"] = FIDELITY
     own = tables[here].model_fields if here in tables else keys
     for key in own:
         written[key] = key

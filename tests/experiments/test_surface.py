@@ -99,6 +99,11 @@ def test_motion_starts_where_the_answer_says(
     assert main(["study", str(file), "--out", str(folder)]) == 0
     said = capsys.readouterr().out
     assert f"in a wind of {row['starts, m/s']:.3g} m/s at 10 m from 270°" in said
+    # before the sentences stands the card
+    card = said.partition("measured: ")[0]
+    assert card.startswith("In which wind does this surface start to move")
+    assert "hours a year" in card
+    assert "wall stress over a bed in three dimensions has not been" in said
     assert "smoothed over" in said
 
 

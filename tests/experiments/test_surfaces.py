@@ -101,9 +101,25 @@ def test_other_studies_are_none_of_surfaces(name: str) -> None:
         (
             "height = 10",
             'height = 10\npacking = "aligned"',
-            "bed.packing: a surface has no grains that are packed",
+            "bed.packing: beds in a plane alone have it",
         ),
-        ("height = 10", "height = 10\nhight = 3", "bed.hight: unknown key"),
+        (
+            "height = 10",
+            "height = 10\nhight = 3",
+            r"bed.hight: unknown key \(did you mean height",
+        ),
+        ("[axes]", "[axis]", r"axis: unknown key \(did you mean axes"),
+        ("[0, 90.0]", "[0, 0.0]", "axes: 0 and 0.0 are one scene"),
+        (
+            "height = 10",
+            "height = 10\nobstacles = [[-3.0, 2.0, 0.1]]",
+            "bed.obstacles: a surface has no fences",
+        ),
+        (
+            'shape = "cone"\nheight = 10\nslope_deg = 30',
+            'surface = "none.tif"',
+            "bed.surface: .*none.tif: there is no such file",
+        ),
         ("height = 10", "height = 10\nroughness = 2.0", "method.flow.roughness: 2 m"),
         (
             "[axes]",

@@ -14,10 +14,13 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from orchestrator.bed import surface
 from orchestrator.bed.poured import BED, PouredBed
 from orchestrator.flow import theory
 from orchestrator.flow.case import WALL_STRESS, FlowCase
+from orchestrator.flow.mesh3 import Level
 from orchestrator.flow.stress import WallStress
+from orchestrator.flow.surface_case import SurfaceFlowCase
 from orchestrator.grains import pile
 from orchestrator.grains.cells import batches
 from orchestrator.grains.loads import Geometry
@@ -33,6 +36,9 @@ from orchestrator.types import FloatArray
 FOLDER = Path(__file__).parent
 SCENES, PINNED = FOLDER / "scenes.toml", FOLDER / "pinned.json"
 COMMAND = "python -m tests.recipes"
+FORMS = {"a cone": surface.cone(10.0, 26.0), "a barchan": surface.barchan(3.0, 10.0)}
+"""Beds in three dimensions, which scenes of grains have not."""
+FEW_CELLS = Level("few cells", 6, 1, 1.35, 1.5, 8000)
 SIZES = (1.0, 0.9, 1.1)
 """Sizes of the grains of a bed that stands in for a poured one, over d."""
 
@@ -65,6 +71,9 @@ def current(cases: Path) -> dict[str, Inputs]:
                 digests[case.name] = _written(case, cases)
                 _stand_in(case, cases)
             found[name] = Inputs(case.recipe, digests[case.name])
+    for name, form in FORMS.items():
+        case = SurfaceFlowCase(form, 240.0, 10.0, 0.005, 1e-5, FEW_CELLS)
+        found[f"{name}: surface 1"] = Inputs(case.recipe, _written(case, cases))
     return found
 
 
@@ -99,7 +108,8 @@ def advice(names: list[str]) -> str:
         "Results that were made of the former inputs would be taken for theirs. If you "
         "did not mean to change them, undo it. Else raise `recipe` by one in the class "
         "of each kind that is named: flow FlowCase (orchestrator/flow/case.py), which "
-        "raises that of worn too; poured PouredBed (orchestrator/bed/poured.py); pile "
+        "raises that of worn too; surface SurfaceFlowCase "
+        "(orchestrator/flow/surface_case.py); poured PouredBed (orchestrator/bed/poured.py); pile "
         "PileCase (orchestrator/grains/pile.py); cells SingleGrainCase "
         f"(orchestrator/grains/cells.py). Then run `{COMMAND}` and commit "
         "tests/recipes/pinned.json with it."

@@ -1,44 +1,47 @@
-"""Flows over surfaces against measurements, against the flow in a section, and themselves.
+"""Flows over surfaces beside measurements, the flow in a section, and one another.
 
-python tools/surface_truth.py DIRECTORY [PART ...] > docs/measured/surfaces.csv
+`orchestrator validate --surfaces PART` runs them and makes ``measured/surfaces.csv``.
 
-The parts are ridge, turn, interval, piles and askervein; by default all, in an hour of one core. The
-cases in DIRECTORY run by hand as they lie; those that are there are not run again.
-
-- ridge: a ridge across the wind in three dimensions against today's flow over its bed line.
-- turn: a cone on a raster, with the wind turned by 30 degrees against the raster's axes.
+- ridge: a ridge across the wind in three dimensions against the flow over its bed line.
+- turn: a cone on a raster, with the wind turned against the raster's axes.
 - interval: a cone with other meshes, first cells and turbulence models.
-- piles: us/ur on cone and oval, by the areas that AP-42 (section 13.2.5, table 13.2.5-3) has of them.
+- piles: us/ur on cone and oval, by the areas that AP-42 (section 13.2.5) has of them.
 - askervein: the wind at 10 m over Askervein hill against the masts of 1983.
 
-No measured stress on the wall of a hill in three dimensions was found: none is compared here.
+No measured stress on the wall of a hill in three dimensions was found.
 """
 
-import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from orchestrator import plan
 from orchestrator.bed.surface import SPREAD_OF_SHAPE, Surface, cone, oval, surface_of
 from orchestrator.errors import Stalled
+from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs
 from orchestrator.flow import mesh3
 from orchestrator.flow.case import WALL_STRESS, FlowCase
+from orchestrator.flow.foam import BED_FLOW
 from orchestrator.flow.mesh3 import COARSE, STANDARD, Columns, Level, Sizes
 from orchestrator.flow.stress import WallStress
 from orchestrator.flow.surface_case import SurfaceFlowCase
 from orchestrator.flow.surface_stress import SurfaceStress
 from orchestrator.physics.velocity import log_law_speed
-from orchestrator.runs import case, engine
+from orchestrator.report.page import Section
 from orchestrator.runs.case import Case
 from orchestrator.study.method import FlowMethod
 from orchestrator.types import BoolArray, FloatArray
 
-HERE = Path(__file__).resolve().parents[1] / "docs/measured"
+MEASURED = Path(__file__).with_name("measured")
+SURFACES = MEASURED / "surfaces.csv"
+"""What the parts have given."""
 LIMIT_S = 7200.0
+"""Time that a run may take, s."""
 AIR = 1.5e-5
 """Kinematic viscosity, m2/s."""
 RIDGE, RIDGE_DEG_UP = 10.0, 15.0
@@ -47,8 +50,8 @@ PILE, BASE = 11.4, 14.6
 """Height and radius of the cone, m."""
 PILE_SLOPE = float(np.degrees(np.arctan(PILE / BASE)))
 OVAL_SLOPE, OVAL_LENGTH, OVAL_WIDTH = 37.0, 22.8, 11.4
-"""Of the oval: AP-42 gives a slope of 37 degrees and a flat top; its lengths are taken here
-as two heights and one."""
+"""Of the oval: AP-42 gives a slope of 37 degrees and a flat top; its lengths are
+taken here as two heights and one."""
 ROUGHNESS = 0.004
 """Roughness length of a coal pile, m."""
 ABOVE_PILE = 0.25
@@ -56,7 +59,7 @@ ABOVE_PILE = 0.25
 REFERENCE = 10.0
 """Height at which ur is read, m, and that of the masts."""
 QUICK = Level("quick", 8, 2, 1.25, 1.35, 50_000)
-"""A third of the cells of the coarse level: for ratios to the same mesh."""
+"""A third of the cells of the coarse level."""
 BANDS = (0.0, 0.4, 0.8, 1.0, np.inf)
 """Ends of the classes of us/ur, whose middles AP-42 names 0.2, 0.6, 0.9 and 1.1."""
 AREAS = {
@@ -77,6 +80,8 @@ ALONG_DEG, RIDGE_DEG = 43.0, 133.0
 """Where lines A and AA, and line B, go to, degrees from north."""
 TO_CP = 400.0
 """From the hilltop to the centre point along line B, m."""
+AT_MAST = "U/U_RS at 10 m"
+"""The wind at a mast over that at the reference site."""
 
 
 class Row(dict[str, object]):
@@ -84,22 +89,10 @@ class Row(dict[str, object]):
 
 
 def row(part: str, name: str, quantity: str, value: float, beside: float) -> Row:
-    """A value and what it is compared with, NaN where it is compared with nothing."""
+    """A value and what it is compared with, NaN where it stands alone."""
     return Row(
         part=part, case=name, quantity=quantity, value=value, compared_with=beside
     )
-
-
-def solve(one: Case, cases: Path) -> Path:
-    """The directory of a case, run if it has not been."""
-    if not case.done_state(one, cases):
-        engine.execute(one, cases, LIMIT_S)
-    return cases / one.name
-
-
-def stress_of(one: SurfaceFlowCase, cases: Path) -> SurfaceStress:
-    """The stress on the bed of a case."""
-    return one.stress(solve(one, cases))[0]
 
 
 @dataclass(frozen=True)
@@ -114,6 +107,12 @@ class RidgeFlow(SurfaceFlowCase):
     def parameters(self) -> dict[str, object]:
         """All that the flow depends on."""
         return {**super().parameters, "lines": self.has_its_lines}
+
+    @property
+    def needs(self) -> tuple[Case, ...]:
+        """The flow in the section."""
+        assert self.section is not None
+        return (self.section,)
 
     @cached_property
     def mesh(self) -> Columns:
@@ -148,8 +147,9 @@ def lines_of(section: FlowCase) -> FloatArray:
     return np.concatenate(lines)
 
 
-def ridge(cases: Path) -> Iterator[Row]:
-    """A ridge in three dimensions against its section, by the means of its two sides."""
+@cache
+def ridge_flows() -> dict[str, SurfaceFlowCase]:
+    """The flows over a ridge, on two meshes."""
     first = RIDGE / 40
     settings = FlowMethod(
         roughness=RIDGE / 600,
@@ -161,42 +161,44 @@ def ridge(cases: Path) -> Iterator[Row]:
         downstream=mesh3.DOWNSTREAM,
     )
     section = FlowCase(RIDGE, RIDGE_DEG_UP, settings)
-    plane = WallStress.from_csv(solve(section, cases) / WALL_STRESS)
-    face = RIDGE / np.tan(np.radians(RIDGE_DEG_UP))
-    level = Level("ridge", 40, 1, 1.1, 1.2, 10**6)
-    surface = cone(RIDGE, RIDGE_DEG_UP)
+    flows: dict[str, SurfaceFlowCase] = {}
     for name in ("grid lines of the section", "even cells"):
-        wide = RidgeFlow(
-            surface,
+        flows[name] = RidgeFlow(
+            cone(RIDGE, RIDGE_DEG_UP),
             270.0,
             10.0,
             RIDGE / 600,
             1e-5,
-            level,
+            Level("ridge", 40, 1, 1.1, 1.2, 10**6),
             first_cell_m=first,
             section=section,
             has_its_lines=name != "even cells",
         )
-        try:
-            directory = solve(wide, cases)
-        except Stalled:
-            # the velocity across is nothing but round-off, whose residual need not fall
-            directory = cases / wide.name
-        stress, _ = wide.stress(directory)
-        for side, ends in (("windward", (0.0, face)), ("lee", (face, 2 * face))):
-            of_wide = (stress.along_m > ends[0]) & (stress.along_m < ends[1])
-            of_plane = (plane.x_m > ends[0]) & (plane.x_m < ends[1])
-            ours = signed_ustar(stress.tau_along)[of_wide]
+    return flows
+
+
+def ridge(cases: Path) -> Iterator[Row]:
+    """A ridge in three dimensions against its section, by means of its sides."""
+    face = RIDGE / np.tan(np.radians(RIDGE_DEG_UP))
+    sides = {"windward": (0.0, face), "lee": (face, 2 * face)}
+    for name, one in ridge_flows().items():
+        (section,) = one.needs
+        plane = WallStress.from_csv(cases / section.name / WALL_STRESS)
+        stress = stress_of(one, cases)
+        # the whole stress along the slope, not its part along the wind
+        ours = np.sign(stress.tau_along) * stress.ustar_over_ustar0
+        for side, (start, end) in sides.items():
+            of_wide = (stress.along_m > start) & (stress.along_m < end)
+            of_plane = (plane.x_m > start) & (plane.x_m < end)
             theirs = plane.ustar_over_ustar0_wall[of_plane]
-            value = float(np.average(ours, weights=stress.area_m2[of_wide]))
+            value = float(np.average(ours[of_wide], weights=stress.area_m2[of_wide]))
             beside = float(np.average(theirs, weights=plane.length_m[of_plane]))
-            quantity = f"mean u*/u*_0, {side} side"
-            yield row("ridge", name, quantity, value, beside)
+            yield row("ridge", name, f"mean u*/u*_0, {side} side", value, beside)
 
 
-def signed_ustar(tau: FloatArray) -> FloatArray:
-    """Friction velocity of a stress, with its sign."""
-    return np.asarray(np.sign(tau) * np.sqrt(np.abs(tau)))
+def stress_of(one: SurfaceFlowCase, cases: Path) -> SurfaceStress:
+    """The stress on the bed of a case."""
+    return one.stress(cases / one.name)[0]
 
 
 def pile_flow(
@@ -235,35 +237,49 @@ def exceeded(values: FloatArray, area: FloatArray, share: float) -> float:
     return float(np.interp(share, part, values[order]))
 
 
-def turn(cases: Path) -> Iterator[Row]:
-    """A cone whose raster is turned against the wind, and against itself in the axes."""
+@cache
+def turn_flows() -> dict[str, SurfaceFlowCase]:
+    """The flows over a cone from three directions."""
     surface = cone(PILE, PILE_SLOPE)
-    first = measures(stress_of(pile_flow(surface), cases), PILE)
-    for turned_deg in (30.0, 90.0):
-        other = stress_of(pile_flow(surface, 270.0 - turned_deg), cases)
-        for quantity, value in measures(other, PILE).items():
-            name = f"by {turned_deg:g} deg"
-            yield row("turn", name, quantity, value, first[quantity])
+    names = {0.0: "by 0 deg", 30.0: "by 30 deg", 90.0: "by 90 deg"}
+    return {name: pile_flow(surface, 270.0 - turn) for turn, name in names.items()}
+
+
+def turn(cases: Path) -> Iterator[Row]:
+    """A cone whose raster is turned against the wind."""
+    return beside_the_first("turn", turn_flows(), cases)
+
+
+@cache
+def interval_flows() -> dict[str, SurfaceFlowCase]:
+    """The flows over a cone on other meshes, with other first cells and models."""
+    coarse = pile_flow(cone(PILE, PILE_SLOPE))
+    return {
+        "coarse": coarse,
+        "first cell h/20": replace(coarse, first_cell_m=PILE / 20),
+        "first cell h/80": replace(coarse, first_cell_m=PILE / 80),
+        "standard level": replace(coarse, level=STANDARD),
+        "RNGkEpsilon": replace(coarse, turbulence_model="RNGkEpsilon"),
+        "kOmegaSST": replace(coarse, turbulence_model="kOmegaSST"),
+    }
 
 
 def interval(cases: Path) -> Iterator[Row]:
-    """A cone with other meshes, first cells and models, each against the same mesh."""
-    surface = cone(PILE, PILE_SLOPE)
-    quick = pile_flow(surface, level=QUICK)
-    standard = pile_flow(surface, level=replace(STANDARD, ranks=1))
-    others = (
-        ("coarse level against quick", pile_flow(surface), quick),
-        ("first cell h/20", replace(quick, first_cell_m=PILE / 20), quick),
-        ("first cell h/80", replace(quick, first_cell_m=PILE / 80), quick),
-        ("RNGkEpsilon", replace(quick, turbulence_model="RNGkEpsilon"), quick),
-        ("kOmegaSST", replace(quick, turbulence_model="kOmegaSST"), quick),
-        ("standard level against coarse", standard, pile_flow(surface)),
-    )
-    for name, one, beside in others:
-        found = measures(stress_of(one, cases), PILE)
-        first = measures(stress_of(beside, cases), PILE)
-        for quantity, value in found.items():
-            yield row("interval", name, quantity, value, first[quantity])
+    """A cone with other meshes, first cells and models."""
+    return beside_the_first("interval", interval_flows(), cases)
+
+
+def beside_the_first(
+    part: str, flows: Mapping[str, SurfaceFlowCase], cases: Path
+) -> Iterator[Row]:
+    """Measures of the flows over a cone beside those of the first."""
+    found = {}
+    for name, one in flows.items():
+        found[name] = measures(stress_of(one, cases), PILE)
+    first, *others = found
+    for name in others:
+        for quantity, value in found[name].items():
+            yield row(part, name, quantity, value, found[first][quantity])
 
 
 def speed_over_bed(one: SurfaceFlowCase, directory: Path, above: float) -> FloatArray:
@@ -283,33 +299,41 @@ def reference_speed(one: SurfaceFlowCase, directory: Path) -> float:
     return float(log_law_speed(ustar0, REFERENCE, one.roughness_m))
 
 
-def piles(cases: Path) -> Iterator[Row]:
-    """Areas of AP-42's classes on the shapes that the tunnel had."""
+@cache
+def piles_flows() -> dict[str, SurfaceFlowCase]:
+    """The flows over the shapes that the tunnel had."""
     round_one = cone(PILE, PILE_SLOPE)
     long_one = oval(PILE, OVAL_SLOPE, OVAL_LENGTH, OVAL_WIDTH)
-    flows = [("cone", pile_flow(round_one))]
-    flows.append(("cone", pile_flow(round_one, roughness=3 * ROUGHNESS)))
+    flows = {}
+    for roughness in (ROUGHNESS, 3 * ROUGHNESS):
+        name = f"cone, z0 {1e3 * roughness:g} mm"
+        flows[name] = pile_flow(round_one, roughness=roughness)
     for angle in (0.0, 20.0, 40.0):
-        wind = pile_flow(long_one, 270.0 - angle, level=QUICK)
-        flows.append((f"oval, {angle:g} deg", wind))
-    for name, one in flows:
-        directory = solve(one, cases)
+        name = f"oval, {angle:g} deg"
+        flows[name] = pile_flow(long_one, 270.0 - angle, level=QUICK)
+    return flows
+
+
+def piles(cases: Path) -> Iterator[Row]:
+    """Areas of AP-42's classes on the shapes that the tunnel had."""
+    for name, one in piles_flows().items():
+        directory = cases / one.name
         ratio = speed_over_bed(one, directory, ABOVE_PILE)
         ratio /= reference_speed(one, directory)
-        stress, _ = one.stress(directory)
+        stress = stress_of(one, cases)
         form = on_form(stress, PILE)
         area = stress.area_m2[form]
         counts, _ = np.histogram(ratio[form], BANDS, weights=area)
+        of_epa = AREAS[name.partition(", z0")[0]]
         for band, count in enumerate(counts):
             quantity = f"us/ur from {BANDS[band]:g}, % of the area"
             share = 100 * float(count / area.sum())
-            label = f"{name}, z0 {1e3 * one.roughness_m:g} mm"
-            yield row("piles", label, quantity, share, AREAS[name][band])
+            yield row("piles", name, quantity, share, of_epa[band])
 
 
 def askervein_hill() -> Surface:
     """Askervein hill by the Copernicus model of heights, tapered to level ground."""
-    table = pd.read_csv(HERE / "askervein_terrain.csv", comment="#")
+    table = pd.read_csv(MEASURED / "askervein_terrain.csv", comment="#")
     x, y = np.unique(table["x_m"]), np.unique(table["y_m"])
     z = table.pivot(index="y_m", columns="x_m", values="z_m").to_numpy()
     rim = np.concatenate([z[0], z[-1], z[:, 0], z[:, -1]])
@@ -351,38 +375,53 @@ def at_places(
     return np.array(found)
 
 
+@cache
+def askervein_flows() -> dict[str, SurfaceFlowCase]:
+    """The flows over Askervein hill, on two meshes."""
+    surface = askervein_hill()
+    flows = {}
+    for level in HILLS:
+        flows[level.name] = SurfaceFlowCase(
+            surface, HILL_FROM_DEG, 16.0, HILL_ROUGHNESS, AIR, level
+        )
+    return flows
+
+
 def askervein(cases: Path) -> Iterator[Row]:
     """The wind at the masts over that at the reference site far upstream."""
-    surface = askervein_hill()
-    masts = pd.read_csv(HERE / "askervein_masts.csv", comment="#")
-    top = np.unravel_index(int(surface.z.argmax()), surface.z.shape)
-    hilltop = np.array([surface.x[top[1]], surface.y[top[0]]])
-    starts = {"A": hilltop, "B": hilltop, "AA": hilltop + TO_CP * towards(RIDGE_DEG)}
-    half = (surface.x[-1] - surface.x[0]) / 2 - TAPERED
-    for level in HILLS:
-        one = SurfaceFlowCase(surface, HILL_FROM_DEG, 16.0, HILL_ROUGHNESS, AIR, level)
-        directory = solve(one, cases)
-        reference = reference_speed(one, directory)
+    masts = pd.read_csv(MEASURED / "askervein_masts.csv", comment="#")
+    for one in askervein_flows().values():
         for line, table in masts.groupby("line"):
-            bearing = RIDGE_DEG if line == "B" else ALONG_DEG
-            along = 1000 * table["distance_km"].to_numpy()
-            places = starts[str(line)] + along[:, None] * towards(bearing)
-            is_in = np.all(np.abs(places - surface.centre) <= half, axis=1)
-            speeds = at_places(one, directory, places[is_in], REFERENCE) / reference
-            measured = table["speed_over_reference"].to_numpy()[is_in]
-            cells = f"{one.mesh.cells} cells, line {line}"
-            for place, value, beside in zip(
-                along[is_in], speeds, measured, strict=True
-            ):
-                name = f"{cells}, {place:.0f} m"
-                quantity = "U/U_RS at 10 m"
-                yield row("askervein", name, quantity, float(value), float(beside))
-            error = speeds - measured
-            rms = float(np.sqrt(np.mean(error**2)))
-            name = f"{cells}, {len(error)} masts"
-            yield row("askervein", name, "rms of the differences", rms, np.nan)
-            bias = float(error.mean())
-            yield row("askervein", name, "mean of the differences", bias, np.nan)
+            yield from _at_masts(one, cases / one.name, str(line), table)
+
+
+def _at_masts(
+    one: SurfaceFlowCase, directory: Path, line: str, masts: pd.DataFrame
+) -> Iterator[Row]:
+    """The wind at the masts of one line, and how far it is off all of them."""
+    surface = one.surface
+    top = np.unravel_index(int(surface.z.argmax()), surface.z.shape)
+    start = np.array([surface.x[top[1]], surface.y[top[0]]])
+    if line == "AA":
+        start = start + TO_CP * towards(RIDGE_DEG)
+    bearing = RIDGE_DEG if line == "B" else ALONG_DEG
+    along = 1000 * masts["distance_km"].to_numpy()
+    places = start + along[:, None] * towards(bearing)
+    half = (surface.x[-1] - surface.x[0]) / 2 - TAPERED
+    is_in = np.all(np.abs(places - surface.centre) <= half, axis=1)
+    speeds = at_places(one, directory, places[is_in], REFERENCE)
+    speeds /= reference_speed(one, directory)
+    measured = masts["speed_over_reference"].to_numpy()[is_in]
+    cells = f"{one.mesh.cells} cells, line {line}"
+    for place, value, beside in zip(along[is_in], speeds, measured, strict=True):
+        name = f"{cells}, {place:.0f} m"
+        yield row("askervein", name, AT_MAST, float(value), float(beside))
+    error = speeds - measured
+    name = f"{cells}, {len(error)} masts"
+    rms = float(np.sqrt(np.mean(error**2)))
+    yield row("askervein", name, "rms of the differences", rms, np.nan)
+    bias = float(error.mean())
+    yield row("askervein", name, "mean of the differences", bias, np.nan)
 
 
 def towards(bearing_deg: float) -> FloatArray:
@@ -391,29 +430,93 @@ def towards(bearing_deg: float) -> FloatArray:
     return np.array([np.sin(angle), np.cos(angle)])
 
 
+@dataclass(frozen=True)
+class Part:
+    """A comparison: its flows by name, and the rows of its table."""
+
+    flows: Callable[[], Mapping[str, SurfaceFlowCase]]
+    rows: Callable[[Path], Iterator[Row]]
+
+
 PARTS = {
-    "ridge": ridge,
-    "turn": turn,
-    "interval": interval,
-    "piles": piles,
-    "askervein": askervein,
+    "ridge": Part(ridge_flows, ridge),
+    "turn": Part(turn_flows, turn),
+    "interval": Part(interval_flows, interval),
+    "piles": Part(piles_flows, piles),
+    "askervein": Part(askervein_flows, askervein),
 }
+"""The comparisons by their names."""
 
 
-def main(directory: str, *parts: str) -> None:
-    """Run the parts and print the table."""
-    cases = Path(directory)
-    cases.mkdir(parents=True, exist_ok=True)
-    is_first = True
-    for part in parts or PARTS:
-        for one in PARTS[part](cases):
-            table = pd.DataFrame([one])
-            text = table.to_csv(
-                index=False, header=is_first, float_format="%.4g", lineterminator="\n"
-            )
-            print(text, end="", flush=True)
-            is_first = False
+def experiment(names: Sequence[str]) -> Experiment:
+    """Make the experiment that compares flows over surfaces.
+
+    Parameters
+    ----------
+    names
+        The comparisons, of `PARTS`.
+
+    Returns
+    -------
+    Experiment
+        Its runs, and their table.
+    """
+    runs: dict[str, list[Case]] = {}
+    for name in names:
+        runs[name] = [*PARTS[name].flows().values()]
+    ridges = {one.name for one in runs.get("ridge", ())}
+
+    def results(found: Runs) -> Results:
+        listed: list[Row] = []
+        for name in names:
+            ended = [
+                one.name in found.done or (found.cases / one.name / BED_FLOW).is_file()
+                for one in runs[name]
+            ]
+            if all(ended):
+                listed += PARTS[name].rows(found.cases)
+        if not listed:
+            return {}, ()
+        table = pd.DataFrame(listed)
+        return {"surfaces": table}, [section(table)]
+
+    planned = plan.Plan({}, {}, (), {}, plan.listed([*chain(*runs.values())]))
+    return Experiment(
+        "surfaces",
+        "Flows over surfaces beside measurements",
+        planned,
+        results,
+        LIMIT_S,
+        # the velocity across a ridge is nothing but round-off, whose residual need not
+        # fall
+        verdicts=(Stalled.__name__,),
+        failing=planned.cases.keys() - ridges,
+    )
 
 
-if __name__ == "__main__":
-    main(*sys.argv[1:])
+def section(table: pd.DataFrame) -> Section:
+    """Make the section of a page that has the comparisons.
+
+    Parameters
+    ----------
+    table
+        Their table.
+
+    Returns
+    -------
+    Section
+        All rows but those of single masts.
+    """
+    few = table[table["quantity"] != AT_MAST]
+    return Section("Beds in three dimensions", TEXTS["surface"]["truth"], (), [few])
+
+
+def stored() -> pd.DataFrame:
+    """Read the table of the comparisons as they came out before.
+
+    Returns
+    -------
+    DataFrame
+        Part, case, quantity, value and what it is compared with.
+    """
+    return pd.read_csv(SURFACES)

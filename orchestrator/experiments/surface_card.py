@@ -1,0 +1,205 @@
+"""The answer on a surface in words: the card, and the sentences below it."""
+
+from collections.abc import Iterator, Sequence
+from functools import cache
+from math import ceil, isfinite, log10
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pandas as pd
+
+from orchestrator.grains import onset
+from orchestrator.report.card import Card, Number, Worth
+from orchestrator.report.subjects import length
+
+if TYPE_CHECKING:
+    from orchestrator.experiments.surface import Answer, Direction
+
+SURFACES = Path(__file__).with_name("measured") / "surfaces.csv"
+"""Flows over surfaces beside others: `orchestrator validate --surfaces all`."""
+HALF, TENTH = 0.5, 0.1
+"""Shares of the surface whose hours or winds the answer has."""
+EXCEEDED = {
+    onset.STARTS: "u*/u*_0 that 1 % of the area exceeds",
+    HALF: "u*/u*_0 that half of the area exceeds",
+}
+"""Stresses of that table, by the share of the surface whose wind they decide."""
+LITTLE = 0.005
+"""Share of the surface that is not worth a word."""
+NOT_MEASURED = (
+    "wall stress over a bed in three dimensions has not been measured; the wind over "
+    "Askervein hill is met within 0.04 to 0.12 of the reference speed"
+)
+INTERVAL_OF = "other first cells, meshes and models, on a cone"
+WORTH = Worth(
+    "care",
+    "usable, to compare directions and parts",
+    "Take the interval: it is that of the flow alone, and the threshold of the grain "
+    "has its own.",
+)
+
+
+def card(found: Sequence["Answer"], source: str) -> Card:
+    """Make the answer card of surfaces: that of the one which moves first.
+
+    Parameters
+    ----------
+    found
+        The answers.
+    source
+        Where a given threshold is from, in words.
+
+    Returns
+    -------
+    Card
+        The wind in which motion starts, that in which half of the surface moves, and
+        the hours a year by the wind rose or the share that moves before flat ground.
+    """
+    first = min(found, key=lambda answer: answer.easiest.starts)
+    others = f"; {len(found)} surfaces are compared below" if len(found) > 1 else ""
+    directions = [f"{each.from_deg:g}°" for each in first.directions]
+    winds = f"wind from {', '.join(directions)}"
+    if len(directions) > 4:
+        winds = f"wind from {len(directions)} directions"
+    return Card(
+        "In which wind does this surface start to move, and how much of it moves?",
+        f"{first.name}; {_grain(first, source)}; {winds}{others}.",
+        tuple(_numbers(first)),
+        NOT_MEASURED,
+        WORTH,
+    )
+
+
+def _grain(answer: "Answer", source: str) -> str:
+    """What lies on the surface, in words."""
+    ground = answer.ground
+    if ground.threshold is not None:
+        return f"threshold friction velocity {ground.threshold:.3g} m/s{source}"
+    return f"grains of {length(ground.grain.diameter)}"
+
+
+def _numbers(answer: "Answer") -> Iterator[Number]:
+    """The figures of the card."""
+    first = answer.easiest
+    flat = answer.ground.flat
+    yield _wind(
+        first,
+        onset.STARTS,
+        f"wind at 10 m from {first.from_deg:g}° in which motion starts",
+        f"first at {_place(answer)}; on flat ground in {flat:.3g} m/s",
+    )
+    if isfinite(first.shares().wind_for(HALF)):
+        what = f"wind at 10 m from {first.from_deg:g}° in which half of it moves"
+        yield _wind(first, HALF, what)
+    if answer.rose is not None:
+        yield Number(
+            answer.hours_of(TENTH),
+            "hours a year",
+            "in which a tenth of it moves or more, by the wind rose",
+            f"some of it {answer.hours_of(onset.STARTS):.0f}, "
+            f"half of it {answer.hours_of(HALF):.0f} hours",
+            decimals=0,
+        )
+        return
+    low, high = factors_of_wind(HALF)
+    least, share, most = first.shares().at([flat / high, flat, flat / low])
+    yield Number(
+        100 * float(share),
+        "%",
+        f"of it moves in {flat:.3g} m/s, the wind that moves flat ground",
+        low=100 * float(least),
+        high=100 * float(most),
+        interval_of=INTERVAL_OF,
+        decimals=0,
+    )
+
+
+def _wind(direction: "Direction", share: float, meaning: str, note: str = "") -> Number:
+    """The wind in which a share of a surface moves, with its interval."""
+    wind = direction.shares().wind_for(share)
+    low, high = factors_of_wind(share)
+    return Number(
+        wind,
+        "m/s",
+        meaning,
+        note,
+        low=low * wind,
+        high=high * wind,
+        interval_of=INTERVAL_OF,
+    )
+
+
+@cache
+def factors_of_wind(share: float) -> tuple[float, float]:
+    """Find how far other flows move the wind in which a share of a surface moves.
+
+    The wind is inverse to the stress.
+
+    Parameters
+    ----------
+    share
+        The share, of `EXCEEDED`.
+
+    Returns
+    -------
+    low, high : float
+        The least and the largest factor, which 1 lies between.
+    """
+    table = pd.read_csv(SURFACES)
+    is_meant = (table["part"] == "interval") & (table["quantity"] == EXCEEDED[share])
+    factors = table["compared_with"][is_meant] / table["value"][is_meant]
+    return min(1.0, float(factors.min())), max(1.0, float(factors.max()))
+
+
+def _place(answer: "Answer") -> str:
+    """Where motion starts, in the axes of the file."""
+    row = answer.easiest.first
+    digits = max(0, ceil(1 - log10(answer.cell_m)))
+    x = f"x = {row['x_m']:.{digits}f} m"
+    y = f"y = {row['y_m']:.{digits}f} m"
+    return f"{x}, {y}, {row['z_m']:.3g} m high"
+
+
+def sentences(answer: "Answer", source: str) -> Iterator[str]:
+    """Say what qualifies an answer.
+
+    Parameters
+    ----------
+    answer
+        The answer.
+    source
+        Where a given threshold is from, in words.
+
+    Yields
+    ------
+    str
+        A sentence.
+    """
+    first = answer.easiest
+    shares = first.shares()
+    yield (
+        f"On {answer.name} ({_grain(answer, source)}) motion starts in a wind of "
+        f"{first.starts:.3g} m/s at 10 m from {first.from_deg:g}°. "
+        f"A tenth of the surface moves in {shares.wind_for(TENTH):.3g} m/s."
+    )
+    if len(answer.directions) > 1:
+        last = max(answer.directions, key=lambda each: each.starts)
+        yield (
+            f"From {last.from_deg:g}° motion starts at {last.starts:.3g} m/s, "
+            f"of the {len(answer.directions)} directions the highest."
+        )
+    leaves = first.leaves
+    if leaves is not None:
+        yield (
+            "Motion is that of grains that leave in a gust and go on after it; "
+            f"without gusts grains leave their pockets at {leaves:.3g} m/s."
+        )
+    said = "; ".join(answer.smooth.said)
+    yield f"The surface is {said}: {answer.smooth.relief:.4g} m high in the flow."
+    loose = max(each.loose for each in answer.directions)
+    if loose > LITTLE:
+        angle = 90 - answer.ground.grain.entrainment_angle_deg
+        yield (
+            f"{loose:.0%} of it is steeper than {angle:g}° of the pockets of its "
+            "grains, which lie loose there: it is left out."
+        )
