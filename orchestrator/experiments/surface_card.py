@@ -4,16 +4,13 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from math import ceil, isfinite, log10
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pandas as pd
 
+from orchestrator.experiments.surface_answer import Answer, Direction
 from orchestrator.grains import onset
 from orchestrator.report.card import Card, Number, Worth
 from orchestrator.report.subjects import length
-
-if TYPE_CHECKING:
-    from orchestrator.experiments.surface import Answer, Direction
 
 SURFACES = Path(__file__).with_name("measured") / "surfaces.csv"
 """Flows over surfaces beside others: `orchestrator validate --surfaces all`."""
@@ -39,7 +36,7 @@ WORTH = Worth(
 )
 
 
-def card(found: Sequence["Answer"], source: str) -> Card:
+def card(found: Sequence[Answer], source: str) -> Card:
     """Make the answer card of surfaces: that of the one which moves first.
 
     Parameters
@@ -70,7 +67,7 @@ def card(found: Sequence["Answer"], source: str) -> Card:
     )
 
 
-def _grain(answer: "Answer", source: str) -> str:
+def _grain(answer: Answer, source: str) -> str:
     """What lies on the surface, in words."""
     ground = answer.ground
     if ground.threshold is not None:
@@ -78,7 +75,7 @@ def _grain(answer: "Answer", source: str) -> str:
     return f"grains of {length(ground.grain.diameter)}"
 
 
-def _numbers(answer: "Answer") -> Iterator[Number]:
+def _numbers(answer: Answer) -> Iterator[Number]:
     """The figures of the card."""
     first = answer.easiest
     flat = answer.ground.flat
@@ -114,7 +111,7 @@ def _numbers(answer: "Answer") -> Iterator[Number]:
     )
 
 
-def _wind(direction: "Direction", share: float, meaning: str, note: str = "") -> Number:
+def _wind(direction: Direction, share: float, meaning: str, note: str = "") -> Number:
     """The wind in which a share of a surface moves, with its interval."""
     wind = direction.shares().wind_for(share)
     low, high = factors_of_wind(share)
@@ -151,7 +148,7 @@ def factors_of_wind(share: float) -> tuple[float, float]:
     return min(1.0, float(factors.min())), max(1.0, float(factors.max()))
 
 
-def _place(answer: "Answer") -> str:
+def _place(answer: Answer) -> str:
     """Where motion starts, in the axes of the file."""
     row = answer.easiest.first
     digits = max(0, ceil(1 - log10(answer.cell_m)))
@@ -160,7 +157,7 @@ def _place(answer: "Answer") -> str:
     return f"{x}, {y}, {row['z_m']:.3g} m high"
 
 
-def sentences(answer: "Answer", source: str) -> Iterator[str]:
+def sentences(answer: Answer, source: str) -> Iterator[str]:
     """Say what qualifies an answer.
 
     Parameters

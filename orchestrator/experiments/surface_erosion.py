@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator import plan
-from orchestrator.experiments import erosion, surface
+from orchestrator.experiments import erosion, surface, surface_answer
 from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs
 from orchestrator.experiments.surfaces import SurfaceScene, SurfaceStudy
 from orchestrator.flow.surface_case import SURFACE_STRESS, SurfaceFlowCase
@@ -31,7 +31,7 @@ def surface_of(
     scene
         The pile under the wind of one direction.
     faces
-        The faces of the form, as `surface.Ground.faces` lists them, with the slope
+        The faces of the form, as `surface_answer.Ground.faces` lists them, with the slope
         along the wind in ``uphill``.
     threshold
         u*_t, m/s.
@@ -49,7 +49,7 @@ def surface_of(
         "z_m": faces["z_m"],
         "part": np.where(is_level, "top", side),
         "share": faces["area_m2"],
-        "ratio": faces[surface.RATIO],
+        "ratio": faces[surface_answer.RATIO],
     }
     name = f"wind from {scene.flow.from_deg:g}°"
     over_wind = float(log_law_ustar(1.0, WIND_HEIGHT, scene.solve_roughness))
@@ -130,7 +130,7 @@ def piles(
             ground = surface.ground_of(scene, least)
             stress = SurfaceStress.from_csv(cases / flows[scene].name / SURFACE_STRESS)
             faces = ground.faces(stress, scene.flow.from_deg)
-            direction = surface.Direction(
+            direction = surface_answer.Direction(
                 scene.flow.from_deg, faces, scene.heights.relief
             )
             surfaces.append(surface_of(scene, direction.form, ground.level_ustar))

@@ -1,0 +1,309 @@
+"""A surface under the winds of some directions: what lies on it, and where it moves."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from orchestrator.bed.surface import OF_GROUND, Surface
+from orchestrator.flow.mesh3 import wind_axes
+from orchestrator.flow.surface_stress import SurfaceStress
+from orchestrator.grains import onset
+from orchestrator.grains.onset import Shares
+from orchestrator.physics.threshold import SingleGrain
+from orchestrator.report.maps import Grid
+from orchestrator.types import FloatArray
+
+MOVES = "wind_m_s"
+LEAVES, GOES_ON = "wind_leaves_m_s", "wind_goes_on_m_s"
+"""Columns of faces: winds in which a grain moves, leaves its pocket, and goes on."""
+RATIO = "ustar_over_ustar0"
+LEAST, HOURS = "least_wind_m_s", "hours_a_year"
+"""Maps of the least wind of all directions, and of the hours a year."""
+STARTS = "starts, m/s"
+FIRST_LEAVES = "first leaves, m/s"
+"""Columns of directions: wind in which motion starts, and the first grains leave."""
+ASKED_SHARES = (0.1, 0.5)
+"""Shares of the surface whose winds the answer has."""
+PER_CELL = 2.0
+"""Steps of the raster of maps in a cell of the flow, at least."""
+
+
+@dataclass(frozen=True)
+class Ground:
+    """What lies on a surface: one grain, and the force law or a given threshold.
+
+    Attributes
+    ----------
+    grain
+        The grain in its pocket.
+    law
+        Name of the force law.
+    roughness
+        Roughness length of the ground under the wind, m.
+    is_natural
+        Whether grains count that go on, as in natural fluids, or all that leave.
+    threshold
+        u*_t of every face, m/s; None for the closed form.
+    """
+
+    grain: SingleGrain
+    law: str
+    roughness: float
+    is_natural: bool = True
+    threshold: float | None = None
+
+    def winds(self, local: FloatArray, ratio: FloatArray) -> FloatArray:
+        """Winds at 10 m at which local friction velocities are reached, m/s, (F,)."""
+        return onset.wind_of(onset.undisturbed(local, ratio), self.roughness)
+
+    @property
+    def level_ustar(self) -> float:
+        """Friction velocity at which the grain moves on flat ground, m/s."""
+        if self.threshold is not None:
+            return self.threshold
+        level = np.zeros(1)
+        leaving, going = self._local(level, level)
+        return float((going if self.is_natural else leaving)[0])
+
+    @property
+    def flat(self) -> float:
+        """Wind at 10 m at which the grain moves on flat ground, m/s."""
+        return float(onset.wind_of(self.level_ustar, self.roughness))
+
+    def faces(self, stress: SurfaceStress, from_deg: float) -> pd.DataFrame:
+        """List the faces of a bed with the wind at which each moves.
+
+        Parameters
+        ----------
+        stress
+            The stress on them by the flow of one direction.
+        from_deg
+            Where the wind comes from, degrees.
+
+        Returns
+        -------
+        DataFrame
+            A row for each face: place, area, slope, slope along the wind, angle of the
+            stress to the way up the slope, u*/u*_0, and the wind `MOVES`; with the
+            closed form also `LEAVES` and `GOES_ON`, NaN where grains lie loose.
+        """
+        slope = onset.slopes_deg(stress.normal)
+        heading = onset.headings_deg(stress.normal, stress.tau)
+        ratio = stress.ustar_over_ustar0
+        columns = {
+            "x_m": stress.x_m,
+            "y_m": stress.y_m,
+            "z_m": stress.z_m,
+            "along_m": stress.along_m,
+            "across_m": stress.across_m,
+            "area_m2": stress.area_m2,
+            "slope_deg": slope,
+            "uphill": -(stress.normal[:, :2] @ wind_axes(from_deg)[0]),
+            "heading_deg": heading,
+            RATIO: ratio,
+        }
+        if self.threshold is not None:
+            local = np.full_like(ratio, self.threshold)
+            return pd.DataFrame({**columns, MOVES: self.winds(local, ratio)})
+        leaving, going = self._local(slope, heading)
+        columns |= {
+            LEAVES: self.winds(leaving, ratio),
+            GOES_ON: self.winds(going, ratio),
+        }
+        columns[MOVES] = columns[GOES_ON] if self.is_natural else columns[LEAVES]
+        return pd.DataFrame(columns)
+
+    def _local(
+        self, slope: FloatArray, heading: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Local u* at which a grain leaves, and goes on, m/s; NaN where it is loose."""
+        leaving = onset.leaves(self.grain, self.law, slope, heading)
+        is_loose = leaving == 0
+        going = onset.goes_on(self.grain, leaving, slope, heading)
+        return np.where(is_loose, np.nan, leaving), np.where(is_loose, np.nan, going)
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A bed under the wind of one direction.
+
+    Attributes
+    ----------
+    from_deg
+        Where the wind comes from, degrees.
+    every
+        All faces, also those of the flat ground.
+    relief
+        Height of the form, m.
+    """
+
+    from_deg: float
+    every: pd.DataFrame
+    relief: float
+
+    @cached_property
+    def form(self) -> pd.DataFrame:
+        """The faces of the form."""
+        return self.every[self.every["z_m"].abs() > OF_GROUND * self.relief]
+
+    @cached_property
+    def faces(self) -> pd.DataFrame:
+        """The faces of the form on which grains lie."""
+        return self.form[self.form[MOVES].notna()]
+
+    @property
+    def loose(self) -> float:
+        """Share of the form on which grains roll without a flow."""
+        is_loose = self.form[MOVES].isna()
+        area = self.form["area_m2"]
+        return float(area[is_loose].sum() / area.sum())
+
+    def shares(self, column: str = MOVES) -> Shares:
+        """The share of the form that moves, against the wind."""
+        wind = self.faces[column].fillna(np.inf).to_numpy(float)
+        return Shares.of(wind, self.faces["area_m2"].to_numpy(float))
+
+    @property
+    def first(self) -> "pd.Series[float]":
+        """The face that moves first."""
+        return self.faces.iloc[int(self.faces[MOVES].to_numpy(float).argmin())]
+
+    @cached_property
+    def starts(self) -> float:
+        """Wind at which motion starts, m/s."""
+        return self.shares().wind_for(onset.STARTS)
+
+    @property
+    def leaves(self) -> float | None:
+        """Wind in which the first grains leave without gusts, m/s; None if that is one.
+
+        It is the wind in which motion starts where no grain goes on.
+        """
+        if LEAVES not in self.faces or self.faces[LEAVES].equals(self.faces[MOVES]):
+            return None
+        return self.shares(LEAVES).wind_for(onset.STARTS)
+
+    @property
+    def word(self) -> str:
+        """The direction in names of files."""
+        return f"{self.from_deg:g}"
+
+    @property
+    def title(self) -> str:
+        """The direction in words."""
+        return f"wind from {self.from_deg:g}°"
+
+    def row(self) -> dict[str, Any]:
+        """Its numbers, a row of the table of directions."""
+        shares = self.shares()
+        first = self.first
+        row = {
+            "from_deg": self.from_deg,
+            STARTS: self.starts,
+            "x_m": first["x_m"],
+            "y_m": first["y_m"],
+            "z_m": first["z_m"],
+        }
+        for share in ASKED_SHARES:
+            row[_of(share)] = shares.wind_for(share)
+        if LEAVES in self.faces:
+            leaving = self.shares(LEAVES)
+            row[FIRST_LEAVES] = leaving.wind_for(onset.STARTS)
+            row["half leaves, m/s"] = leaving.wind_for(0.5)
+        area = self.faces["area_m2"]
+        ratio = self.faces[RATIO]
+        row["mean u*/u*₀"] = float(np.average(ratio, weights=area))
+        row["largest u*/u*₀"] = float(ratio.max())
+        row["loose, %"] = 100 * self.loose
+        return row
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A surface with what lies on it under the winds of some directions.
+
+    Attributes
+    ----------
+    name
+        The bed in a few words.
+    surface
+        The surface as it was read.
+    ground
+        What lies on it.
+    directions
+        The winds.
+    cell_m
+        Length of the flow's cells over the form, m.
+    rose
+        The table of a wind rose; None without one.
+    """
+
+    name: str
+    surface: Surface
+    ground: Ground
+    directions: Sequence[Direction]
+    cell_m: float
+    rose: pd.DataFrame | None = None
+
+    @cached_property
+    def smooth(self) -> Surface:
+        """The surface as the flow has it."""
+        return self.surface.smoothed(self.cell_m)
+
+    @cached_property
+    def grid(self) -> Grid:
+        """The raster of the maps: nodes of the file, as near as the flow has detail."""
+        axes = []
+        steps = self.surface.steps
+        for axis, step in zip((self.surface.x, self.surface.y), steps, strict=True):
+            every = max(int(self.cell_m / PER_CELL / step), 1)
+            axes.append(axis[::every])
+        x, y = axes
+        height = self.smooth.at(x, y[:, None])
+        is_form = np.abs(height) > OF_GROUND * self.smooth.relief
+        return Grid(x, y, height, is_form)
+
+    @cached_property
+    def easiest(self) -> Direction:
+        """The direction from which motion starts at the least wind."""
+        return min(self.directions, key=lambda each: each.starts)
+
+    @cached_property
+    def maps(self) -> Mapping[str, FloatArray]:
+        """The maps by name: of each direction, the least wind of all, and hours."""
+        found = {}
+        for each in self.directions:
+            columns = [c for c in (RATIO, MOVES, LEAVES, GOES_ON) if c in each.every]
+            for column, values in self.grid.of_faces(each.every, columns).items():
+                found[f"{column}-{each.word}"] = values
+        winds = [found[f"{MOVES}-{each.word}"] for each in self.directions]
+        found[LEAST] = np.fmin.reduce(winds)
+        if self.rose is not None:
+            found[HOURS] = self._hours(winds)
+        return found
+
+    def _hours(self, winds: Sequence[FloatArray]) -> FloatArray:
+        """The map of the hours a year in which each part moves."""
+        assert self.rose is not None
+        total = np.zeros_like(winds[0])
+        for each, wind in zip(self.directions, winds, strict=True):
+            total += onset.hours(wind, each.from_deg, self.rose)
+        return total
+
+    def hours_of(self, share: float) -> float:
+        """Hours a year in which at least this share of the surface moves."""
+        assert self.rose is not None
+        total = 0.0
+        for each in self.directions:
+            wind = np.array([each.shares().wind_for(share)])
+            total += float(onset.hours(wind, each.from_deg, self.rose)[0])
+        return total
+
+
+def _of(share: float) -> str:
+    """The column of the wind in which a share of the surface moves."""
+    return f"{share:.0%}, m/s"
