@@ -31,8 +31,8 @@ def surface_of(
     scene
         The pile under the wind of one direction.
     faces
-        The faces of the form, as `surface_answer.Ground.faces` lists them, with the slope
-        along the wind in ``uphill``.
+        The faces of the form, as `surface_answer.Ground.faces` lists them, with the
+        slope along the wind in ``uphill``.
     threshold
         u*_t, m/s.
 
