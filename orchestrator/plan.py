@@ -44,10 +44,21 @@ BY_DEM = (
 class Plan:
     """How the scenes of a study are answered, and by which cases.
 
-    By the id of the scene that was asked for: `decisions`, `piles`, `checks`, piles by
-    DEM that check an answer without DEM, and `smoothings`, noisy profiles with other
-    smoothing, by its factor. Each of the `cells` answers its single grains. `cases` has
-    every run once, by name, after those whose results it needs.
+    Attributes
+    ----------
+    decisions
+        The decisions, by the id of the scene that was asked for.
+    piles
+        The piles that answer, by the same id.
+    cells
+        Cases of single grains, each of which answers its grains.
+    checks
+        Piles by DEM that check an answer without DEM, by the same id.
+    cases
+        Every run once, by name, after those whose results it needs.
+    smoothings
+        Noisy profiles with other smoothing, by the same id and by the factor of the
+        smoothing.
     """
 
     decisions: dict[str, Decision]
@@ -92,10 +103,22 @@ class Plan:
     def done(
         self, directory: Path, but: Container[str] = ()
     ) -> dict[str, dict[str, Any]]:
-        """The markers of the cases that are done, by name, but for some.
+        """Read the markers of the cases that are done.
 
         Results are checked. A case that other code has made, and that the code as it is
         now would make otherwise, is not done; nor is one that needs such a case.
+
+        Parameters
+        ----------
+        directory
+            The directory of the cases.
+        but
+            Names of cases that are left out.
+
+        Returns
+        -------
+        dict of str to dict
+            The markers, by name.
         """
         names = [name for name in self.cases if name not in but]
         with ThreadPoolExecutor() as pool:  # gigabytes of results are read
@@ -120,9 +143,19 @@ class Plan:
         return done
 
     def missing(self, directory: Path, done: Container[str]) -> dict[str, Case]:
-        """The cases to be run, by name.
+        """List the cases to be run.
 
-        They are those not `done`, and those pruned that they need.
+        Parameters
+        ----------
+        directory
+            The directory of the cases.
+        done
+            Names of the cases that are done.
+
+        Returns
+        -------
+        dict of str to Case
+            Those not done, and those pruned that they need, by name.
         """
         missing = {name: case for name, case in self.cases.items() if name not in done}
         starts = (
@@ -143,6 +176,11 @@ def make(study: Study, cases: Path | None = None) -> Plan:
     cases
         The directory of the runs, where the grains of poured beds are read.
 
+    Returns
+    -------
+    Plan
+        The plan.
+
     Raises
     ------
     InputError
@@ -160,7 +198,22 @@ def of(
     checks: Mapping[str, Decision] | None = None,
     cases: Path | None = None,
 ) -> Plan:
-    """List the cases that some decisions and some `checks` need."""
+    """List the cases that some decisions and some `checks` need.
+
+    Parameters
+    ----------
+    decisions
+        The decisions, by the id of the asked scene.
+    checks
+        Decisions on piles by DEM that check answers, by the same id.
+    cases
+        The directory of the runs, where the grains of poured beds are read.
+
+    Returns
+    -------
+    Plan
+        The plan.
+    """
     piles = _piles(decisions, cases)
     checking = _piles(checks or {}, cases)
     scenes = [answer.scene for asked, answer in decisions.items() if asked not in piles]
@@ -191,9 +244,17 @@ def _piles(decisions: Mapping[str, Decision], cases: Path | None) -> dict[str, P
 
 
 def listed(cases: Iterable[Case]) -> dict[str, Case]:
-    """Some cases and all that they need, by name.
+    """List some cases and all that they need.
 
-    Each is there once, behind those whose results it needs.
+    Parameters
+    ----------
+    cases
+        The cases.
+
+    Returns
+    -------
+    dict of str to Case
+        Each case once, by name, behind those whose results it needs.
     """
     found: dict[str, Case] = {}
 
@@ -208,9 +269,21 @@ def listed(cases: Iterable[Case]) -> dict[str, Case]:
 
 
 def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
-    """Say in lines of text what a study would run.
+    """Say what a study would run.
 
-    They have scenes with their regimes, cases by kind, expected time and disk.
+    Parameters
+    ----------
+    study
+        The study.
+    directory
+        The directory of the cases.
+    workers
+        How many cases run at a time.
+
+    Yields
+    ------
+    str
+        Lines of text: scenes with their regimes, cases by kind, expected time and disk.
     """
     plan = make(study, directory)
     regimes = _counted(regime_of(scene) for scene in study.scenes)
@@ -229,7 +302,22 @@ def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
 
 
 def expected(plan: Plan, directory: Path, workers: int) -> Iterator[str]:
-    """Lines of text: the cases of a plan by kind, expected time and disk."""
+    """Say how long the cases of a plan take.
+
+    Parameters
+    ----------
+    plan
+        The plan.
+    directory
+        The directory of the cases.
+    workers
+        How many cases run at a time.
+
+    Yields
+    ------
+    str
+        Lines of text: cases by kind, expected time and disk.
+    """
     missing = plan.missing(directory, plan.done(directory)).values()
     kinds, todo = (
         _counted(case.kind for case in each) for each in (plan.cases.values(), missing)
@@ -250,7 +338,14 @@ def expected(plan: Plan, directory: Path, workers: int) -> Iterator[str]:
 
 
 def pace() -> float:
-    """How much longer a fixed calculation takes than where cases' times were found."""
+    """Measure how slow this machine is.
+
+    Returns
+    -------
+    float
+        Time of a fixed calculation over that on the machine on which the cases' times
+        were found.
+    """
     sort = partial(np.sort, np.random.default_rng(0).random(100_000), kind="stable")
     return min(timeit.repeat(sort, timer=time.process_time, number=1)) / SORT_S
 

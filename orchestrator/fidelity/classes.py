@@ -59,6 +59,18 @@ def scene_class(part: str, scene: Scene) -> str:
     For the flow it names how the stress is read, and what the flow goes over or under.
     For the grains it names their packing, and whether lift takes them off before they
     roll.
+
+    Parameters
+    ----------
+    part
+        `FLOW` or `GRAINS`.
+    scene
+        The scene of a pile.
+
+    Returns
+    -------
+    str
+        The name of the class.
     """
     if part == FLOW:
         return _flow_class(scene)
@@ -107,14 +119,36 @@ def _grain_class(scene: Scene) -> str:
 
 
 def is_curved(bed: PileBed) -> bool:
-    """Whether a bed has no edge where a row of grains could begin to leave."""
+    """Whether a bed has no edge where a row of grains could begin to leave.
+
+    Parameters
+    ----------
+    bed
+        The bed.
+
+    Returns
+    -------
+    bool
+        Whether it has none.
+    """
     if bed.profile or bed.brink_radius or bed.windward == "curved":
         return True
     return bed.shape in CURVED_SHAPES
 
 
 def is_small(scene: Scene) -> bool:
-    """Whether so few grains are counted that a tenth of them is a few."""
+    """Whether so few grains are counted that a tenth of them is a few.
+
+    Parameters
+    ----------
+    scene
+        The scene of a pile.
+
+    Returns
+    -------
+    bool
+        Whether fewer than `LEAST_COUNTED` are counted.
+    """
     bed = scene.bed
     assert isinstance(bed, PileBed)
     line = of_bed(bed)
@@ -130,21 +164,51 @@ def _is_random(bed: PileBed) -> bool:
 
 
 def is_limiting(scene: Scene) -> bool:
-    """Whether the slope is near that on which grains leave without any flow."""
+    """Whether the slope is near that on which grains leave without any flow.
+
+    Parameters
+    ----------
+    scene
+        The scene of a pile.
+
+    Returns
+    -------
+    bool
+        Whether it is.
+    """
     return scene.limiting_slope_deg - scene.bed.slope_deg < LIMITING_DEG
 
 
 def lift_over_weight(scene: Scene) -> float:
-    """Lift over the weight normal to the bed when a grain would roll.
+    """Compute lift over the weight normal to the bed when a grain would roll.
 
-    Above 1 the grain is gone before it rolls.
+    Parameters
+    ----------
+    scene
+        The scene.
+
+    Returns
+    -------
+    float
+        The ratio; above 1 the grain is gone before it rolls.
     """
     normal = scene.weight * math.cos(math.radians(scene.bed.slope_deg))
     return float(closed_form(scene).lift) / normal
 
 
 def unmeasured(scene: Scene) -> str:
-    """The property of a pile for which nothing was measured, in words, or empty."""
+    """Name the property of a pile for which nothing was measured.
+
+    Parameters
+    ----------
+    scene
+        The scene of a pile.
+
+    Returns
+    -------
+    str
+        The property in words; empty where there is none.
+    """
     lift = lift_over_weight(scene)
     if lift > LIFTED_TO:
         return f"a lift of {lift:.3g} times the weight normal to the bed"

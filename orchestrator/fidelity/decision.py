@@ -193,7 +193,20 @@ def _leaving(scene: Scene, tolerance: float | None) -> Decision:
 
 
 def as_written(scene: Scene, why: str = "") -> Decision:
-    """The decision to answer a scene as it is written; `why` adds to its method."""
+    """Decide to answer a scene as it is written.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    why
+        A reason in words, beside that of the method.
+
+    Returns
+    -------
+    Decision
+        The decision.
+    """
     answer = written(scene)
     why = "; ".join(filter(None, (method_of(scene)[1], why)))
     if not isinstance(answer.bed, PileBed):
@@ -208,7 +221,24 @@ def as_written(scene: Scene, why: str = "") -> Decision:
 def on_fidelity(
     scene: Scene, fidelity: Fidelity, why: str, *, is_chosen: bool = False
 ) -> Decision:
-    """The decision to answer a pile by a fidelity."""
+    """Decide to answer a pile by a fidelity.
+
+    Parameters
+    ----------
+    scene
+        The scene of a pile.
+    fidelity
+        The fidelity.
+    why
+        The reason, in words.
+    is_chosen
+        Whether it was chosen by its known error.
+
+    Returns
+    -------
+    Decision
+        The decision.
+    """
     found = known(fidelity, scene)
     return Decision(scene, fidelity.answer(scene), fidelity, found, why, is_chosen)
 
@@ -257,6 +287,16 @@ def is_along(scene: Scene) -> bool:
     """Whether a pile has too many grains for DEM, and the closed form may answer it.
 
     Its rows have to lie along the bed, and each grain has to feel the flow by itself.
+
+    Parameters
+    ----------
+    scene
+        The scene of a pile.
+
+    Returns
+    -------
+    bool
+        Whether it may.
     """
     if not has_rows_along(scene) or scene.threshold.update:
         return False
@@ -365,10 +405,20 @@ def _check_group(scene: Scene) -> tuple[object, ...]:
 
 
 def checks(answers: Iterable[Decision]) -> dict[str, Decision]:
-    """The piles by DEM that check answers without it, by the id of the asked scene.
+    """Choose the piles by DEM that check answers without it.
 
     Of each group it is the pile that DEM, as the scene is written, answers in the least
     time.
+
+    Parameters
+    ----------
+    answers
+        The decisions on all scenes.
+
+    Returns
+    -------
+    dict of str to Decision
+        The checks, by the id of the asked scene.
     """
     cheapest: dict[object, tuple[float, str, Scene]] = {}
     for answer in answers:

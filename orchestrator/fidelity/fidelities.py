@@ -66,6 +66,16 @@ class Rung:
         """Whether it can answer a pile.
 
         Linear theory knows boundary layers over beds without obstacles.
+
+        Parameters
+        ----------
+        scene
+            The scene of a pile.
+
+        Returns
+        -------
+        bool
+            Whether it can.
         """
         bed = scene.bed
         assert isinstance(bed, PileBed)
@@ -74,14 +84,40 @@ class Rung:
         return packing(scene) not in self.not_on
 
     def changes(self, scene: Scene) -> Fields:
-        """The fields that it sets where it answers: of fine sand z0, too."""
+        """List the fields that it sets where it answers.
+
+        Of fine sand it sets z0, too.
+
+        Parameters
+        ----------
+        scene
+            The scene of a pile.
+
+        Returns
+        -------
+        dict
+            Values by the fields' names.
+        """
         fields = dict(self.fields(scene))
         if self.sets.get("method.flow.model", "flat") != "flat":
             fields["method.flow.roughness"] = outer_roughness(scene)
         return fields
 
     def describes(self, scene: Scene, *, or_finer: bool = False) -> bool:
-        """Whether the scene has the numbers of this rung, or finer ones."""
+        """Whether the scene has the numbers of this rung, or finer ones.
+
+        Parameters
+        ----------
+        scene
+            The scene of a pile.
+        or_finer
+            Whether finer numbers count as well.
+
+        Returns
+        -------
+        bool
+            Whether it has them.
+        """
         if not self.takes(scene):
             return False
         for name, value in self.fields(scene).items():
@@ -94,7 +130,18 @@ class Rung:
         return True
 
     def fields(self, scene: Scene) -> Fields:
-        """The fields that it sets in a scene."""
+        """List the fields that it sets in a scene.
+
+        Parameters
+        ----------
+        scene
+            The scene of a pile.
+
+        Returns
+        -------
+        dict
+            Values by the fields' names.
+        """
         bed = scene.bed
         assert isinstance(bed, PileBed)
         fields = {**self.sets, **self.on.get(packing(scene), {})}
@@ -111,7 +158,19 @@ class Rung:
 
 @dataclass(frozen=True)
 class Fidelity:
-    """A way to answer a pile: a rung for its flow and one for its grains."""
+    """A way to answer a pile: a rung for its flow and one for its grains.
+
+    Attributes
+    ----------
+    name
+        Its name.
+    flow
+        The rung for the flow.
+    grains
+        The rung for the grains.
+    meaning
+        What it is, in words.
+    """
 
     name: str
     meaning: str
@@ -124,31 +183,99 @@ class Fidelity:
         return bool(self.grains.sets["method.kind"] == "dem")
 
     def takes(self, scene: Scene) -> bool:
-        """Whether it can answer a pile."""
+        """Whether it can answer a pile.
+
+        Parameters
+        ----------
+        scene
+            The scene of a pile.
+
+        Returns
+        -------
+        bool
+            Whether both of its rungs can.
+        """
         return self.flow_over(scene).takes(scene) and self.grains.takes(scene)
 
     def flow_over(self, scene: Scene) -> Rung:
-        """Its rung for the flow; over a level bed u* is u*_0, and none is solved."""
+        """Choose its rung for the flow over a pile.
+
+        Over a level bed u* is u*_0, and no flow is solved.
+
+        Parameters
+        ----------
+        scene
+            The scene of a pile.
+
+        Returns
+        -------
+        Rung
+            The rung.
+        """
         assert isinstance(scene.bed, PileBed)
         return FLAT if scene.bed.is_level else self.flow
 
     def answer(self, scene: Scene) -> Scene:
-        """The scene as this fidelity answers it."""
+        """Make the scene as this fidelity answers it.
+
+        Parameters
+        ----------
+        scene
+            The scene of a pile.
+
+        Returns
+        -------
+        Scene
+            The scene with the numbers of both rungs.
+        """
         flow = self.flow_over(scene).changes(scene)
         return changed(scene, {**flow, **self.grains.changes(scene)})
 
     def describes(self, scene: Scene) -> bool:
-        """Whether a scene has all of its numbers."""
+        """Whether a scene has all of its numbers.
+
+        Parameters
+        ----------
+        scene
+            The scene of a pile.
+
+        Returns
+        -------
+        bool
+            Whether it has them.
+        """
         return self.flow_over(scene).describes(scene) and self.grains.describes(scene)
 
 
 def named(name: str) -> Fidelity:
-    """A fidelity by its name."""
+    """Find a fidelity by its name.
+
+    Parameters
+    ----------
+    name
+        The name.
+
+    Returns
+    -------
+    Fidelity
+        The fidelity.
+    """
     return next(one for one in FIDELITIES if one.name == name)
 
 
 def packing(scene: Scene) -> str:
-    """The packing of a pile; a poured bed in space is a "strip"."""
+    """Name the packing of a pile.
+
+    Parameters
+    ----------
+    scene
+        The scene of a pile.
+
+    Returns
+    -------
+    str
+        The packing; that of a poured bed in space is ``strip``.
+    """
     assert isinstance(scene.bed, PileBed)
     return "strip" if scene.bed.width else scene.bed.packing
 
@@ -181,7 +308,18 @@ LOCAL = Fidelity(
 
 
 def fidelity_of(scene: Scene) -> Fidelity:
-    """The fidelity whose numbers a pile has; `OWN_NUMBERS` where it is none."""
+    """Find the fidelity whose numbers a pile has.
+
+    Parameters
+    ----------
+    scene
+        The scene of a pile.
+
+    Returns
+    -------
+    Fidelity
+        The fidelity; `OWN_NUMBERS` where it is none.
+    """
     if LOCAL.grains.describes(scene):
         return LOCAL
     for one in FIDELITIES[::-1]:

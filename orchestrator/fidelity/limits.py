@@ -45,7 +45,21 @@ ANGLES = "min(friction angle, 90 deg - entrainment angle)"
 
 
 class Limit(NamedTuple):
-    """A limit that a scene is beyond, and its map; a study is refused or warned."""
+    """A limit that a scene is beyond, and its map; a study is refused or warned.
+
+    Attributes
+    ----------
+    map
+        The map of `orchestrator stability` that it was read off; empty if none.
+    field
+        The field of the scene.
+    what
+        What is wrong, in words.
+    remedy
+        What to do, in words.
+    refused
+        Whether the study is refused; else it is warned.
+    """
 
     map: str
     field: str
@@ -55,7 +69,18 @@ class Limit(NamedTuple):
 
 
 def check_study(study: Study) -> None:
-    """Check every scene of a study; messages name the file and the group."""
+    """Check every scene of a study.
+
+    Parameters
+    ----------
+    study
+        The study.
+
+    Raises
+    ------
+    InputError
+        With the file and the group of the first scene beyond a limit.
+    """
     for group in study.groups:
         for scene in group.scenes:
             try:
@@ -69,9 +94,21 @@ def check_study(study: Study) -> None:
 def check(scene: Scene, where: str, *, grains: bool = True) -> None:
     """Refuse a scene outside of the regions in which its answer means something.
 
-    An `InputError` names the first limit that it is beyond: field, map and remedy, and
-    `where`, the scene's file. Where the answer is merely worse, a warning is given.
-    Without `grains` only the flow over a pile counts.
+    Where the answer is merely worse, a warning is given.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    where
+        The file of the scene, for messages.
+    grains
+        Whether the grains count; else only the flow over a pile does.
+
+    Raises
+    ------
+    InputError
+        With field, map and remedy of the first limit that it is beyond.
     """
     with suppress(UnfitError):  # which is told below
         scene = written(scene)
@@ -93,7 +130,20 @@ def check(scene: Scene, where: str, *, grains: bool = True) -> None:
 
 
 def exceeded(scene: Scene, *, grains: bool = True) -> Iterator[Limit]:
-    """The limits that a scene is beyond; without `grains` those of its flow."""
+    """List the limits that a scene is beyond.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    grains
+        Whether the grains count; else only the flow over a pile does.
+
+    Yields
+    ------
+    Limit
+        Each limit.
+    """
     bed = scene.bed
     slope, limit, angle = (
         bed.slope_deg,
@@ -126,7 +176,18 @@ def exceeded(scene: Scene, *, grains: bool = True) -> Iterator[Limit]:
 
 
 def largest_timestep(damping: float) -> float:
-    """The largest safe time step at a damping ratio, sqrt(m/K)."""
+    """Look up the largest safe time step.
+
+    Parameters
+    ----------
+    damping
+        Damping ratio of a collision.
+
+    Returns
+    -------
+    float
+        The time step, sqrt(m/K).
+    """
     return next(step for most, step in TIMESTEPS if damping <= most)
 
 

@@ -15,9 +15,18 @@ FACTORS = (0.5, 1.0, 2.0)
 
 
 def length_of(scene: Scene) -> float:
-    """The smoothing of a noisy profile, m: the one used, or needed if that is more.
+    """Compute the smoothing of a noisy profile, m.
 
-    It is 0 for a scene without a profile, or with one whose points are not noisy.
+    Parameters
+    ----------
+    scene
+        The scene.
+
+    Returns
+    -------
+    float
+        The one used, or the one needed if that is more; 0 for a scene without a
+        profile, or with one whose points are not noisy.
     """
     bed = scene.bed
     if not isinstance(bed, PileBed) or bed.profile is None or not bed.profile.needs:

@@ -51,7 +51,18 @@ class Spread(NamedTuple):
 
 
 def model_class(scene: Scene) -> str:
-    """The class of scenes on which the shared choices have the same effect."""
+    """Name the class of scenes on which the shared choices have the same effect.
+
+    Parameters
+    ----------
+    scene
+        The scene of a pile.
+
+    Returns
+    -------
+    str
+        The class.
+    """
     bed, reynolds = scene.bed, float(closed_form(scene).reynolds)
     assert isinstance(bed, PileBed)
     regime = (
@@ -66,10 +77,22 @@ def model_class(scene: Scene) -> str:
 
 
 def spread(scene: Scene, fraction: float) -> Spread:
-    """The spread of the threshold of a pile at a fraction; NaN where not known.
+    """Look up the spread of the threshold of a pile.
 
     What the frozen bed does is the largest of the scenes of the class; it is not known
     of a bed that changes already, nor of a flow that is not solved.
+
+    Parameters
+    ----------
+    scene
+        The scene of a pile.
+    fraction
+        Fraction n/N of the counted grains.
+
+    Returns
+    -------
+    Spread
+        The spread; NaN where it is not known.
     """
     of_class = _spread(model_class(scene), fraction)
     if scene.threshold.update or scene.method.flow.model != "solve":
@@ -90,9 +113,21 @@ def _spread(model: str, fraction: float) -> Spread:
 
 
 def together(shares: pd.DataFrame, quantity: str = "shields") -> tuple[float, float]:
-    """Shares of independent choices as one, down and up, by their squares.
+    """Combine shares of independent choices by their squares.
 
     Nothing falls below zero, however many choices lower it.
+
+    Parameters
+    ----------
+    shares
+        A row for each choice, with its shares down and up.
+    quantity
+        The quantity that the shares are of.
+
+    Returns
+    -------
+    low, high : float
+        The shares of all choices, down and up.
     """
     low, high = (
         float(np.hypot.reduce(shares[f"{quantity}_{end}"])) for end in ("low", "high")

@@ -177,9 +177,20 @@ def wind_of(ustar0: ArrayLike, roughness: float) -> FloatArray:
 
 
 def undisturbed(local: FloatArray, ratio: FloatArray) -> FloatArray:
-    """Find the undisturbed friction velocity that makes local ones, m/s, (F,).
+    """Find the undisturbed friction velocities that make local ones.
 
-    It is infinite where there is no stress.
+    Parameters
+    ----------
+    local
+        Local friction velocity of each face, m/s, shape (F,).
+    ratio
+        Local over undisturbed friction velocity, shape (F,).
+
+    Returns
+    -------
+    FloatArray
+        Undisturbed friction velocities, m/s, shape (F,); infinite where there is no
+        stress.
     """
     found = np.full_like(local, np.inf)
     return np.divide(local, ratio, out=found, where=ratio > 0)
@@ -236,7 +247,18 @@ class Shares:
         return np.concatenate([[0.0], self.share])[place]
 
     def wind_for(self, share: float) -> float:
-        """Find the least wind in which a share of the surface moves, m/s."""
+        """Find the least wind in which a share of the surface moves.
+
+        Parameters
+        ----------
+        share
+            The share, of 1.
+
+        Returns
+        -------
+        float
+            The wind, m/s.
+        """
         place = int(np.searchsorted(self.share, share * (1 - 1e-12)))
         if place == len(self.wind):
             return float("inf")

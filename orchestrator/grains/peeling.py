@@ -202,7 +202,15 @@ class ForceTable:
 
 
 class Disc(NamedTuple):
-    """A grain in the plane of the flow."""
+    """A grain in the plane of the flow.
+
+    Attributes
+    ----------
+    x, z
+        Its centre, d.
+    radius
+        Its radius, d.
+    """
 
     x: float
     z: float

@@ -71,10 +71,16 @@ compared at the second: those of two equal stresses say of no power, 0/0."""
 class Worn:
     """The n grains of a pile that wears, at one time.
 
-    `places`, shape (n, 2), has x and z of the centres, d, NaN for a grain that has
-    gone; `left`, shape (n,), the undisturbed friction velocity at which a counted grain
-    has moved, m/s, else infinite; `speed`, shape (n,), the signed local friction
-    velocity over the undisturbed one, at that time or when it was last there.
+    Attributes
+    ----------
+    places
+        x and z of the centres, d, shape (n, 2); NaN for a grain that has gone.
+    left
+        Undisturbed friction velocity at which a counted grain has moved, m/s, shape
+        (n,); infinite for all others.
+    speed
+        Signed local friction velocity over the undisturbed one, shape (n,), at that
+        time or when the grain was last there.
     """
 
     places: FloatArray
@@ -83,7 +89,18 @@ class Worn:
 
     @classmethod
     def whole(cls, packing: Packing) -> "Worn":
-        """The grains as they were packed."""
+        """Make the grains as they were packed.
+
+        Parameters
+        ----------
+        packing
+            The packing.
+
+        Returns
+        -------
+        Worn
+            The grains, none of which has left.
+        """
         count = len(packing.centres)
         return cls(packing.centres, np.full(count, np.inf), np.zeros(count))
 
@@ -98,7 +115,13 @@ class Worn:
         return int(np.isfinite(self.left).sum())
 
     def to_csv(self, directory: Path) -> None:
-        """Write ``grains.csv``."""
+        """Write ``grains.csv``.
+
+        Parameters
+        ----------
+        directory
+            The directory of the case.
+        """
         table = pd.DataFrame(self.places, columns=["x_d", "z_d"])
         table = table.assign(moved_at_m_s=self.left, ustar_over_ustar0=self.speed)
         table.index = pd.RangeIndex(1, len(table) + 1, name="id")
@@ -106,17 +129,35 @@ class Worn:
 
     @classmethod
     def from_csv(cls, directory: Path) -> "Worn":
-        """Read what `to_csv` wrote."""
+        """Read what `to_csv` wrote.
+
+        Parameters
+        ----------
+        directory
+            The directory of the case.
+
+        Returns
+        -------
+        Worn
+            The grains.
+        """
         values = deck.read_table(directory / GRAINS).to_numpy(float)
         return cls(values[:, 1:3], values[:, 3], values[:, 4])
 
 
 @dataclass(frozen=True)
 class WornFlow(Case):
-    """The flow over a worn bed, after a round under the flow `before`.
+    """The flow over a worn bed, after a round under another flow.
 
-    In that round the grains left in the `run` of LIGGGHTS, or by peeling if there is
-    none.
+    Attributes
+    ----------
+    scene
+        The scene of the pile.
+    before
+        The flow of the round before.
+    run
+        The run of LIGGGHTS in which grains left in that round; None if they left by
+        peeling.
     """
 
     scene: Scene
@@ -180,7 +221,18 @@ Flow = FlowCase | WornFlow
 
 
 def rounds(scene: Scene) -> int:
-    """How many flows act on a pile until the last of its fractions has moved."""
+    """Count the flows that act on a pile until its last fraction has moved.
+
+    Parameters
+    ----------
+    scene
+        The scene of a pile.
+
+    Returns
+    -------
+    int
+        How many there are.
+    """
     update = scene.threshold.update
     return ceil(max(scene.threshold.fractions) / update - 1e-9) if update else 1
 
@@ -190,6 +242,18 @@ def goal_part(scene: Scene, flow: Flow | None) -> float:
 
     The last round goes on a little beyond the largest fraction that is asked for, whose
     interval ends where half a grain more has moved.
+
+    Parameters
+    ----------
+    scene
+        The scene of a pile.
+    flow
+        The flow of the round; None over the whole pile.
+
+    Returns
+    -------
+    float
+        The part, of 1.
     """
     number = 1
     while isinstance(flow, WornFlow):
@@ -201,19 +265,62 @@ def goal_part(scene: Scene, flow: Flow | None) -> float:
 
 
 def goal(geometry: Geometry, flow: Flow | None) -> int:
-    """How many counted grains have moved when the round of a flow ends."""
+    """Count the grains that have moved when the round of a flow ends.
+
+    Parameters
+    ----------
+    geometry
+        The pile as it was packed.
+    flow
+        The flow of the round; None over the whole pile.
+
+    Returns
+    -------
+    int
+        How many counted grains that are.
+    """
     return ceil(goal_part(geometry.scene, flow) * geometry.packing.count - 1e-9)
 
 
 def grains(geometry: Geometry, flow: Flow, cases: Path) -> Worn:
-    """The grains as they were when the round of a flow began."""
+    """Find the grains as they were when the round of a flow began.
+
+    Parameters
+    ----------
+    geometry
+        The pile as it was packed.
+    flow
+        The flow of the round.
+    cases
+        The directory of the finished runs.
+
+    Returns
+    -------
+    Worn
+        The grains.
+    """
     if isinstance(flow, WornFlow):
         return Worn.from_csv(cases / flow.name)
     return Worn.whole(geometry.packing)
 
 
 def line(geometry: Geometry, flow: Flow, cases: Path) -> BedLine:
-    """The bed line of the round of a flow, d."""
+    """Find the bed line of the round of a flow.
+
+    Parameters
+    ----------
+    geometry
+        The pile as it was packed.
+    flow
+        The flow of the round.
+    cases
+        The directory of the finished runs.
+
+    Returns
+    -------
+    BedLine
+        The line, d.
+    """
     if isinstance(flow, WornFlow):
         return sunk(geometry, grains(geometry, flow, cases))
     return geometry.line
@@ -229,7 +336,22 @@ def _loads(geometry: Geometry, flow: Flow, cases: Path) -> Loads:
 
 
 def peeled(geometry: Geometry, flow: Flow, cases: Path) -> Worn:
-    """The grains at the end of a round in which they leave by peeling."""
+    """Find the grains at the end of a round in which they leave by peeling.
+
+    Parameters
+    ----------
+    geometry
+        The pile as it was packed.
+    flow
+        The flow of the round.
+    cases
+        The directory of the finished runs.
+
+    Returns
+    -------
+    Worn
+        The grains.
+    """
     worn, loads = grains(geometry, flow, cases), _loads(geometry, flow, cases)
     windward = geometry.packing.windward
     reached = worn.left[np.isfinite(worn.left)].max(initial=0.0)
@@ -247,9 +369,21 @@ def peeled(geometry: Geometry, flow: Flow, cases: Path) -> Worn:
 
 
 def sunk(geometry: Geometry, worn: Worn) -> BedLine:
-    """The bed line over worn grains, d.
+    """Make the bed line over worn grains.
 
     It is lower by as much as their upper sides are on average.
+
+    Parameters
+    ----------
+    geometry
+        The pile as it was packed.
+    worn
+        The grains.
+
+    Returns
+    -------
+    BedLine
+        The line, d.
     """
     line = geometry.line
     x = np.arange(line.x[1] - EDGE, line.x[-2] + EDGE - digits.SLACK, SPACING)
@@ -305,8 +439,14 @@ def _tops(centres: FloatArray, radii: FloatArray, x: FloatArray) -> FloatArray:
 class PileCase(GrainCase):
     """The run of LIGGGHTS of the grains of one pile or of one round.
 
-    `flow` is that of the round, None over the whole pile; it goes on from the run
-    `before`.
+    Attributes
+    ----------
+    scene
+        The scene of the pile.
+    flow
+        The flow of the round; None over the whole pile.
+    before
+        The run that it goes on from; None if it is the first.
     """
 
     scene: Scene
@@ -493,11 +633,24 @@ class PileCase(GrainCase):
 
 
 def flows(loads: Loads) -> FloatArray:
-    """The flow of the settling, then of each load step.
+    """Find the flow of the settling, then of each load step.
 
     They begin before the first grain goes.
 
-    Raises an InputError if no counted grain is held by its contacts and can leave them.
+    Parameters
+    ----------
+    loads
+        The grains under their forces.
+
+    Returns
+    -------
+    FloatArray
+        Undisturbed friction velocities u*_0, m/s, that rise from 0 or more.
+
+    Raises
+    ------
+    InputError
+        If no counted grain is held by its contacts and can leave them.
     """
     geometry = loads.geometry
     pivots = np.sort(loads.alone())
@@ -535,12 +688,24 @@ def flows(loads: Loads) -> FloatArray:
 
 
 def in_time(gusts: Gusts, loads: Loads, rising: FloatArray) -> FloatArray:
-    """Force in each event and after the last over that of the largest one.
+    """Compute the force in each event and after the last over the largest one.
 
-    `rising` are the flows (u*_0, m/s) of the load steps; the forces of `loads` are
-    those under the largest stress. The force is a power of the stress, which is found
-    between the mean and the largest stress, or one that is `STRONGER` where the largest
-    is hardly above the mean.
+    The force is a power of the stress, which is found between the mean and the largest
+    stress, or one that is `STRONGER` where the largest is hardly above the mean.
+
+    Parameters
+    ----------
+    gusts
+        The gusts.
+    loads
+        The grains under the forces of the largest stress.
+    rising
+        Flows of the load steps, u*_0 in m/s, shape (K,).
+
+    Returns
+    -------
+    FloatArray
+        The ratios of the forces.
     """
     peak = loads.geometry.scene.gust
     mean = rising / np.sqrt(peak)
@@ -577,7 +742,20 @@ def _first(thresholds: FloatArray, geometry: Geometry) -> float:
 
 
 def table(loads: Loads, worn: Worn) -> GrainTable:
-    """The grains of the deck."""
+    """Make the grains of the deck.
+
+    Parameters
+    ----------
+    loads
+        The grains under their forces.
+    worn
+        The grains as they are.
+
+    Returns
+    -------
+    GrainTable
+        The grains.
+    """
     geometry, packed = loads.geometry, loads.geometry.packing
     grain = geometry.scene.grain
     kind = np.select(
@@ -602,6 +780,11 @@ class Method:
     """A way to find out when the counted grains of a bed move.
 
     Each method is a subclass.
+
+    Attributes
+    ----------
+    geometry
+        The pile.
     """
 
     geometry: Geometry
@@ -612,14 +795,33 @@ class Method:
         return ()
 
     def motion(self, cases: Path) -> Motion:
-        """Motion of the counted grains.
+        """Find the motion of the counted grains.
 
-        `cases` is the directory of the finished runs.
+        Parameters
+        ----------
+        cases
+            The directory of the finished runs.
+
+        Returns
+        -------
+        Motion
+            When each of them moved.
         """
         raise NotImplementedError
 
     def last(self, cases: Path) -> Worn:
-        """The grains of a bed that changes, when the last round has ended."""
+        """Find the grains of a bed that changes when the last round has ended.
+
+        Parameters
+        ----------
+        cases
+            The directory of the finished runs.
+
+        Returns
+        -------
+        Worn
+            The grains.
+        """
         raise NotImplementedError
 
 
@@ -627,6 +829,11 @@ class Pivot(Method):
     """The closed form.
 
     Each grain, or place on the bed line, moves by itself under its own stress.
+
+    Attributes
+    ----------
+    geometry
+        The pile.
     """
 
     def motion(self, cases: Path) -> Motion:
@@ -639,6 +846,11 @@ class Peeling(Method):
     """Pivots that free one another, without dynamics.
 
     A grain that lift takes off frees none.
+
+    Attributes
+    ----------
+    geometry
+        The pile.
     """
 
     @property
@@ -666,7 +878,13 @@ class Peeling(Method):
 
 
 class Dem(Method):
-    """A run of LIGGGHTS under a flow that is raised in steps."""
+    """A run of LIGGGHTS under a flow that is raised in steps.
+
+    Attributes
+    ----------
+    geometry
+        The pile.
+    """
 
     @property
     def cases(self) -> tuple[Case, ...]:
@@ -704,7 +922,13 @@ class Dem(Method):
 
 
 class GoingOn(Method):
-    """A run of LIGGGHTS in which the drag is that of the relative velocity."""
+    """A run of LIGGGHTS in which the drag is that of the relative velocity.
+
+    Attributes
+    ----------
+    geometry
+        The pile.
+    """
 
     @cached_property
     def run(self) -> GoingCase:
@@ -728,7 +952,19 @@ METHODS = {"local": Pivot, "pivot": Pivot, "peeling": Peeling, "dem": Dem}
 
 @dataclass(frozen=True)
 class Pile(Geometry):
-    """The pile of a scene: its bed, the flow over it, and its threshold method."""
+    """The pile of a scene: its bed, the flow over it, and its threshold method.
+
+    Attributes
+    ----------
+    scene
+        The scene.
+    cases
+        The directory of the finished runs; only the grains of a poured bed, and the
+        flow over a profile, are read there.
+    part
+        The part of the bed on which grains are packed, a range of x in diameters; by
+        default all.
+    """
 
     @cached_property
     def method(self) -> Method:
@@ -746,7 +982,18 @@ class Pile(Geometry):
         return (*self.model.cases, *self.pouring, *self.method.cases)
 
     def is_run(self, done: Container[str]) -> bool:
-        """Whether all of its runs are among those that are done, by name."""
+        """Whether all of its runs are among those that are done, by name.
+
+        Parameters
+        ----------
+        done
+            Names of the cases that are done.
+
+        Returns
+        -------
+        bool
+            Whether all are.
+        """
         return all(run.name in done for run in self.runs)
 
     @property
@@ -774,25 +1021,53 @@ class Pile(Geometry):
         return {run.name: self for run in self.model.cases}
 
     def stress(self, cases: Path) -> WallStress:
-        """The stress along the whole bed.
+        """Read the stress along the whole bed.
 
-        `cases` is the directory of the finished runs.
+        Parameters
+        ----------
+        cases
+            The directory of the finished runs.
+
+        Returns
+        -------
+        WallStress
+            The stress.
         """
         return self.model.stress(cases)
 
     def speed(self, cases: Path) -> FloatArray:
-        """Signed local friction velocity over u*_0 of the counted grains, (N,).
+        """Find the signed local friction velocity over u*_0 of the counted grains.
 
         On a bed that changes it is that of the round in which a grain moved.
+
+        Parameters
+        ----------
+        cases
+            The directory of the finished runs.
+
+        Returns
+        -------
+        FloatArray
+            The ratios, shape (N,).
         """
         changes = bool(self.scene.threshold.update)
         ratio = self.method.last(cases).speed if changes else self.loads(cases).ratio
         return np.asarray(ratio[self.packing.windward])
 
     def first(self, motion: Motion) -> tuple[float, float]:
-        """Where a motion starts, x in m, and at which u*_0, m/s.
+        """Find where a motion starts.
 
         Grains that lie loose, and go in still fluid, say nothing of it.
+
+        Parameters
+        ----------
+        motion
+            The motion of the counted grains.
+
+        Returns
+        -------
+        x, ustar0 : float
+            The place, m, and the undisturbed friction velocity, m/s.
         """
         flows = of_grains(motion).value
         flows = np.where(flows > 0, flows, np.nan)
@@ -806,21 +1081,34 @@ class Pile(Geometry):
         return float(x[at]) * self.scene.grain.diameter, float(flows[at])
 
     def pivot_thresholds(self, speed: FloatArray) -> FloatArray:
-        """Friction velocities u*_0 at which counted grains move by themselves, m/s.
+        """Find the friction velocities at which counted grains move by themselves.
 
-        They are sorted.
+        Parameters
+        ----------
+        speed
+            Local friction velocity of each over the undisturbed one, shape (N,).
 
-        `speed` is the local friction velocity of each over the undisturbed one, shape
-        (N,).
+        Returns
+        -------
+        FloatArray
+            Undisturbed friction velocities, m/s, sorted, shape (N,).
         """
         ratio = np.zeros(len(self.packing.sizes))
         ratio[self.packing.windward] = speed
         return np.sort(Loads(self, ratio, np.ones(len(ratio), bool)).alone())
 
     def motion(self, cases: Path) -> Motion:
-        """Motion of the counted grains.
+        """Find the motion of the counted grains.
 
-        `cases` is the directory of the finished runs.
+        Parameters
+        ----------
+        cases
+            The directory of the finished runs.
+
+        Returns
+        -------
+        Motion
+            When each of them moved.
         """
         motion = self.method.motion(cases)
         if not self.goes_on:
@@ -833,13 +1121,37 @@ class Pile(Geometry):
         return self.scene.threshold.criterion == GOES_ON
 
     def hops_decide(self, cases: Path) -> BoolArray:
-        """Which counted grains hopping on holds longer than their pockets, (N,)."""
+        """Find the counted grains that hopping on holds longer than their pockets.
+
+        Parameters
+        ----------
+        cases
+            The directory of the finished runs.
+
+        Returns
+        -------
+        BoolArray
+            Which they are, shape (N,).
+        """
         further, over = self.loads(cases).going_on()
         return np.asarray(self.method.motion(cases).flows / over < further)
 
     def thresholds(
         self, cases: Path, fractions: Iterable[float]
     ) -> list[PileThreshold]:
-        """Its thresholds at some n/N; `cases` is the directory of the finished runs."""
+        """Find its thresholds at some fractions.
+
+        Parameters
+        ----------
+        cases
+            The directory of the finished runs.
+        fractions
+            Fractions n/N of the counted grains.
+
+        Returns
+        -------
+        list of PileThreshold
+            A threshold for each.
+        """
         motion, speed = self.motion(cases), self.speed(cases)
         return [of_pile(motion, speed, n, self.scene.fluid.density) for n in fractions]

@@ -26,9 +26,17 @@ from orchestrator.study.scene import CELLS_OVER_Z0, Scene
 
 
 def single_grain(scene: Scene) -> SingleGrain:
-    """The grain of a scene.
+    """Make the single grain of a scene.
 
-    Its entrainment angle is that of the pocket that it lies in.
+    Parameters
+    ----------
+    scene
+        The scene.
+
+    Returns
+    -------
+    SingleGrain
+        The grain; its entrainment angle is that of the pocket that it lies in.
     """
     grain, bed, fluid = scene.grain, scene.bed, scene.fluid
     # at a contact of two sizes the pull is that of their harmonic mean
@@ -48,12 +56,22 @@ def single_grain(scene: Scene) -> SingleGrain:
 
 
 def closed_form(scene: Scene, name: str | None = None) -> Threshold:
-    """The threshold of the grain of a scene under a force law.
-
-    The law is by default the scene's own.
+    """Find the threshold of the grain of a scene under a force law.
 
     Under gusts u*, Re* and the Shields number are those of the mean flow, the forces
     those of the gust.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    name
+        Name of the force law, by default the scene's own.
+
+    Returns
+    -------
+    Threshold
+        The threshold, of shape ().
     """
     at = thresholds_of(name or law_of(scene), [single_grain(scene)])[0]
     if scene.gust == 1:
@@ -67,13 +85,21 @@ def closed_form(scene: Scene, name: str | None = None) -> Threshold:
 
 
 def outer_roughness(scene: Scene) -> float | None:
-    """Roughness length (m) of the flow over the bed of a pile.
-
-    It is None if that is the bed's own.
+    """Find the roughness length of the flow over the bed of a pile.
 
     Where the bed is not rough viscosity adds to its own, by the friction velocity at
     which a single grain moves; a sublayer that is thicker than the first cells bears no
     turbulent flow. The flows of Eqs. 2 and 4 are the paper's, over a rough wall.
+
+    Parameters
+    ----------
+    scene
+        The scene of a pile.
+
+    Returns
+    -------
+    float, or None
+        The length, m; None if it is the bed's own.
     """
     z0, ustar = scene.bed.roughness, closed_form(scene).friction_velocity
     outer = float(velocity.outer_roughness(z0, ustar, scene.fluid.viscosity))
@@ -84,19 +110,52 @@ def outer_roughness(scene: Scene) -> float | None:
 
 
 def regime_of(scene: Scene) -> Regime:
-    """Which of Eqs. 2 and 4 holds at the single-grain threshold of a scene."""
+    """Say which of Eqs. 2 and 4 holds at the single-grain threshold of a scene.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+
+    Returns
+    -------
+    str
+        ``low``, ``high`` or ``transition``.
+    """
     return cast(
         Regime, str(regime(closed_form(scene, "low"), closed_form(scene, "high")))
     )
 
 
 def law_holds(scene: Scene) -> bool:
-    """Whether the force law of a resolved scene holds at its single-grain threshold."""
+    """Say whether the force law of a scene holds at its single-grain threshold.
+
+    Parameters
+    ----------
+    scene
+        A scene with one force law.
+
+    Returns
+    -------
+    bool
+        Whether it does.
+    """
     return bool(closed_form(scene).valid)
 
 
 def law_of(scene: Scene) -> str:
-    """The force law that answers a scene: where none is asked for, one that holds."""
+    """Choose the force law that answers a scene.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+
+    Returns
+    -------
+    str
+        Its name; where none is asked for, one that holds.
+    """
     if scene.forces.law != AUTO:
         return scene.forces.law
     grain = single_grain(scene)
@@ -105,10 +164,20 @@ def law_of(scene: Scene) -> str:
 
 
 def resolved(scenes: Sequence[Scene]) -> Iterator[tuple[Scene, ...]]:
-    """Each scene with one force law.
+    """Give each scene one force law.
 
     Where a scene leaves the law open, it is one that holds for its single grain. By the
     paper's rule a scene becomes two in the transition.
+
+    Parameters
+    ----------
+    scenes
+        The scenes.
+
+    Yields
+    ------
+    tuple of Scene
+        One or two scenes for each.
     """
     # many thresholds at once take a hundredth of the time that they take one after
     # another

@@ -84,6 +84,11 @@ def field(default: Any = ..., *, since: bool = False, **settings: Any) -> Any:
         keep their id.
     **settings
         Words of `Info`, and rules of `pydantic.Field` such as ``ge``.
+
+    Returns
+    -------
+    Any
+        The declaration, for pydantic.
     """
     words = {name: settings.pop(name) for name in WORDS if name in settings}
     if since:

@@ -79,7 +79,18 @@ WRITTEN: Mapping[str, Written] = _read()
 
 
 def packing_of(bed: Mapping[str, Any]) -> str:
-    """The packing of a bed; a poured bed in space is a "strip"."""
+    """Name the packing of a bed.
+
+    Parameters
+    ----------
+    bed
+        The table of the bed.
+
+    Returns
+    -------
+    str
+        The packing; that of a poured bed in space is ``strip``.
+    """
     packing = str(bed.get("packing", "aligned"))
     return "strip" if packing == "poured" and bed.get("width") else packing
 
@@ -95,6 +106,11 @@ def fields_of(name: str, bed: Mapping[str, Any], where: str) -> Fields:
         The table of the bed. One grain has no flow that is solved.
     where
         The file, for messages.
+
+    Returns
+    -------
+    dict
+        Values by the names of the fields.
 
     Raises
     ------

@@ -81,16 +81,35 @@ class Quantity:
         return table_of(self.name) in METHOD
 
     def asked(self, scene: Scene) -> Any:
-        """Its value as a scene has it written.
+        """Find its value as a scene has it written.
 
-        It is None where it has no effect or is left open.
+        Parameters
+        ----------
+        scene
+            The scene.
+
+        Returns
+        -------
+        Any
+            The value; None where it has no effect or is left open.
         """
         if not APPLIES[self.info.scope](scene):
             return None
         return plain(self.read(scene))
 
     def used(self, scene: Scene) -> Any:
-        """Its value as a scene uses it; None where it has no effect."""
+        """Find its value as a scene uses it.
+
+        Parameters
+        ----------
+        scene
+            The scene.
+
+        Returns
+        -------
+        Any
+            The value; None where it has no effect.
+        """
         if not APPLIES[self.info.scope](scene):
             return None
         if self.info.read:
@@ -111,7 +130,17 @@ class Quantity:
 
 
 def table_of(name: str) -> str:
-    """The table of a field, such as ``bed`` or ``method.flow``.
+    """Name the table of a field, such as ``bed`` or ``method.flow``.
+
+    Parameters
+    ----------
+    name
+        The name of the field in a study file.
+
+    Returns
+    -------
+    str
+        The table.
 
     Examples
     --------
@@ -122,13 +151,35 @@ def table_of(name: str) -> str:
 
 
 def default_of(name: str) -> Any:
-    """The default of a field, named as in a study file."""
+    """Find the default of a field.
+
+    Parameters
+    ----------
+    name
+        The name of the field in a study file.
+
+    Returns
+    -------
+    Any
+        The default.
+    """
     table, _, field = name.rpartition(".")
     return PARTS[table].model_fields[field].default
 
 
 def plain(value: Any) -> Any:
-    """A value as a cell of a table: words and numbers stay, all else becomes a text."""
+    """Make a value a cell of a table.
+
+    Parameters
+    ----------
+    value
+        The value.
+
+    Returns
+    -------
+    Any
+        Words and numbers as they are, all else as a text.
+    """
     if isinstance(value, tuple):
         return "; ".join(_item(each) for each in value) or None
     if isinstance(value, Profile | LogNormal | Gusts):
@@ -250,34 +301,83 @@ open."""
 
 
 def question(scene: Scene) -> dict[str, Any]:
-    """What a scene asks, by column."""
+    """List what a scene asks.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+
+    Returns
+    -------
+    dict
+        Values by column.
+    """
     return {column: COLUMNS[column].used(scene) for column in OF_QUESTION}
 
 
 def method(scene: Scene) -> dict[str, Any]:
-    """How a scene is answered, by column; what it leaves open is worked out."""
+    """List how a scene is answered.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+
+    Returns
+    -------
+    dict
+        Values by column; what the scene leaves open is worked out.
+    """
     return {column: COLUMNS[column].used(scene) for column in OF_METHOD}
 
 
 def asked(scene: Scene) -> dict[str, Any]:
-    """What a scene asks and how its method is written, by column; None is left open."""
+    """List what a scene asks and how its method is written.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+
+    Returns
+    -------
+    dict
+        Values by column; None is left open.
+    """
     written = {column: COLUMNS[column].asked(scene) for column in OF_METHOD}
     return question(scene) | written
 
 
 def used(scene: Scene) -> dict[str, Any]:
-    """All quantities of a scene, by column; what it leaves open is worked out."""
+    """List all quantities of a scene.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+
+    Returns
+    -------
+    dict
+        Values by column; what the scene leaves open is worked out.
+    """
     return {column: each.used(scene) for column, each in COLUMNS.items()}
 
 
 def written(scene: Scene) -> str:
-    """The fields of the method that a scene does not leave at their defaults.
+    """List the fields of the method that a scene does not leave at their defaults.
+
+    Parameters
+    ----------
+    scene
+        The scene.
 
     Returns
     -------
     str
-        For each its name in the table ``[method]`` and its value; ``auto`` if there
-        is none.
+        For each its name in the table ``[method]`` and its value; ``auto`` if there is
+        none.
     """
     texts = []
     for each in FIELDS:
@@ -290,9 +390,21 @@ def written(scene: Scene) -> str:
 
 
 def others(columns: Iterable[Hashable], *but: str) -> list[str]:
-    """The columns of fields among some.
+    """List the columns of fields among some.
 
-    A few are left out, and those that follow from others.
+    Those that follow from others are left out.
+
+    Parameters
+    ----------
+    columns
+        The columns.
+    *but
+        Columns that are left out as well.
+
+    Returns
+    -------
+    list of str
+        The columns.
     """
     rest = set(columns) - {*but, *TWINS, *LEFT_OPEN}
     return [column for column in COLUMNS if column in rest]

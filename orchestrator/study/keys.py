@@ -116,9 +116,17 @@ def by_name(data: Mapping[str, Any]) -> Tables:
 
 
 def nested(tables: Mapping[str, Table]) -> Tables:
-    """Tables by name as a scene takes them.
+    """Put the tables within the method into it, as a scene takes them.
 
-    Those within the method are fields of it.
+    Parameters
+    ----------
+    tables
+        The tables by name.
+
+    Returns
+    -------
+    dict of str to dict
+        The tables by name.
     """
     whole: Tables = {}
     for name, table in tables.items():

@@ -62,12 +62,20 @@ class LogNormal(Part):
         return self.smallest or self.sigma_g**-2, self.largest or self.sigma_g**2
 
     def quantile(self, part: ArrayLike, *, power: int) -> FloatArray:
-        """Diameter over the median that a part is below.
+        """Compute the diameter that a part is below.
 
-        The part is one of the mass (power 0) or of the number.
+        Parameters
+        ----------
+        part
+            Part of the distribution, 0 to 1.
+        power
+            0 for parts of the mass; for parts of the number 3 where masses, 2 where
+            areas in a plane are so distributed.
 
-        By number the power is 3 where masses, 2 where areas in a plane are so
-        distributed.
+        Returns
+        -------
+        FloatArray
+            Diameter over the median, of the shape of the part.
         """
         from scipy.special import ndtr, ndtri
 
@@ -478,10 +486,23 @@ class Threshold(Part):
 
 
 def percentile(sizes: Sizes | None, diameter: float, part: float) -> float:
-    """Diameter that a part (0 ... 1) of the mass is finer than, m.
+    """Compute the diameter that a part of the mass is finer than.
 
-    It is straight in its logarithm between classes. `diameter` is that of equal grains,
-    where `sizes` is None, or the median of a log-normal distribution, m.
+    It is straight in its logarithm between classes.
+
+    Parameters
+    ----------
+    sizes
+        The mixture; None for equal grains.
+    diameter
+        That of equal grains, or the median of a log-normal distribution, m.
+    part
+        Part of the mass, 0 to 1.
+
+    Returns
+    -------
+    float
+        The diameter, m.
     """
     if sizes is None:
         return diameter
@@ -494,9 +515,19 @@ def percentile(sizes: Sizes | None, diameter: float, part: float) -> float:
 
 
 def extremes(sizes: Sizes | None, diameter: float) -> tuple[float, float]:
-    """The smallest and the largest grain of a mixture over one diameter.
+    """Find the smallest and the largest grain of a mixture.
 
-    Both are 1 of equal grains.
+    Parameters
+    ----------
+    sizes
+        The mixture; None for equal grains.
+    diameter
+        A diameter, m.
+
+    Returns
+    -------
+    smallest, largest : float
+        Diameters over the given one; both 1 of equal grains.
     """
     if isinstance(sizes, LogNormal):
         return sizes.ends

@@ -38,7 +38,23 @@ OVER = (
 
 @dataclass(frozen=True)
 class Profile:
-    """A bed line of n points, x rising, that begins at the origin."""
+    """A bed line of n points that begins at the origin.
+
+    Two profiles with one digest are one bed.
+
+    Attributes
+    ----------
+    name
+        The name of the file.
+    x, z
+        Places and heights of the points from the first one, m; x rises.
+    text
+        The file itself.
+    digest
+        Digest of the corners.
+    needs
+        Smoothing that the noise of the points needs, m.
+    """
 
     name: str = field(compare=False)  # the file's
     x: tuple[float, ...] = field(compare=False)  # m, from the first point; so is z
@@ -51,7 +67,18 @@ class Profile:
         return f"{self.name} ({self.digest[:12]})"
 
     def smoothed(self, length: float) -> dict[str, Any]:
-        """Fields of a bed with the points smoothed over another length, m."""
+        """Make the fields of a bed with the points smoothed over another length.
+
+        Parameters
+        ----------
+        length
+            The length, m.
+
+        Returns
+        -------
+        dict
+            Values by the names of the fields.
+        """
         return _fields(read_profile(self.text, self.name, self.name, length))
 
 
@@ -161,7 +188,20 @@ class Files:
         return _fields(profile)
 
     def sieve(self, name: str, where: str) -> list[list[float]]:
-        """The rows of a sieve table, diameter (m) and fraction of the mass."""
+        """Read a sieve table.
+
+        Parameters
+        ----------
+        name
+            The name of the file.
+        where
+            The study file, for messages.
+
+        Returns
+        -------
+        list of list
+            Rows of diameter, m, and fraction of the mass.
+        """
         where = f"{where}: grain.sizes"
         place = self._place(name, where)
         text = self._text(name, where)
@@ -202,10 +242,26 @@ class Files:
 
 
 def read_bytes(path: Path, largest: int, where: str) -> bytes:
-    """The content of a file of the user; `where` names it in messages.
+    """Read a file of the user.
 
-    An `InputError` refuses one that is missing, no regular file, or larger than so many
-    bytes.
+    Parameters
+    ----------
+    path
+        The file.
+    largest
+        Largest size, bytes.
+    where
+        Its name in messages.
+
+    Returns
+    -------
+    bytes
+        The content.
+
+    Raises
+    ------
+    InputError
+        For a file that is missing, no regular one, or larger.
     """
     try:
         with opened(path) as stream:
@@ -218,7 +274,25 @@ def read_bytes(path: Path, largest: int, where: str) -> bytes:
 
 
 def decoded(content: bytes, where: str) -> str:
-    """The text in UTF-8 of a file of the user; an `InputError` refuses any other."""
+    """Decode a file of the user.
+
+    Parameters
+    ----------
+    content
+        The content, text in UTF-8.
+    where
+        Its name in messages.
+
+    Returns
+    -------
+    str
+        The text.
+
+    Raises
+    ------
+    InputError
+        For any other content.
+    """
     try:
         # some editors begin with a mark of the encoding
         text = content.decode("utf-8-sig")

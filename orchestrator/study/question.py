@@ -181,7 +181,18 @@ def _check(question: Question) -> None:
 
 
 def why_not_going_on(question: Question) -> str:
-    """Say why grains that go on are not known for a question; empty where they are."""
+    """Say why grains that go on are not known for a question.
+
+    Parameters
+    ----------
+    question
+        The question.
+
+    Returns
+    -------
+    str
+        The reason; empty where they are known.
+    """
     law = question.forces.law
     if law in (PAPER, *LAWS_OF["transition"]):
         return f"the law {law} is of grains that leave their pockets"

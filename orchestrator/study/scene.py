@@ -65,7 +65,18 @@ class Scene(Question):
         return Question(**parts)
 
     def by(self, kind: str) -> "Scene":
-        """The same question by another threshold method, a word of `Method.kind`."""
+        """Make the same question by another threshold method.
+
+        Parameters
+        ----------
+        kind
+            A word of `Method.kind`.
+
+        Returns
+        -------
+        Scene
+            The scene.
+        """
         parts = {name: getattr(self, name) for name in Scene.model_fields}
         parts["method"] = self.method.model_copy(update={"kind": kind})
         return Scene(**parts)
@@ -214,21 +225,54 @@ def _check_update(scene: Scene) -> None:
 def default_first_cell_height(
     height: float, roughness: float, viscous: float = 0.0
 ) -> float:
-    """Height of the first cell on the bed of a pile, m.
+    """Choose the height of the first cell on the bed of a pile.
 
     The finer the better, but its centre z_e must not lie in the roughness, and where
-    the eddy viscosity is below the molecular one, `viscous` = nu/(kappa u*_0), the flow
-    is not turbulent. h/4 is the end.
+    the eddy viscosity is below the molecular one, the flow is not turbulent. h/4 is the
+    end.
+
+    Parameters
+    ----------
+    height
+        Height h of the bed, m.
+    roughness
+        Roughness length of the solve, m.
+    viscous
+        The length nu/(kappa u*_0), m.
+
+    Returns
+    -------
+    float
+        The height, m.
     """
     least = max(height / 40, CELLS_OVER_Z0 * roughness, VISCOUS_CELLS * viscous)
     return rounded(min(least, height / 4))
 
 
 def roughness_length(text: str, diameter: float, mixture: Sizes | None = None) -> float:
-    """A roughness in metres from a part of the diameter (m) such as ``"d/30"``.
+    """Compute a roughness length from a part of the diameter such as ``"d/30"``.
 
     In a mixture d is the median; ``"d84/30"`` is a part of the diameter that 84 % of
     the mass are finer than.
+
+    Parameters
+    ----------
+    text
+        The part.
+    diameter
+        The diameter, m.
+    mixture
+        The mixture; None for equal grains.
+
+    Returns
+    -------
+    float
+        The length, m.
+
+    Raises
+    ------
+    UnfitError
+        For a text that is no such part.
     """
     form = r"\s*d([1-9]\d)?\s*/\s*(\d+(?:\.\d+)?)\s*"
     match = re.fullmatch(form, text, re.ASCII)

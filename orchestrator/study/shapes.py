@@ -59,7 +59,27 @@ class Form(Protocol):
 
 @dataclass(frozen=True)
 class Shape:
-    """The facts of one shape."""
+    """The facts of one shape.
+
+    Attributes
+    ----------
+    name
+        Its name.
+    meaning
+        What it is, in words.
+    corners
+        Makes the corners of one form of a bed.
+    fields
+        Fields of the bed that not all shapes have, and this one has.
+    label
+        What figures call it, where that is not the name.
+    rises
+        Whether it has a windward side, whose slope is the bed's.
+    lee_slope_deg
+        Slope of the lee side by default, degrees; None is that of the windward side.
+    counted
+        Exposed grains that count by default.
+    """
 
     name: str
     meaning: str

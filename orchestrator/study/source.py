@@ -41,6 +41,16 @@ class Source:
 
         The path of the study file is relative to that directory: a copy of both
         together is a study of its own.
+
+        Parameters
+        ----------
+        root
+            The directory of results.
+
+        Returns
+        -------
+        dict
+            The source as JSON.
         """
         file = os.path.relpath(self.file, root)
         return {
@@ -51,13 +61,29 @@ class Source:
 
 
 def presets() -> dict[str, Path]:
-    """The study files that the package brings, by name."""
+    """List the study files that the package brings.
+
+    Returns
+    -------
+    dict of str to Path
+        The files by name.
+    """
     files = Path(__file__).parents[1].glob("*/presets/*.toml")
     return {path.stem: path for path in sorted(files)}
 
 
 def find(source: str | Path) -> Path:
-    """The file of a study: of a preset by its name, or of the path itself.
+    """Find the file of a study.
+
+    Parameters
+    ----------
+    source
+        The name of a preset, or the path of a file.
+
+    Returns
+    -------
+    Path
+        The file.
 
     Raises
     ------
@@ -76,9 +102,24 @@ def find(source: str | Path) -> Path:
 
 
 def digests_now(folder: Path, names: Iterable[str]) -> dict[str, str | None]:
-    """SHA-256 of files as they are now, by their paths relative to a folder.
+    """Compute the digests of files as they are now.
 
-    None for a file that is not there. Raises OSError for one that cannot be read.
+    Parameters
+    ----------
+    folder
+        The folder.
+    names
+        Paths of the files relative to it.
+
+    Returns
+    -------
+    dict
+        SHA-256 by path; None for a file that is not there.
+
+    Raises
+    ------
+    OSError
+        For a file that cannot be read.
     """
     found: dict[str, str | None] = {}
     for name in names:

@@ -124,7 +124,17 @@ class _File(_Tables):
 
 @dataclass(frozen=True)
 class Group:
-    """Scenes of a study that belong together: the points of one experiment."""
+    """Scenes of a study that belong together: the points of one experiment.
+
+    Attributes
+    ----------
+    name
+        Its name.
+    scenes
+        Its scenes in the file's order.
+    where
+        Its place in messages: the file, and which group of it.
+    """
 
     name: str
     scenes: tuple[Scene, ...]  # in the file's order, each with its force law decided
@@ -133,7 +143,29 @@ class Group:
 
 @dataclass(frozen=True)
 class Study:
-    """The content of a study file."""
+    """The content of a study file.
+
+    Attributes
+    ----------
+    name
+        The name of the file, without its ending.
+    title
+        The title.
+    groups
+        The groups of scenes.
+    time_limit_s
+        Wall time after which one solver run counts as hung, s.
+    tolerance
+        Relative error that tau_c may have; None if none is given.
+    cluster
+        Settings of the queue that runs the cases.
+    erosion
+        Winds and threshold of `orchestrator erosion`.
+    text
+        The file itself, and the texts of the files that it names.
+    source
+        Where the text came from; None if it was no file.
+    """
 
     name: str  # the file's, without its ending
     title: str
@@ -248,6 +280,11 @@ def load(source: str | Path, tolerance: float | None = None) -> Study:
     tolerance
         Relative error that tau_c may have, in place of the file's.
 
+    Returns
+    -------
+    Study
+        The study.
+
     Raises
     ------
     InputError
@@ -291,6 +328,11 @@ def parse(text: str, *, name: str, where: str, files: Files | None = None) -> St
         Its path, for messages.
     files
         The files that it may name, by default those of its folder.
+
+    Returns
+    -------
+    Study
+        The study.
 
     Raises
     ------
@@ -523,6 +565,11 @@ def make_scene(
     files
         The files that the tables may name.
 
+    Returns
+    -------
+    Scene
+        The scene.
+
     Raises
     ------
     InputError
@@ -614,14 +661,42 @@ def _write_lengths(grain: Table, bed: Table, is_level: bool) -> None:
 
 
 def value_of(scene: Scene, name: str) -> Any:
-    """The value of a field, named as in a study file."""
+    """Find the value of a field of a scene.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    name
+        The name of the field in a study file.
+
+    Returns
+    -------
+    Any
+        The value.
+    """
     return attrgetter(name)(scene)
 
 
 def changed(scene: Scene, fields: Mapping[str, Any]) -> Scene:
     """Make a scene with some fields changed.
 
-    It is an `InputError` for a value that a field cannot have.
+    Parameters
+    ----------
+    scene
+        The scene.
+    fields
+        New values by the names of the fields in a study file.
+
+    Returns
+    -------
+    Scene
+        The scene.
+
+    Raises
+    ------
+    InputError
+        For a value that a field cannot have.
     """
     tables = {name: dict(attrgetter(name)(scene)) for name in PARTS}
     # the tables within the method stand beside it

@@ -40,7 +40,19 @@ TO_SI: Mapping[str, float] = {
 
 
 class Unit(NamedTuple):
-    """A range of a field in which a number is likelier in another unit."""
+    """A range of a field in which a number is likelier in another unit.
+
+    Attributes
+    ----------
+    field
+        The field.
+    low, high
+        Ends of the range.
+    question
+        What is asked, a format of the number.
+    factor
+        What the number is multiplied with, to have the unit of the field.
+    """
 
     field: str
     low: float
@@ -97,6 +109,16 @@ def number(text: str) -> float:
 
     Python takes more for a number: digits of other scripts, and 1_0 for 10.
 
+    Parameters
+    ----------
+    text
+        The text.
+
+    Returns
+    -------
+    float
+        The number.
+
     Raises
     ------
     ValueError
@@ -121,7 +143,23 @@ def number(text: str) -> float:
 
 
 def whole_number(text: str) -> int:
-    """The whole number that a text is; a ValueError for any other text."""
+    """Read the whole number that a text is.
+
+    Parameters
+    ----------
+    text
+        The text.
+
+    Returns
+    -------
+    int
+        The number.
+
+    Raises
+    ------
+    ValueError
+        For any other text.
+    """
     if not re.fullmatch(r"[+-]?\d+", text.strip(), re.ASCII):
         raise ValueError(f"{text!r} is no whole number")
     return int(text)
@@ -131,6 +169,16 @@ def meant(text: str) -> str:
     """How to write a number that has a decimal comma or a unit.
 
     It is empty for any other text.
+
+    Parameters
+    ----------
+    text
+        The text.
+
+    Returns
+    -------
+    str
+        The advice; empty for any other text.
 
     Examples
     --------
@@ -164,6 +212,11 @@ def questions(
         What the questions call the fields; one that is missing has its own name.
     form
         How a field is given a value: a format of its name and the value.
+
+    Returns
+    -------
+    list of str
+        The questions.
 
     Examples
     --------
@@ -214,7 +267,22 @@ def _of_fluid(
 
 
 def of_profile(name: str, length: float, height: float) -> str:
-    """A question on a bed line of a length and a height (m) that no bed has."""
+    """Ask about a bed line of a length and a height that no bed has.
+
+    Parameters
+    ----------
+    name
+        Its name.
+    length
+        Its length, m.
+    height
+        Its height, m.
+
+    Returns
+    -------
+    str
+        The question; empty for any other bed line.
+    """
     if length <= LONGEST and height <= HIGHEST:
         return ""
     meant = f"{length / 1e3:.4g} m long and {height / 1e3:.4g} m high"
@@ -223,7 +291,18 @@ def of_profile(name: str, length: float, height: float) -> str:
 
 
 def of_sieve(diameters: Sequence[float]) -> list[str]:
-    """A question on a sieve table with diameters (m) that no sieve has."""
+    """Ask about a sieve table with diameters that no sieve has.
+
+    Parameters
+    ----------
+    diameters
+        The diameters, m.
+
+    Returns
+    -------
+    list of str
+        One question, or none.
+    """
     if not diameters or max(diameters) < WIDEST:
         return []
     sizes = f"{min(diameters):g} to {max(diameters):g}"
