@@ -163,6 +163,8 @@ class Study:
         Winds and threshold of `orchestrator erosion`.
     text
         The file itself, and the texts of the files that it names.
+    units_confirmed
+        Whether the file says that the units of its numbers are meant.
     source
         Where the text came from; None if it was no file.
     """
