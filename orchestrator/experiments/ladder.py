@@ -531,10 +531,11 @@ def _card(pairs: pd.DataFrame) -> Card:
         if math.isfinite(off):
             note = f"other numbers of its own move it by up to {off:.2g} %"
         numbers.append(Number(float(cost[best]), "s", meaning, note))
+    count = int(pairs.groupby(PAIR)["piles"].sum().max())
+    piles_ = "pile" if count == 1 else "piles, each"
     return Card(
         "How much computing time does a threshold need, by how far off it may be?",
-        f"{int(pairs.groupby(PAIR)['piles'].sum().max())} piles, each by "
-        f"{len(worst)} pairs of models for flow and grains.",
+        f"{count} {piles_} by {len(worst)} pairs of models for flow and grains.",
         tuple(numbers),
         "Nothing is measured here: errors are those from the most costly models, the "
         "reference, at 10, 30, 50 and 70 % of the grains.",

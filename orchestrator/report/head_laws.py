@@ -40,7 +40,7 @@ def laws(best: Sequence[theory.Line]) -> Head:
     def draw(narrow: bool) -> Canvas:
         canvas = figure(narrow, 44 + 30 * len(best))
         ax = canvas.subplots()
-        margins(canvas, 118 if narrow else 250, 52, 24, 24)
+        margins(canvas, 118 if narrow else 250, 64, 24, 24)
         for place, line in enumerate(reversed(best)):
             _row(ax, place, line, ANSWER if line is best[0] else FLOW)
         names = []
