@@ -17,10 +17,10 @@ from orchestrator.study.study import BED, TIME_LIMIT_S
 
 HEAD = f"""# Study files
 
-A study file is TOML. Six tables say what is asked: `[fluid]`, `[grain]`, `[bed]`, `[flow]` (what
-flows above), `[forces]` and `[threshold]` (what counts as motion). How it is answered is in
-`[method]`, `[method.flow]` and `[method.grains]`, all of which may be left out. `[axes]` lists
-values; every combination is a scene:
+A study file is TOML. Six tables are the question: `[fluid]`, `[grain]`, `[bed]`, `[flow]` (the flow
+above the bed), `[forces]` and `[threshold]` (what counts as motion). The tables `[method]`,
+`[method.flow]` and `[method.grains]` say how the question is answered; each may be left out.
+`[axes]` lists values of fields; every combination of them is a scene:
 
 ```toml
 title = "Two grains on three slopes"
@@ -33,26 +33,27 @@ roughness = "d/30"
 "bed.slope_deg" = [0.0, 15.0, 20.0]
 ```
 
-Each `[[group]]` is an experiment with a `name`: its tables override those of the top, its `axes`
-add to them. The [glossary](glossary.md) explains the words.
+Each `[[group]]` is an experiment with a `name`. Its tables override those at the top of the file, and
+its `axes` are added to those at the top. The [glossary](glossary.md) explains the words.
 
 | key of the top | default | meaning |
 |---|---|---|
 | `title` | the file's name | a line for the page |
 | `time_limit` | {TIME_LIMIT_S:g} | wall time after which a run of a solver counts as hung, s |
-| `units_confirmed` | false | numbers that are usual in another unit are meant: nothing is asked about them, and a profile beyond 10 km or 500 m of height is not refused |
-| `seeds` | none | number of beds that differ in their seed alone; also of a group |
-| `tolerance` | none | relative error that τ_c may have: [ladder.md](ladder.md) |
+| `units_confirmed` | false | true: unusual numbers are meant as they stand. Nothing is asked about them, and a profile that is longer than 10 km or higher than 500 m is accepted |
+| `seeds` | none | number of beds that differ in their seed alone; a group may have its own |
+| `tolerance` | none | accepted relative error of τ_c: [ladder.md](ladder.md) |
 | `cluster` | none | settings of a queue: [cluster.md](cluster.md) |
 | `group` | one group | the experiments |
 
-The *scope* says on which scenes a field has an effect; on others its column in the tables is empty.
-The *column* is named as the field where none is given: the table `scenes` has what was asked, the
-table `methods` how each scene was answered. The method `auto` and a tolerance may change the fields
-of the method ([ladder.md](ladder.md#how-a-scene-is-answered)); `methods` has the values that were
-run. Whether a file writes a default or leaves it out is the same. Ranges are intervals; a
-parenthesis leaves out the end. The [limits](#limits) are what a study refuses within the ranges. A
-key that files of an earlier version had is refused, with what it is called now.
+In the tables below, the *scope* names the scenes on which a field has an effect; on other scenes its
+column in the results is empty. The *column* of a field has the name of the field unless another is
+given. The table `scenes` of the results has the question, the table `methods` has how each scene was
+answered. The method `auto` and a tolerance may change the fields of the method
+([ladder.md](ladder.md#how-a-scene-is-answered)); `methods` has the values that were used. A default
+that is written in the file has the same effect as one that is left out. Ranges are intervals; a
+parenthesis excludes the end. Within the ranges, a study refuses what the [limits](#limits) name. A key
+of an earlier version is refused, and the message names the present key.
 """
 DAMPED = ", ".join(
     f"{step:g} up to a damping of {most:g}" for most, step in limits.TIMESTEPS
@@ -65,25 +66,25 @@ LIMITS = {
         "merge the finest or the coarsest classes of the sieve",
     ),
     "bed.profile": (
-        f"more than {limits.MOST_GRAINS:g} d of bed, of any shape, that are packed with grains, or "
+        f"more than {limits.MOST_GRAINS:g} d of bed, of any shape, to pack with grains, or "
         f"{profile.MOST_CORNERS} points, a slope above {profile.STEEPEST_DEG:g}°, points nearer "
         f"than {scene.NARROWEST_OVER_D:g} d or {scene.NARROWEST_OVER_CELL:g} of the first cell",
         "the method `local`, or a range of `bed.counted`; smooth it",
     ),
     "bed.slope_deg": (
-        f"a pile below {LOW:g}° or above {HIGH:g}°; anything counted beyond {limits.ANGLES}, where "
-        f"it rolls back without a flow; poured beds beyond the friction angle or {HIGH:g}°",
+        f"a pile below {LOW:g}° or above {HIGH:g}°; a counted place steeper than {limits.ANGLES}, "
+        f"from which grains roll without a flow; poured beds beyond the friction angle or {HIGH:g}°",
         "lower the slope, or count another part with `bed.counted`",
     ),
     "bed.entrainment_angle_deg": (
-        f"a pile below {limits.CLOSE_PACKED_DEG:g}°: the row above wedges a row apart",
+        f"a pile below {limits.CLOSE_PACKED_DEG:g}°: a row of grains then pushes the row below it apart",
         "60; single grains may have less",
     ),
     "bed.roughness": (
         f"above {question.ROUGHEST:.2g} d, or above the first cell's height",
         "d/30 is usual",
     ),
-    "bed.height": ("less than five grains", "raise it, or take a level bed"),
+    "bed.height": ("less than five grains high", "raise it, or take a level bed"),
     "bed.width": (f"below {question.LEAST_WIDTH:g} of the largest grains", "raise it"),
     "flow.depth, method.flow.lid": (
         f"less than {question.LEAST_DEPTH:g} heights of the forms or obstacles",
