@@ -321,7 +321,7 @@ def sentences(row: Mapping[Any, Any]) -> tuple[str, str]:
     said = _in_gas(row) if is_gas else _in_liquid(row)
     low, high, count, held = (row[name] for name in TESTED)
     if not count:
-        none = "no ten measured thresholds are of such beds at such Re*"
+        none = "fewer than ten measured thresholds are of such beds at this Re*"
         return said, f"no tested interval: {none}"
     where = "rows in air" if is_gas else "flume rows"
     rows = f"{held:.0%} of {count:g} {where} lie within {low:.3f} and {high:.3f}"
