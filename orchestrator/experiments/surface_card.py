@@ -24,8 +24,8 @@ EXCEEDED = {
 LITTLE = 0.005
 """Share of the surface that is not worth a word."""
 NOT_MEASURED = (
-    "wall stress over a bed in three dimensions has not been measured; the wind over "
-    "Askervein hill is met within 0.04 to 0.12 of the reference speed"
+    "Wall stress over a bed in three dimensions has not been measured; the wind over "
+    "Askervein hill is met within 0.04 to 0.12 of the reference speed."
 )
 INTERVAL_OF = "other first cells, meshes and models, on a cone"
 WORTH = Worth(

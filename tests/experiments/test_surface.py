@@ -103,7 +103,7 @@ def test_motion_starts_where_the_answer_says(
     card = said.partition("measured: ")[0]
     assert card.startswith("In which wind does this surface start to move")
     assert "hours a year" in card
-    assert "wall stress over a bed in three dimensions has not been" in said
+    assert "Wall stress over a bed in three dimensions has not been" in said
     assert "smoothed over" in said
 
 
