@@ -2,7 +2,6 @@
 
 import argparse
 import difflib
-import gc
 import os
 import sys
 import warnings
@@ -77,8 +76,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Exception
         If it is none of this program's own: a fault of the program.
     """
-    # fewer searches for unreachable cycles: 6 % less time for the plan of 375 cases
-    gc.set_threshold(100_000)
     terminal.listen()
     terminal.take()
     for name in ("SOURCE_DATE_EPOCH", "MPLBACKEND"):
