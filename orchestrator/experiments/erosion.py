@@ -561,9 +561,12 @@ def _card(found: Sequence[Pile], winds: Sequence[float], source: str) -> Card:
             )
         )
     speeds = ", ".join(map("{:g}".format, winds))
+    subject = pile.name
+    if len(found) > 1:
+        subject += f"; {len(found)} piles are compared below"
     return Card(
         f"How much dust does a wind of {speeds} m/s take from this pile?",
-        f"{pile.name}; {len(found)} piles are compared below.",
+        f"{subject}.",
         tuple(numbers),
         "No loss was measured on such a pile; the law of the loss is that of AP-42.",
         Worth(

@@ -57,7 +57,20 @@ class Ground:
     threshold: float | None = None
 
     def winds(self, local: FloatArray, ratio: FloatArray) -> FloatArray:
-        """Winds at 10 m at which local friction velocities are reached, m/s, (F,)."""
+        """Give the winds at which local friction velocities are reached.
+
+        Parameters
+        ----------
+        local
+            Friction velocity on each face, m/s, (F,).
+        ratio
+            Friction velocity on each face over that of flat ground, (F,).
+
+        Returns
+        -------
+        ndarray
+            Wind at 10 m, m/s, (F,).
+        """
         return onset.wind_of(onset.undisturbed(local, ratio), self.roughness)
 
     @property

@@ -89,7 +89,26 @@ class Row(dict[str, object]):
 
 
 def row(part: str, name: str, quantity: str, value: float, beside: float) -> Row:
-    """A value and what it is compared with, NaN where it stands alone."""
+    """Make a row of the table of what was compared.
+
+    Parameters
+    ----------
+    part
+        What is compared: a key of `--surfaces`.
+    name
+        The case.
+    quantity
+        What the value is.
+    value
+        The value of the flow over the surface.
+    beside
+        What it is compared with, NaN where it stands alone.
+
+    Returns
+    -------
+    Row
+        The row.
+    """
     return Row(
         part=part, case=name, quantity=quantity, value=value, compared_with=beside
     )

@@ -390,6 +390,11 @@ def tables_of(text: str, where: str) -> dict[str, Any]:
     where
         Its path, for messages.
 
+    Returns
+    -------
+    dict of str to object
+        The tables, as TOML's parser gives them.
+
     Raises
     ------
     InputError

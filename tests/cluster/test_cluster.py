@@ -33,7 +33,7 @@ packing = "disordered"
 
 [method.grains]
 load_increment = 0.006
-waiting_time = 3.0
+waiting_time = 6.0
 stiffness = 1e3
 mobile_layers = 1
 [method.flow]

@@ -26,7 +26,7 @@ fractions = [0.3, 0.5]
 
 [method.grains]
 load_increment = 0.05
-waiting_time = 3.0
+waiting_time = 6.0
 time_step = 0.3
 final_fraction = 0.8
 stiffness = 1e3

@@ -328,7 +328,7 @@ def test_warnings_that_are_errors_end_no_command(
     tmp_path: Path, orchestrator: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PYTHONWARNINGS", "error")
-    text = (HEAD + PILE).replace("waiting_time = 3.0", "waiting_time = 2.0")
+    text = (HEAD + PILE).replace("waiting_time = 6.0", "waiting_time = 2.0")
     (tmp_path / "small.toml").write_text(text)
     ended = orchestrator("study", "small.toml", "--plan")
     assert ended.returncode == 0, ended.stderr
