@@ -31,6 +31,7 @@ UNDESCRIBED = (
     "orchestrator.bed.surface",
     "orchestrator.experiments.surface",
     "orchestrator.experiments.surface_erosion",
+    "orchestrator.experiments.surface_truth",
     "orchestrator.flow.mesh3",
     "orchestrator.report.along",
     "orchestrator.report.answers",

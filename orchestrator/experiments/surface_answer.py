@@ -176,7 +176,18 @@ class Direction:
         return float(area[is_loose].sum() / area.sum())
 
     def shares(self, column: str = MOVES) -> Shares:
-        """The share of the form that moves, against the wind."""
+        """Give the share of the form that moves, against the wind.
+
+        Parameters
+        ----------
+        column
+            The column of the faces with the wind at which each moves.
+
+        Returns
+        -------
+        Shares
+            Winds, and the share of the area that moves in each.
+        """
         wind = self.faces[column].fillna(np.inf).to_numpy(float)
         return Shares.of(wind, self.faces["area_m2"].to_numpy(float))
 
@@ -308,7 +319,18 @@ class Answer:
         return total
 
     def hours_of(self, share: float) -> float:
-        """Hours a year in which at least this share of the surface moves."""
+        """Give the hours a year in which at least a share of the surface moves.
+
+        Parameters
+        ----------
+        share
+            Share of the area, 0 to 1.
+
+        Returns
+        -------
+        float
+            Hours a year, all directions of the rose together.
+        """
         assert self.rose is not None
         total = 0.0
         for each in self.directions:
