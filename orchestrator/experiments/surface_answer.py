@@ -222,7 +222,13 @@ class Direction:
         return f"wind from {self.from_deg:g}°"
 
     def row(self) -> dict[str, Any]:
-        """Its numbers, a row of the table of directions."""
+        """Give the numbers of the direction.
+
+        Returns
+        -------
+        dict of str to object
+            A row of the table of directions, by column.
+        """
         shares = self.shares()
         first = self.first
         row = {
