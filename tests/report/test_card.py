@@ -182,6 +182,8 @@ def test_labels_of_the_picture_of_a_grain_lie_on_no_points(
     results: Results, measured: float, narrow: bool
 ) -> None:
     grain = only(results, "grain").joined("single_grain").iloc[0].copy()
+    # of this roughness the thresholds of grains that go on are tabulated
+    grain["z0_m"] = grain["d_m"] / 30
     grain["ustar0_m_s"] = grain["ustar_m_s"]
     grain["measured_level_ustar_m_s"] = measured * grain["ustar0_m_s"]
     canvas = head_grain.of_grain(grain).draw(narrow)
