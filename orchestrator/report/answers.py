@@ -182,15 +182,27 @@ def _first_motion(row: pd.Series, first: float, told: Quantity) -> Number:
         of_what = _of_seeds(row)
     elif row["tested_rows"] > 0:
         of_what = single.tested_on(row)
+    return _flow_number(row, told, "the first grains", (first, low, high), of_what)
+
+
+def _flow_number(
+    row: pd.Series,
+    told: Quantity,
+    moved: str,
+    ustar: tuple[float, float, float],
+    of_what: str,
+) -> Number:
+    """The flow that moves a part of a bed: u*_0 with the ends of its interval, m/s."""
+    value, low, high = ustar
     return Number(
-        single.in_unit(row, first, told),
+        single.in_unit(row, value, told),
         told.unit,
-        f"{told.name} that moves the first grains",
+        f"{told.name} that moves {moved}",
         single.place_of(told, row),
         low=single.in_unit(row, low, told),
         high=single.in_unit(row, high, told),
         interval_of=of_what,
-        measured=single.in_unit(row, single.measured_ustar(row, first), told),
+        measured=single.in_unit(row, single.measured_ustar(row, value), told),
     )
 
 
@@ -266,16 +278,7 @@ def share(row: pd.Series, told: Quantity) -> Number:
     low, high, of_what = _share_interval(row)
     part = f"{row['fraction']:.0%}".replace("%", " %")
     what = "of the bed" if row["method"] == "local" else "of the grains"
-    return Number(
-        single.in_unit(row, ustar, told),
-        told.unit,
-        f"{told.name} that moves {part} {what}",
-        single.place_of(told, row),
-        low=single.in_unit(row, low, told),
-        high=single.in_unit(row, high, told),
-        interval_of=of_what,
-        measured=single.in_unit(row, single.measured_ustar(row, ustar), told),
-    )
+    return _flow_number(row, told, f"{part} {what}", (ustar, low, high), of_what)
 
 
 def ustar_number(row: pd.Series) -> Number:
@@ -527,10 +530,13 @@ def by_law(row: pd.Series) -> dict[str, tuple[float, bool]]:
         Friction velocity at the threshold, m/s, and whether the law holds there, by the
         name of the law.
     """
+    rows = pd.DataFrame([row] * len(LAWS)).assign(force_law=list(LAWS))
+    # what goes on depends on no law: all are asked for at once
+    ustar = grain_ustar(rows)
     found = {}
-    for name in LAWS:
-        (ustar,), (holds,) = by_this_law(pd.DataFrame([row]).assign(force_law=name))
-        found[name] = float(ustar), bool(holds)
+    for place, name in enumerate(LAWS):
+        (holds,) = _holds(rows.iloc[[place]], ustar[[place]])
+        found[name] = float(ustar[place]), bool(holds)
     return found
 
 
@@ -550,6 +556,11 @@ def by_this_law(rows: pd.DataFrame) -> tuple[FloatArray, BoolArray]:
         Whether the law holds there, shape (n,).
     """
     ustar = grain_ustar(rows)
+    return ustar, _holds(rows, ustar)
+
+
+def _holds(rows: pd.DataFrame, ustar: FloatArray) -> BoolArray:
+    """Whether the one force law of rows holds at their thresholds (m/s)."""
     exposure = Exposure(
         diameter=rows["d_m"].to_numpy(float),
         roughness=rows["z0_m"].to_numpy(float),
@@ -558,7 +569,7 @@ def by_this_law(rows: pd.DataFrame) -> tuple[FloatArray, BoolArray]:
         lift_coefficient=rows["alpha_s"].to_numpy(float),
     )
     law = LAWS[str(rows["force_law"].iloc[0])]
-    return ustar, np.asarray(law.valid(ustar, exposure))
+    return np.asarray(law.valid(ustar, exposure))
 
 
 # many laws, and hills
@@ -676,7 +687,3 @@ def _worth_of_many(shown: pd.DataFrame, count: int, of: int) -> Worth:
         f"a {what} take the measured value, to compare beds the computed ones."
     )
     return Worth("care", "usable, with a correction", advice)
-
-
-TERM_LINES = (TERMS["u*"], TERMS["shields"])
-"""Terms that tables of thresholds have in their heads."""
