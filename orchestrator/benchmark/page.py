@@ -16,7 +16,7 @@ from orchestrator.benchmark.pack import Pack
 from orchestrator.errors import printable
 from orchestrator.physics import curves
 from orchestrator.report import page, style
-from orchestrator.report.card import Card, Mark, Number, Worth
+from orchestrator.report.card import Card, Number, Worth
 from orchestrator.report.page import Section
 from orchestrator.report.style import DIAMETERS, PANELS, WATER, Figure, Look
 from orchestrator.runs.files import Folder
@@ -146,15 +146,13 @@ def _card(theirs: pd.DataFrame) -> Card:
     of = len(theirs)
     passed, failed, declined = theirs[["passed", "failed", "declined"]].sum().tolist()
     names = list(theirs["solver"].unique())
-    told: tuple[tuple[int, str, str, Mark], ...] = (
-        (passed, "scenes passed", "within the tolerance of each", "good"),
-        (declined, "scenes declined", "no answer was given", "care"),
-        (failed, "scenes failed", "the list below says which and why", "bad"),
+    within = "within the tolerance of each"
+    which = "the list below says which and why"
+    numbers = (
+        Number.counted(passed, of, "scenes passed", within, "good"),
+        Number.counted(declined, of, "scenes declined", "no answer was given", "care"),
+        Number.counted(failed, of, "scenes failed", which, "bad"),
     )
-    numbers = []
-    for count, meaning, note, mark in told:
-        number = Number(count, f"of {of}", meaning, note, decimals=0, mark=mark)
-        numbers.append(number)
     worth = Worth("good", "passed", "No scene is beyond its tolerance.")
     if failed:
         worth = Worth("bad", "failed", "Read first what failed.")
@@ -164,7 +162,7 @@ def _card(theirs: pd.DataFrame) -> Card:
     return Card(
         f"Does {who} give the expected answers?",
         f"{of} scenes of the benchmark; expected are exact answers, or our own runs.",
-        tuple(numbers),
+        numbers,
         "Nothing is measured here: levels 1 and 2 are exact answers, levels 3 to 5 our "
         "own runs.",
         worth,

@@ -26,7 +26,7 @@ from orchestrator.fidelity.decision import as_written, written
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import Motion
 from orchestrator.report import style
-from orchestrator.report.card import Card, Mark, Number, Worth
+from orchestrator.report.card import Card, Number, Worth
 from orchestrator.report.page import Section
 from orchestrator.report.style import Figure
 from orchestrator.runs import case
@@ -245,20 +245,20 @@ def _card(table: pd.DataFrame) -> Card:
     good = int(counts.get("good", 0))
     noticed = int(table["caught"].sum())
     silent = of - good - noticed
-    told: tuple[tuple[int, str, str, Mark], ...] = (
-        (good, "runs are good", f"within {WRONG:.0%} of their references", "good"),
-        (noticed, "runs say that they failed", "noisy, exploded or stalled", "care"),
-        (silent, "runs are wrong and say nothing", "further off", "bad"),
+    within = f"within {WRONG:.0%} of their references"
+    kinds = "noisy, exploded or stalled"
+    numbers = (
+        Number.counted(good, of, "runs are good", within, "good"),
+        Number.counted(noticed, of, "runs say that they failed", kinds, "care"),
+        Number.counted(
+            silent, of, "runs are wrong and say nothing", "further off", "bad"
+        ),
     )
-    numbers = []
-    for count, meaning, note, mark in told:
-        number = Number(count, f"of {of}", meaning, note, decimals=0, mark=mark)
-        numbers.append(number)
     return Card(
         "Where do the methods fail, and do they say so?",
         f"{table['map'].nunique()} maps of two numbers each, taken far beyond what is "
         "used.",
-        tuple(numbers),
+        numbers,
         "Nothing is measured here: each run is compared with a finer one.",
         Worth("good", "usable", "Stay where the maps are good."),
     )

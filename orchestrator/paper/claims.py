@@ -211,8 +211,7 @@ def card(judged: Sequence[Judged], tables: Tables) -> Card:
     figures = []
     for verdict, meaning, note in told:
         mark = MARKS[verdict]
-        count = counts[verdict]
-        figures.append(Number(count, f"of {of}", meaning, note, decimals=0, mark=mark))
+        figures.append(Number.counted(counts[verdict], of, meaning, note, mark))
     return Card(
         "Do the paper’s claims hold when its method is run anew?",
         "Bravo, Ortiz and Pérez-Aparicio on sediment transport by the discrete element"

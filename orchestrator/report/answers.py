@@ -398,14 +398,8 @@ def _end_of_range(
 
 def _usable_number(count: int, of: int) -> Number:
     """How many thresholds are usable."""
-    return Number(
-        count,
-        f"of {of}",
-        "thresholds are usable",
-        "" if count == of else "the tables give the reason for each other one",
-        decimals=0,
-        mark=_mark_of(count, of),
-    )
+    note = "" if count == of else "the tables give the reason for each other one"
+    return Number.counted(count, of, "thresholds are usable", note, _mark_of(count, of))
 
 
 def _mark_of(count: int, of: int) -> Mark:

@@ -63,6 +63,28 @@ class Number:
     decimals: int | None = None
     mark: Mark | None = None
 
+    @classmethod
+    def counted(
+        cls, value: int, of: int, meaning: str, note: str = "", mark: Mark | None = None
+    ) -> "Number":
+        """Make the number of a count.
+
+        Parameters
+        ----------
+        value
+            The count.
+        of
+            All that could be counted.
+        meaning, note, mark
+            As those of the number.
+
+        Returns
+        -------
+        Number
+            The number, without decimals.
+        """
+        return cls(value, f"of {of}", meaning, note, decimals=0, mark=mark)
+
     @property
     def figure(self) -> str:
         """The number as it is written."""
