@@ -202,36 +202,24 @@ def way(galileo: float, ratio: float, theta: float, gust: float) -> FloatArray:
     """
     bed = saltation.BEADS
     grains = saltation.Grains(galileo, ratio)
-    flow = saltation._Flow(
-        grains, np.array([theta]), saltation.Gust(gust, 10.0), bed.level
-    )
-    speed = np.sqrt(2 * saltation.EXCESS * bed.trapped)
+    flow = saltation._Flow(grains, np.array([theta]), saltation.Gust(gust, 10.0), bed)
+    speed = np.sqrt(2 * saltation.EXCESS * flow.trapped)
     angle = np.radians(saltation.LAUNCH_DEG)
-    motion = saltation._Motion(
-        np.zeros(1),
-        np.array([speed * np.cos(angle)]),
-        np.array([speed * np.sin(angle)]),
-    )
-    time = np.array([2 * speed * np.sin(angle) / 200])
-    clock = 0.0
+    start = saltation._Motion(np.zeros(1), speed * np.cos(angle), speed * np.sin(angle))
+    hopping = saltation._Hopping(flow, start, 200)
     x = 0.0
     path = [(x, 0.0)]
     while x < MOST_D:
-        ustar = flow.peak_ustar if clock < flow.gust_end[0] else flow.ustar
-        fluid, pull = flow.pull(*motion, ustar)
-        end = motion.later(flow, fluid, pull, time)
-        x += float(time[0] * (motion.along[0] + end.along[0]) / 2)
-        clock += float(time[0])
-        path.append((x, max(float(end.height[0]), 0.0)))
-        motion = end
-        if end.height[0] > 0:
-            continue
-        impact = np.hypot(end.along, end.normal)
-        whole, up = bed.after(impact, np.clip(-end.normal / impact, 0, 1))
-        if whole[0] ** 2 / 2 < bed.trapped:
-            break
-        motion = saltation._Motion(np.zeros(1), np.sqrt(whole**2 - up**2), up)
-        time = 2 * up / 200
+        along = hopping.motion.along
+        time = -hopping.clock
+        lands, impact = hopping.fly()
+        time += hopping.clock
+        x += float(time[0] * (along[0] + hopping.motion.along[0]) / 2)
+        path.append((x, max(float(hopping.motion.height[0]), 0.0)))
+        if lands[0]:
+            is_trapped, _ = hopping.bounce(lands, impact, bed)
+            if is_trapped[0]:
+                break
     return np.array(path)
 
 
@@ -296,7 +284,7 @@ def main(directory: Path) -> None:
         "how-steps": steps(run.tables["pile_curve"], run.tables["pile_threshold"]),
     }
     for name, canvas in made.items():
-        (FIGURES / f"{name}.svg").write_bytes(style._svg(canvas))
+        (FIGURES / f"{name}.svg").write_bytes(style.svg(canvas))
         (directory / f"{name}.png").write_bytes(style._png(canvas))
 
 

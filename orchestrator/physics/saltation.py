@@ -560,65 +560,120 @@ def fate(
         speed = np.sqrt(2 * EXCESS * flow.trapped)
     launch = np.broadcast_to(np.asarray(speed, float), count)
     angle = np.radians(angle_deg)
-    motion = _Motion(np.zeros(count), launch * np.cos(angle), launch * np.sin(angle))
+    start = _Motion(np.zeros(count), launch * np.cos(angle), launch * np.sin(angle))
+    hopping = _Hopping(flow, start, steps)
     found = np.full(count, ENDLESS)
-    place = np.arange(count)
-    clock = np.zeros(count)
-    step = 2 * motion.normal / flow.normal / steps
-    hops = np.zeros(count)
-    alike = np.zeros(count)
-    # speeds after the rebound before, along and normal to the bed
-    last = np.zeros((2, count))
     for _ in range(MOST_STEPS):
-        in_gust = clock < flow.gust_end
-        ustar = np.where(in_gust, flow.peak_ustar, flow.ustar)
-        # a step ends where the gust does
-        left = np.where(in_gust, flow.gust_end - clock, np.inf)
-        pull = flow.pull(*motion, ustar)
-        time = np.minimum(motion.time_step(step, pull.drag), left)
-        middle = motion.later(pull, time / 2)
-        end = motion.later(flow.pull(*middle, ustar), time)
-        clock = clock + time
-        lands = end.height < 0
+        lands, impact = hopping.fly()
         if not lands.any():
-            motion = end
             continue
-        part = motion.part_at_bed(end, time)
-        clock = np.where(lands, clock - (1 - part) * time, clock)
-        along = motion.along + part * (end.along - motion.along)
-        normal = motion.normal + part * (end.normal - motion.normal)
-        impact = np.hypot(along, normal)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            sine = np.clip(np.nan_to_num(-normal / impact), 0.0, 1.0)
-        whole, up = rebound.after(impact, sine)
-        on = np.sqrt(whole**2 - up**2) * np.sign(along)
-        is_trapped = lands & ((whole**2 / 2 < flow.trapped) | (on < 0))
-        after_gust = lands & (clock >= flow.gust_end)
-        now = np.array([on, up])
-        is_no_weaker = np.all(now >= last * (1 - SETTLED), axis=0)
-        in_a_row = np.where(is_no_weaker, alike + 1, 0)
-        alike = np.where(after_gust, in_a_row, alike)
-        last = np.where(after_gust, now, last)
-        hops = hops + after_gust
-        goes_on = after_gust & ~is_trapped & ((alike > ALIKE) | (hops >= MOST_HOPS))
-        found[place[is_trapped]] = STOPS
-        found[place[goes_on]] = GOES_ON
-        motion = _Motion(
-            np.where(lands, 0.0, end.height),
-            np.where(lands, on, end.along),
-            np.where(lands, up, end.normal),
-        )
-        step = np.where(lands, 2 * up / flow.normal / steps, step)
+        is_trapped, goes_on = hopping.bounce(lands, impact, rebound)
+        found[hopping.place[is_trapped]] = STOPS
+        found[hopping.place[goes_on]] = GOES_ON
         is_left = ~(is_trapped | goes_on)
-        if is_left.all():
-            continue
         if not is_left.any():
             break
-        flow.keep(is_left)
-        motion = _Motion(*[each[is_left] for each in motion])
-        place, clock, step = place[is_left], clock[is_left], step[is_left]
-        hops, alike, last = hops[is_left], alike[is_left], last[:, is_left]
+        hopping.keep(is_left)
     return found
+
+
+class _Hopping:
+    """Grains that are neither trapped nor known to go on, arrays of shape (n,).
+
+    Their `place` among all, their `motion`, the time on the `clock` since they left,
+    the time `step` of their hop, the number of their `hops` after the gust, how many of
+    these in a row are `alike`, and the `last` speeds along the bed and off it.
+    """
+
+    def __init__(self, flow: _Flow, start: _Motion, steps: int) -> None:
+        """Begin with grains that leave the bed; a hop in vacuum takes some steps."""
+        count = len(start.height)
+        self.flow = flow
+        self.steps = steps
+        self.motion = start
+        self.place = np.arange(count)
+        self.clock = np.zeros(count)
+        self.step = self._step(start.normal)
+        self.hops = np.zeros(count)
+        self.alike = np.zeros(count)
+        self.last_along = np.zeros(count)
+        self.last_normal = np.zeros(count)
+
+    def _step(self, normal: FloatArray) -> FloatArray:
+        """The time step of a hop that begins with a speed off the bed."""
+        return 2 * normal / self.flow.normal / self.steps
+
+    def fly(self) -> tuple[BoolArray, _Motion]:
+        """Go on by a time step: which grains land, and how they meet the bed then."""
+        flow = self.flow
+        start = self.motion
+        in_gust = self.clock < flow.gust_end
+        ustar = np.where(in_gust, flow.peak_ustar, flow.ustar)
+        # a step ends where the gust does
+        left = np.where(in_gust, flow.gust_end - self.clock, np.inf)
+        pull = flow.pull(*start, ustar)
+        time = np.minimum(start.time_step(self.step, pull.drag), left)
+        middle = start.later(pull, time / 2)
+        end = start.later(flow.pull(*middle, ustar), time)
+        self.motion = end
+        self.clock = self.clock + time
+        lands = end.height < 0
+        if not lands.any():
+            return lands, end
+        part = start.part_at_bed(end, time)
+        self.clock = np.where(lands, self.clock - (1 - part) * time, self.clock)
+        along = start.along + part * (end.along - start.along)
+        normal = start.normal + part * (end.normal - start.normal)
+        return lands, _Motion(np.zeros(len(part)), along, normal)
+
+    def bounce(
+        self,
+        lands: BoolArray,
+        impact: _Motion,
+        rebound: Rebound,
+    ) -> tuple[BoolArray, BoolArray]:
+        """Rebound those that land: which of them are trapped, and which go on."""
+        speed = np.hypot(impact.along, impact.normal)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            sine = np.clip(np.nan_to_num(-impact.normal / speed), 0.0, 1.0)
+        whole, up = rebound.after(speed, sine)
+        on = np.sqrt(whole**2 - up**2) * np.sign(impact.along)
+        flying = self.motion
+        self.motion = _Motion(
+            np.where(lands, 0.0, flying.height),
+            np.where(lands, on, flying.along),
+            np.where(lands, up, flying.normal),
+        )
+        self.step = np.where(lands, self._step(up), self.step)
+        is_trapped = lands & ((whole**2 / 2 < self.flow.trapped) | (on < 0))
+        after_gust = lands & (self.clock >= self.flow.gust_end)
+        self._count(after_gust, on, up)
+        is_steady = (self.alike > ALIKE) | (self.hops >= MOST_HOPS)
+        return is_trapped, after_gust & ~is_trapped & is_steady
+
+    def _count(self, ends: BoolArray, along: FloatArray, normal: FloatArray) -> None:
+        """Count the hops that have ended, and those no weaker than the one before."""
+        is_as_far = along >= self.last_along * (1 - SETTLED)
+        is_as_high = normal >= self.last_normal * (1 - SETTLED)
+        in_a_row = np.where(is_as_far & is_as_high, self.alike + 1, 0)
+        self.alike = np.where(ends, in_a_row, self.alike)
+        self.last_along = np.where(ends, along, self.last_along)
+        self.last_normal = np.where(ends, normal, self.last_normal)
+        self.hops = self.hops + ends
+
+    def keep(self, mask: BoolArray) -> None:
+        """Keep some of the grains."""
+        if mask.all():
+            return
+        self.flow.keep(mask)
+        self.motion = _Motion(*[each[mask] for each in self.motion])
+        self.place = self.place[mask]
+        self.clock = self.clock[mask]
+        self.step = self.step[mask]
+        self.hops = self.hops[mask]
+        self.alike = self.alike[mask]
+        self.last_along = self.last_along[mask]
+        self.last_normal = self.last_normal[mask]
 
 
 @dataclass(frozen=True, eq=False)
@@ -961,44 +1016,82 @@ def tabulated(grains: Grains, *, at_most: bool = False) -> Thresholds:
     >>> print(tabulated(sand).steady.round(3))
     [0.033 0.028]
     """
-    axes = (np.log(GALILEO_NODES), np.log(DENSITY_NODES), SLOPE_NODES_DEG)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        places = np.log([grains.galileo, grains.density_ratio])
-    points = (*places, grains.slope_deg)
-    is_inside = np.isclose(grains.roughness * SAND_GRAIN, 1, rtol=1e-6, atol=0)
-    is_inside &= (grains.fall <= 0) & (grains.relative_size == 1)
-    table = _table()[2:] if at_most else _table()[:2]
-    corners = []
-    for nodes, point in zip(axes, points, strict=True):
-        is_inside &= (point >= nodes[0]) & (point <= nodes[-1])
-        # NaN is no place: any interval does, since such a grain is not inside
-        place = np.searchsorted(nodes, np.nan_to_num(point), side="right") - 1
-        first = np.clip(place, 0, len(nodes) - 2)
-        part = (point - nodes[first]) / (nodes[first + 1] - nodes[first])
-        corners.append((first, part))
+    is_inside = _is_tabulated(grains)
     found = np.full((2, len(grains)), np.nan)
-    (galileo, over), (density, across), (slope, up) = corners
-    at_slopes = []
-    for steeper in (0, 1):
-        sums = np.zeros_like(found)
-        for further, denser in itertools.product((0, 1), (0, 1)):
-            along = over if further else 1 - over
-            weight = along * (across if denser else 1 - across)
-            value = table[:, galileo + further, density + denser, slope + steeper]
-            # an infinite or missing threshold counts only where it has a weight
-            sums += np.where(weight > 0, weight * value, 0.0)
-        at_slopes.append(np.exp(sums))
-    gentle, steep = at_slopes
-    with np.errstate(invalid="ignore"):
-        rise = np.where(gentle == steep, 0.0, up * (steep - gentle))
-        between = np.where(up > 0, gentle + rise, gentle)
-    found[:, is_inside] = between[:, is_inside]
+    table = _table()[2:] if at_most else _table()[:2]
+    found[:, is_inside] = _interpolated(table, grains.at(is_inside))
     outside = np.flatnonzero(~is_inside)
     if len(outside):
         beyond = _beyond_table(grains.at(outside), at_most)
         found[0, outside] = beyond.steady
         found[1, outside] = beyond.cessation
     return Thresholds(steady=found[0], cessation=found[1])
+
+
+_AXES = (np.log(GALILEO_NODES), np.log(DENSITY_NODES), SLOPE_NODES_DEG)
+"""Axes of the table, in which it is linear."""
+
+
+def _points(grains: Grains) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The places of grains on the axes of the table; NaN where there is none."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        galileo = np.log(grains.galileo)
+        density = np.log(grains.density_ratio)
+    return galileo, density, grains.slope_deg
+
+
+def _is_tabulated(grains: Grains) -> BoolArray:
+    """Whether the table holds each grain: its bed, its flow and its place."""
+    is_inside = np.isclose(grains.roughness * SAND_GRAIN, 1, rtol=1e-6, atol=0)
+    is_inside &= (grains.fall <= 0) & (grains.relative_size == 1)
+    for nodes, point in zip(_AXES, _points(grains), strict=True):
+        is_inside &= (point >= nodes[0]) & (point <= nodes[-1])
+    return is_inside
+
+
+class _Cell(NamedTuple):
+    """Where points lie on an axis: the node below, and the part of the way to the next.
+
+    Arrays of shape (n,).
+    """
+
+    node: IntArray
+    part: FloatArray
+
+    @classmethod
+    def of(cls, nodes: FloatArray, point: FloatArray) -> "_Cell":
+        """The cells of some points between the first and the last node."""
+        below = np.searchsorted(nodes, point, side="right") - 1
+        node = np.clip(below, 0, len(nodes) - 2)
+        part = (point - nodes[node]) / (nodes[node + 1] - nodes[node])
+        return cls(node, part)
+
+    def weight(self, end: int) -> FloatArray:
+        """What the node below (0) or the next one (1) counts."""
+        return self.part if end else 1 - self.part
+
+
+def _interpolated(table: FloatArray, grains: Grains) -> FloatArray:
+    """Thresholds of grains that a part of the table holds, of shape (2, n)."""
+    galileo, density, slope = map(_Cell.of, _AXES, _points(grains))
+    at_slopes = []
+    for steeper in (0, 1):
+        logarithm = np.zeros((2, len(grains)))
+        for further, denser in itertools.product((0, 1), (0, 1)):
+            value = table[
+                :,
+                galileo.node + further,
+                density.node + denser,
+                slope.node + steeper,
+            ]
+            weight = galileo.weight(further) * density.weight(denser)
+            # an infinite or missing threshold counts only where it has a weight
+            logarithm += np.where(weight > 0, weight * value, 0.0)
+        at_slopes.append(np.exp(logarithm))
+    gentle, steep = at_slopes
+    with np.errstate(invalid="ignore"):
+        rise = np.where(gentle == steep, 0.0, slope.part * (steep - gentle))
+        return np.where(slope.part > 0, gentle + rise, gentle)
 
 
 def weakest(density_ratio: FloatArray) -> FloatArray:
