@@ -142,3 +142,24 @@ def whole_up(value: float) -> int:
     (3, 7, 8)
     """
     return int(np.ceil(value - SLACK))
+
+
+def percent(part: float) -> str:
+    """Write a part of a whole in percent.
+
+    Parameters
+    ----------
+    part
+        The part; 1 is the whole.
+
+    Returns
+    -------
+    str
+        Whole percent.
+
+    Examples
+    --------
+    >>> percent(0.3)
+    '30 %'
+    """
+    return f"{part:.0%}".replace("%", " %")

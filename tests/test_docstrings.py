@@ -35,15 +35,10 @@ UNDESCRIBED = (
     "orchestrator.flow.mesh3",
     "orchestrator.report.along",
     "orchestrator.report.answers",
-    "orchestrator.report.bed",
     "orchestrator.report.flows",
     "orchestrator.report.head_line",
     "orchestrator.report.maps",
-    "orchestrator.report.results",
     "orchestrator.report.shields",
-    "orchestrator.report.single",
-    "orchestrator.report.style",
-    "orchestrator.report.subjects",
     "orchestrator.report.theory",
 )
 """Modules whose public names still lack sections of numpydoc."""

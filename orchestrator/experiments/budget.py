@@ -13,6 +13,7 @@ import pandas as pd
 from matplotlib.figure import Figure as Canvas
 
 from orchestrator import plan
+from orchestrator.digits import percent
 from orchestrator.errors import InputError
 from orchestrator.experiments.experiment import Experiment, Results, Runs, label, piles
 from orchestrator.fidelity import limits, spread
@@ -597,7 +598,7 @@ def _row(name: str, theta: _Interval, ustar0: _Interval) -> dict[str, str]:
 
 def _card(name: str, fraction: float, theta: _Interval, ustar0: _Interval) -> Card:
     """The answer card: the numbers of a bed with all choices together."""
-    part = f"{fraction:.0%}".replace("%", " %")
+    part = percent(fraction)
     of_what = "all choices that the models share, together"
     numbers = []
     for of, unit, meaning in (

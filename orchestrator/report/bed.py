@@ -1,4 +1,4 @@
-"""The picture of a bed with its grains and the flow, and the grains at each stop of a slider."""
+"""The picture of a bed with its grains and the flow, with a slider over the flow."""
 
 import base64
 from collections.abc import Iterator
@@ -14,6 +14,7 @@ from PIL import Image
 
 from orchestrator.bed.deck import read_dump
 from orchestrator.bed.line import BedLine
+from orchestrator.digits import percent
 from orchestrator.grains import motion
 from orchestrator.grains import pile as piles
 from orchestrator.grains.pile import Pile
@@ -24,21 +25,43 @@ from orchestrator.report.style import Figure
 from orchestrator.study import fields
 from orchestrator.types import FloatArray, IntArray
 
-LONG = 100.0  # length of a face, d, beyond which its upper end is shown alone: grains must be seen
-WHOLE = 4.0  # length of a whole bed over `LONG` up to which all forms are shown
-STOPS = 300  # largest number of stops of the slider of a bed without dynamics
-SHIFT = 0.02  # grains that have moved by less since they were last drawn stay, d
+LONG = 100.0
+"""Length of a face, d, beyond which its upper end is shown alone.
+
+Grains must be seen.
+"""
+WHOLE = 4.0
+"""Length of a whole bed over `LONG` up to which all forms are shown."""
+STOPS = 300
+"""Largest number of stops of the slider of a bed without dynamics."""
+SHIFT = 0.02
+"""Grains that have moved by less since they were last drawn stay, d."""
+BARS = (1, 2, 5, 10, 20, 50, 100)
+"""Lengths of the bar of scale, d."""
 
 
 @dataclass(frozen=True)
 class Steps:
     """The n drawn grains of a pile at K + 1 stops of the slider, lengths in d.
 
-    `grains` (n,) are their numbers in the packing; `places` (K + 1, n, 2) are x and z, first as
-    packed, NaN of a grain that has left the box; `level` (n,) is the stop by which a grain has
-    moved, 0 if it never does or is not counted. `flow` (K + 1,) is the undisturbed friction
-    velocity, m/s, `totals` (K + 1,) how many counted grains, drawn or not, have moved. `lines` are
-    the bed lines, each with the first stop under its flow; one, on a frozen bed.
+    Attributes
+    ----------
+    pile
+        The pile.
+    grains
+        Their numbers in the packing, shape (n,).
+    places
+        Their x and z, shape (K + 1, n, 2): first as packed; NaN of a grain that has
+        left the box.
+    level
+        The stop by which each grain has moved, shape (n,); 0 if it never does or is not
+        counted.
+    flow
+        Undisturbed friction velocity at each stop, m/s, shape (K + 1,).
+    totals
+        Number of counted grains, drawn or not, that have moved, shape (K + 1,).
+    lines
+        The bed lines, each with the first stop under its flow; one, on a frozen bed.
     """
 
     pile: Pile
@@ -50,16 +73,39 @@ class Steps:
     lines: tuple[tuple[int, BedLine], ...]
 
     def first(self, fraction: float) -> int:
-        """The first stop at which a fraction of the counted grains has moved, or the last."""
+        """Find the first stop at which a fraction of the counted grains has moved.
+
+        Parameters
+        ----------
+        fraction
+            The fraction.
+
+        Returns
+        -------
+        int
+            The stop, or the last one.
+        """
         enough = self.totals >= fraction * self.pile.packing.count - 1e-9
         return int(np.argmax(enough)) if enough.any() else len(self.totals) - 1
 
 
 def read(pile: Pile, cases: Path) -> Steps:
-    """Read where the grains of a finished pile are: without DEM, where they were packed.
+    """Read where the grains of a finished pile are; without DEM where they were packed.
 
-    Only grains within the picture are read, at `STOPS` of the load steps if there are more: all
-    grains of a long bed at all load steps would need many gigabytes.
+    Only grains within the picture are read, at `STOPS` of the load steps if there are
+    more: all grains of a long bed at all load steps would need many gigabytes.
+
+    Parameters
+    ----------
+    pile
+        The pile.
+    cases
+        The directory of its finished cases.
+
+    Returns
+    -------
+    Steps
+        The grains at each stop.
     """
     packing = pile.packing
     moved = pile.motion(cases)
@@ -89,7 +135,10 @@ def read(pile: Pile, cases: Path) -> Steps:
 
 
 def _grains_shown(pile: Pile) -> IntArray:
-    """Numbers of the grains in the picture; by DEM of all mobile ones, which may roll into it."""
+    """Numbers of the grains in the picture.
+
+    By DEM they are all mobile ones, which may roll into it.
+    """
     (left, right, bottom, _), _ = window(pile)
     x, z = pile.packing.centres.T
     is_shown = (x > left - 1) & (x < right + 1) & (z > bottom - 1)
@@ -99,7 +148,7 @@ def _grains_shown(pile: Pile) -> IntArray:
 
 
 def _places_by_dem(pile: Pile, method: piles.Dem, cases: Path) -> FloatArray:
-    """Places of all grains as packed and after each load step, d, of shape (K + 1, N, 2)."""
+    """Places of all grains as packed and after each load step, d: (K + 1, N, 2)."""
     packing = pile.packing
     d = pile.scene.grain.diameter
     fixed = np.where(packing.mobile[:, None], np.nan, packing.centres)
@@ -114,7 +163,10 @@ def _places_by_dem(pile: Pile, method: piles.Dem, cases: Path) -> FloatArray:
 
 
 def _stops(moved: motion.Motion) -> IntArray:
-    """Load steps of the slider of a bed without dynamics: evenly spaced, and that of `FRACTION`."""
+    """Load steps of the slider of a bed without dynamics.
+
+    They are evenly spaced, with that of `FRACTION` between them.
+    """
     share = int(np.argmax(moved.moved >= FRACTION * moved.count - 1e-9))
     count = len(moved.flow)
     spaced = np.linspace(0, count - 1, min(STOPS, count)).round().astype(int)
@@ -122,9 +174,21 @@ def _stops(moved: motion.Motion) -> IntArray:
 
 
 def chosen(results: Results) -> Iterator[tuple[pd.Series, Pile]]:
-    """The threshold of each slope that the sentences are about, with the pile that shows it.
+    """List the thresholds that the sentences are about, one for each slope.
 
-    Where the files of that pile were pruned, the next one has its place.
+    Where the files of a pile were pruned, the next one has its place.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Yields
+    ------
+    row : Series
+        The threshold, with the columns of its scene.
+    pile : Pile
+        The pile that shows it.
     """
     for _, rows in split(results.exemplars, "alpha_deg"):
         for _, row in rows.iterrows():
@@ -135,23 +199,32 @@ def chosen(results: Results) -> Iterator[tuple[pd.Series, Pile]]:
 
 
 def draw(results: Results) -> Iterator[Figure]:
-    """One figure for each slope, by rising slope; the first stands for the study."""
+    """Draw the bed of each slope.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Yields
+    ------
+    Figure
+        By rising slope; the first stands for the study.
+    """
     if results.exemplars.empty:
         return
     telling = labels.varying(results.exemplars, "alpha_deg", "d_m")
     for number, (row, pile) in enumerate(chosen(results)):
         steps = read(pile, results.cases)
         shown = steps.first(FRACTION)
-        share = steps.totals[shown] / pile.packing.count
+        share = percent(steps.totals[shown] / pile.packing.count)
         told = ", ".join(labels.told(row, ["alpha_deg", "d_m", *telling]))
         image = _svg(steps, shown, results.cases).encode()
         told_by = single.quantity(row)
         flows = [single.in_unit(row, flow, told_by) for flow in steps.flow.tolist()]
         yield Figure(
             name=f"bed-alpha{pile.bed.slope_deg:g}",
-            title=f"The bed when {share:.0%} of its grains have moved, {told}".replace(
-                "%", " %"
-            ),
+            title=f"The bed when {share} of its grains have moved, {told}",
             caption=words(results, pile),
             cases=tuple(run.name for run in reversed(pile.runs)),
             drawing=None,
@@ -163,7 +236,20 @@ def draw(results: Results) -> Iterator[Figure]:
 
 
 def words(results: Results, pile: Pile) -> str:
-    """The caption: how the pile was answered, and what of it is shown."""
+    """Write the caption of a bed.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+    pile
+        The pile that is shown.
+
+    Returns
+    -------
+    str
+        How the pile was answered, and what of it is shown.
+    """
     displacement = pile.scene.threshold.displacement
     columns = ["z0_over_d", "packing", "force_law"]
     columns += labels.varying(results.beds("pile"), "alpha_deg", "d_m", *columns)
@@ -186,9 +272,24 @@ def words(results: Results, pile: Pile) -> str:
 
 
 def data(steps: Steps, shown: int, told: FloatArray, unit: str) -> dict[str, Any]:
-    """Data for the slider: at each stop number, x and -z of the grains that have moved since.
+    """Collect the data of the slider.
 
-    `told` (K + 1,) are the flows of the stops in a unit that can be measured.
+    Parameters
+    ----------
+    steps
+        The grains at each stop.
+    shown
+        The stop at which the picture is drawn.
+    told
+        The flows of the stops in a unit that can be measured, shape (K + 1,).
+    unit
+        That unit.
+
+    Returns
+    -------
+    dict of str to object
+        For the page's script: ``frames`` has for each stop the number, x and -z of the
+        grains that have moved since the one before.
     """
     mobile = steps.pile.packing.mobile[steps.grains]
     last = steps.places[0, mobile].copy()
@@ -214,7 +315,7 @@ def data(steps: Steps, shown: int, told: FloatArray, unit: str) -> dict[str, Any
         "step": "load step" if steps.pile.by_dem else "flow",
         "shown": shown,
         "said": f"at {flow[shown]:g} {unit} {moved} of {count} grains have moved "
-        f"({moved / count:.0%})".replace("%", " %"),
+        f"({percent(moved / count)})",
         "count": count,
         "flow": flow,
         "unit": unit,
@@ -229,7 +330,7 @@ def data(steps: Steps, shown: int, told: FloatArray, unit: str) -> dict[str, Any
 
 
 def _paths(steps: Steps) -> list[list[Any]]:
-    """Each bed line as a path of the picture, after the stop from which on it is there."""
+    """Each bed line as a path of the picture, after the stop at which it begins."""
     (left, right, *_), _ = window(steps.pile)
     paths = []
     for stop, line in steps.lines:
@@ -241,7 +342,20 @@ def _paths(steps: Steps) -> list[list[Any]]:
 
 
 def window(pile: Pile) -> tuple[flows.Window, str]:
-    """Left, right, bottom and top of the picture, d, and which part of a long bed it shows."""
+    """Choose what of a bed the picture shows.
+
+    Parameters
+    ----------
+    pile
+        The pile.
+
+    Returns
+    -------
+    frame : tuple of float
+        Left, right, bottom and top, d.
+    part : str
+        A sentence on the part of a long bed that it is; empty if it is the whole.
+    """
     x, z = pile.line.crest.tolist()
     toe = float(pile.line.toe[0])
     is_level = z <= 0
@@ -260,42 +374,50 @@ def window(pile: Pile) -> tuple[flows.Window, str]:
 def _svg(steps: Steps, shown: int, cases: Path) -> str:
     """The picture at one stop of the slider."""
     pile = steps.pile
-    places = steps.places[shown]
     frame = left, right, bottom, top = window(pile)[0]
-    packing = pile.packing
-    centres = packing.centres[steps.grains]
-    radii = packing.sizes[steps.grains] / 2
-    mobile = packing.mobile[steps.grains]
-    is_gone = np.isnan(places[:, 0])
-    here = np.where(is_gone[:, None], centres, places)
-    # classes of the circles: exposed, mobile, moved, gone
-    base = np.where(packing.windward[steps.grains], "e", "m")
-    has_moved = (steps.level > 0) & (steps.level <= shown)
-    look = np.select([has_moved & is_gone, has_moved], ["v g", "v"], base)
-    lengths = (1, 2, 5, 10, 20, 50, 100)
-    bar = next(length for length in lengths if length > (right - left) / 25)
     paths = _paths(steps)
-    fixed = _circles(centres[~mobile], radii[~mobile])
-    moving = _circles(here[mobile], radii[mobile])
+    lines = [path for stop, path in paths if stop <= shown]
+    first = paths[0][1].removeprefix("M")
     return fill(
         "bed.svg.j2",
         left=left,
         right=right,
         top=top,
         bottom=bottom,
-        bar=bar,
+        bar=next(length for length in BARS if length > (right - left) / 25),
         box=f"{left:.2f} {-top:.2f} {right - left:.2f} {top - bottom:.2f}",
-        ground=f"M{left:.2f} {-bottom:.2f} L{paths[0][1][1:]} L{right:.2f} {-bottom:.2f}Z",
-        line=[path for stop, path in paths if stop <= shown][-1],
+        ground=f"M{left:.2f} {-bottom:.2f} L{first} L{right:.2f} {-bottom:.2f}Z",
+        line=lines[-1],
         wears=len(paths) > 1,
         flow=_flow(pile, cases, frame) if pile.model.cases else "",
-        fixed=fixed,
-        mobile=zip(moving, look[mobile], base[mobile], strict=True),
         size=f"{(right - left) / 75:.3g}",
         d=labels.value("d_m", pile.scene.grain.diameter),
         case=pile.runs[-1].name if pile.runs else "",
         title=labels.plain("alpha_deg", pile.bed.slope_deg),
+        **_grains(steps, shown),
     )
+
+
+def _grains(steps: Steps, shown: int) -> dict[str, Any]:
+    """The circles of fixed grains, and those of mobile ones with their classes.
+
+    The classes are exposed, mobile, moved and gone: at this stop, and without flow.
+    """
+    packing = steps.pile.packing
+    centres = packing.centres[steps.grains]
+    radii = packing.sizes[steps.grains] / 2
+    mobile = packing.mobile[steps.grains]
+    places = steps.places[shown]
+    is_gone = np.isnan(places[:, 0])
+    has_moved = (steps.level > 0) & (steps.level <= shown)
+    base = np.where(packing.windward[steps.grains], "e", "m")
+    look = np.select([has_moved & is_gone, has_moved], ["v g", "v"], base)
+    here = np.where(is_gone[:, None], centres, places)
+    moving = _circles(here[mobile], radii[mobile])
+    return {
+        "fixed": _circles(centres[~mobile], radii[~mobile]),
+        "mobile": zip(moving, look[mobile], base[mobile], strict=True),
+    }
 
 
 def _circles(centres: FloatArray, radii: FloatArray) -> list[tuple[str, str, str]]:

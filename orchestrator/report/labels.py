@@ -1,4 +1,4 @@
-"""How values are written in figures and on the page, and which of them tell rows apart."""
+"""How values are written in figures and on the page, and which tell rows apart."""
 
 import re
 import textwrap

@@ -6,6 +6,7 @@ from functools import lru_cache
 import numpy as np
 import pandas as pd
 
+from orchestrator.digits import percent
 from orchestrator.fidelity import spread
 from orchestrator.fidelity.limits import FROZEN_BED
 from orchestrator.physics.fluids import PAPER
@@ -200,7 +201,7 @@ def _model(row: pd.Series, results: Results) -> Iterator[Remark]:
     if pd.isna(low) or pd.isna(row["shields"]):
         return
     choice = row["model_share"]
-    part = f"{row['fraction']:.0%}".replace("%", " %")
+    part = percent(row["fraction"])
     text = (
         f"Models with other choices of packing, forces and angles give Shields numbers "
         f"of {labels.interval(low, high)} for the {part}. The intervals in the table "

@@ -22,7 +22,19 @@ FRACTION = 0.3  # n/N at which one threshold stands for all of its pile
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """A study with its plan, its tables and the directory of its cases."""
+    """A study with its plan, its tables and the directory of its cases.
+
+    Attributes
+    ----------
+    study
+        What was asked.
+    plan
+        How each scene is answered, and by which cases.
+    tables
+        The tables by name.
+    cases
+        The directory of the cases.
+    """
 
     study: Study
     plan: Plan
@@ -35,7 +47,18 @@ class Results:
         return with_methods(self.tables["scenes"], self.tables["methods"])
 
     def beds(self, kind: str) -> pd.DataFrame:
-        """The scenes with one kind of bed."""
+        """Pick the scenes with one kind of bed.
+
+        Parameters
+        ----------
+        kind
+            ``pile`` or ``grain``.
+
+        Returns
+        -------
+        DataFrame
+            Their rows of `scenes`.
+        """
         return self.scenes[self.scenes["bed"] == kind]
 
     @cached_property
@@ -52,7 +75,19 @@ class Results:
     _joins: dict[str, pd.DataFrame] = field(default_factory=dict, init=False)
 
     def joined(self, name: str) -> pd.DataFrame:
-        """A table with the columns of its rows' scenes beside its own, or an empty one."""
+        """Join a table with the columns of its rows' scenes.
+
+        Parameters
+        ----------
+        name
+            Name of the table.
+
+        Returns
+        -------
+        DataFrame
+            Its own columns and those of the scenes that it lacks; empty without the
+            table.
+        """
         if name not in self._joins:
             self._joins[name] = self._with_scenes(self.tables.get(name, pd.DataFrame()))
         return self._joins[name]
@@ -66,12 +101,23 @@ class Results:
         return table.merge(scenes, on="scene_id", how="left").copy()
 
     def values(self, column: str) -> list[float]:
-        """The values that the study's scenes have in a column, rising."""
+        """List the values that the study's scenes have in a column.
+
+        Parameters
+        ----------
+        column
+            Name of the column, whose values are numbers.
+
+        Returns
+        -------
+        list of float
+            The values, each once, rising.
+        """
         return sorted({float(value) for value in self.scenes[column].dropna()})
 
     @cached_property
     def at_fraction(self) -> pd.DataFrame:
-        """The thresholds of piles at the fraction of the sentences, the nearest to 30 %."""
+        """The thresholds of piles at the fraction of the sentences, nearest to 30 %."""
         rows = self.joined("pile_threshold")
         if rows.empty:
             return rows
@@ -82,7 +128,11 @@ class Results:
 
     @cached_property
     def exemplars(self) -> pd.DataFrame:
-        """The thresholds at that fraction by slope: usable, large grains, DEM, least z0 first."""
+        """The thresholds at that fraction, rising by slope.
+
+        Of each slope the usable first, then large grains, DEM, beds that wear, the
+        least z0.
+        """
         if self.at_fraction.empty:
             return self.at_fraction
         here = seeds_as_one(self.at_fraction[self.at_fraction["shields"].notna()])
@@ -93,7 +143,18 @@ class Results:
         )
 
     def shown(self, scene_id: str) -> list[Pile]:
-        """The piles whose files show how a scene's grains move, a check by DEM first."""
+        """List the piles whose files show how a scene's grains move.
+
+        Parameters
+        ----------
+        scene_id
+            The scene.
+
+        Returns
+        -------
+        list of Pile
+            Those whose files are complete, a check by DEM first.
+        """
         piles = [self.plan.piles[scene_id]]
         if scene_id in self.plan.checks:
             piles.insert(0, self.plan.checks[scene_id])
@@ -104,7 +165,7 @@ class Results:
 
     @cached_property
     def flows(self) -> dict[str, Pile]:
-        """A pile for each flow case whose stress is in the tables, by the flow case's name."""
+        """A pile for each flow case whose stress is in the tables, by its name."""
         stress = self.tables.get("wall_stress", pd.DataFrame())
         done = set() if stress.empty else set(stress["flow_case"])
         found = {}
@@ -116,7 +177,20 @@ class Results:
 
 
 def measured_hills(results: Results) -> Iterator[tuple[float, pd.DataFrame]]:
-    """The flows over each hill that others measured, with its half length, the steepest first."""
+    """List the flows over hills that others measured.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Yields
+    ------
+    aspect : float
+        Half length of the hill, in its heights; the steepest first.
+    rows : DataFrame
+        The rows of ``flow`` over it.
+    """
     flows = results.tables.get("flow", pd.DataFrame())
     if "measured_source" not in flows:
         return
@@ -131,15 +205,41 @@ def measured_hills(results: Results) -> Iterator[tuple[float, pd.DataFrame]]:
 def split(
     table: pd.DataFrame, *by: str
 ) -> Iterator[tuple[tuple[Hashable, ...], pd.DataFrame]]:
-    """The parts of a table that agree in some columns, with what they agree in, in rising order."""
+    """List the parts of a table that agree in some columns.
+
+    Parameters
+    ----------
+    table
+        The table.
+    *by
+        The columns.
+
+    Yields
+    ------
+    values : tuple
+        What the rows of a part agree in, in rising order.
+    rows : DataFrame
+        The part.
+    """
     if len(table):
         yield from table.groupby(list(by), sort=True, dropna=False)
 
 
 def seeds_as_one(rows: pd.DataFrame) -> pd.DataFrame:
-    """Thresholds of piles that differ in their seed alone as one row: means over the usable seeds.
+    """Merge thresholds of piles that differ in their seed alone.
 
-    Columns ``seeds``, ``of_seeds``: how many, of how many; ``least``, ``largest`` of them.
+    Parameters
+    ----------
+    rows
+        Thresholds with the columns of their scenes.
+
+    Returns
+    -------
+    DataFrame
+        A row with the means over the usable seeds, with the columns ``seeds`` and
+        ``of_seeds`` (how many, of how many), ``least`` and ``largest`` of their Shields
+        numbers, ``first_least`` and ``first_largest`` of the flows that move the first
+        grain.
     """
     keys = [*fields.others(rows, "seed"), "asked", "fraction"]
     usable = valid(rows)
@@ -169,28 +269,85 @@ def seeds_as_one(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def drawable(table: pd.DataFrame, *columns: str) -> "pd.Series[bool]":
-    """Which rows have a place on logarithmic axes of some columns: finite and above zero."""
+    """Say which rows have a place on logarithmic axes.
+
+    Parameters
+    ----------
+    table
+        The rows.
+    *columns
+        The columns that are drawn.
+
+    Returns
+    -------
+    Series of bool
+        Whether their values are finite and above zero.
+    """
     values = table[list(columns)]
     return ((values > 0) & (values < np.inf)).all(axis=1)
 
 
 def held(table: pd.DataFrame) -> "pd.Series[bool]":
-    """Whether each row's scene holds the flow until its grains are quiet; else it is a ramp."""
+    """Say which rows hold the flow until the grains are quiet; the others are a ramp.
+
+    Parameters
+    ----------
+    table
+        Rows with the columns of their scenes.
+
+    Returns
+    -------
+    Series of bool
+        Whether each does.
+    """
     return ~(table["waiting_time"] < HELD_FROM)
 
 
 def by_dem(table: pd.DataFrame) -> pd.DataFrame:
-    """The rows that DEM answered; an empty table as it is."""
+    """Pick the rows that DEM answered.
+
+    Parameters
+    ----------
+    table
+        Rows with the columns of their scenes, or an empty table.
+
+    Returns
+    -------
+    DataFrame
+        The rows; an empty table as it is.
+    """
     return table[table["method"] == "dem"] if len(table) else table
 
 
 def valid(table: pd.DataFrame) -> "pd.Series[bool]":
-    """Whether each threshold is usable; of scenes, whether their force law holds at their own."""
+    """Say which thresholds are usable, or which scenes are within their force law.
+
+    Parameters
+    ----------
+    table
+        Thresholds, or scenes.
+
+    Returns
+    -------
+    Series of bool
+        Whether each threshold is usable; of scenes, whether their law holds there.
+    """
     return table["usable" if "usable" in table else "law_holds"].astype(bool)
 
 
 def case_names(*tables: pd.DataFrame) -> tuple[str, ...]:
-    """The cases behind the rows of tables, each once."""
+    """List the cases behind the rows of tables.
+
+    Parameters
+    ----------
+    *tables
+        Tables with a column ``case``, or empty ones.
+
+    Returns
+    -------
+    tuple of str
+        The names, each once, in order.
+    """
     names: set[str] = set()
     for rows in tables:
         if len(rows):

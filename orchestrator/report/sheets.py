@@ -1,12 +1,13 @@
 """The tables of a page: thresholds, force laws, parameters and fidelities."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from orchestrator.digits import percent
 from orchestrator.fidelity.fidelities import FIDELITIES, LOCAL, OWN_NUMBERS
 from orchestrator.grains.threshold import STEP
 from orchestrator.physics.laws import LAWS
@@ -224,8 +225,7 @@ def _sheet(rows: pd.DataFrame, keys: Sequence[str], name: str) -> Sheet:
         frame = frame.drop(columns="usable")
     terms = (TERMS["u*"], TERMS["shields"])
     if "fraction" in rows and PART not in frame:
-        percent = f"{rows['fraction'].iloc[0]:.0%}".replace("%", " %")
-        shared.append(f"{PART}: {percent}")
+        shared.append(f"{PART}: {percent(rows['fraction'].iloc[0])}")
     title = TITLES[told_by].format("the bed" if "fraction" in rows else "a grain")
     return Sheet(title, frame, tuple(shared), terms, f"tables/{name}.csv")
 
@@ -243,6 +243,15 @@ def _heads(told: Quantity) -> tuple[str, str, str]:
 USTAR_HEAD = "friction velocity u*₀, m/s"
 TAU_HEAD = "Shields number τ_c"
 TAU_INTERVAL = "interval of τ_c"
+SPANS_OF_SIZES = {
+    "stress on the bed, Pa": ["pa"],
+    "interval, Pa": ["pa_low", "pa_high"],
+    "stress over that of d50": ["hiding"],
+    "measured (Wilcock & Crowe 2003)": ["hiding_wilcock_crowe"],
+    USTAR_HEAD: ["ustar0_m_s"],
+    "Shields number of its own size": ["shields_own"],
+}
+"""Columns of a table of sizes, by their heads."""
 
 
 def _thresholds(
@@ -255,12 +264,10 @@ def _thresholds(
     is_range = "d_m" not in keys
     if is_range:
         # fluids are never merged
-        differ = [
-            name for name in ("rho_f_kg_m3", "nu_m2_s") if rows[name].nunique() > 1
-        ]
-        keys = [*differ, *keys]
-    order = list(keys) if is_range else ["alpha_deg", "d_m"]
-    rows = rows.sort_values(order, kind="stable")
+        keys = [*_different(rows, "rho_f_kg_m3", "nu_m2_s"), *keys]
+        rows = rows.sort_values([*keys], kind="stable")
+    else:
+        rows = rows.sort_values(["alpha_deg", "d_m"], kind="stable")
     told = quantity(rows)
     rows = _with_tested(rows, told)
     rows = _open_ended(rows, "shields_low", "shields_high")
@@ -269,31 +276,44 @@ def _thresholds(
     usable = rows["usable"].groupby(number)
     is_told = rows["usable"] | ~usable.transform("any")
     shown = rows[is_told].groupby(number)
-    low = shown.min(numeric_only=True).astype(float)
-    high = shown.max(numeric_only=True).astype(float)
     first = shown.first()
     table: dict[str, Any] = {column: first[column] for column in more}
     table |= labels.cells(first, keys)
+    low = shown.min(numeric_only=True).astype(float)
+    high = shown.max(numeric_only=True).astype(float)
     if is_range:
         low[~usable.any()] = np.nan
         d_mm = 1e3 * rows["d_m"].groupby(number).agg(["min", "max"])
         table["diameter, mm"] = _ranges(d_mm["min"], d_mm["max"], "g")
     known = set(rows.columns[rows.notna().any()])
-    value, interval, measured = _heads(told)
-    spans = {value: [told.column()]}
-    if not is_range:
-        spans[interval] = [told.column("_low"), told.column("_high")]
-    if f"measured_{told.column()}" in known:
-        spans[measured] = [f"measured_{told.column()}"]
-    spans[USTAR_HEAD] = ["ustar0_m_s"]
-    spans[TAU_HEAD] = ["shields"]
-    spans[TAU_INTERVAL] = ["shields_low", "shields_high"]
-    if more and "shields_model_low" in known:
-        spans["interval of other models"] = ["shields_model_low", "shields_model_high"]
-    table |= _spans(low, high, spans)
+    table |= _spans(low, high, _columns(told, known, is_range, bool(more)))
     reasons = zip(usable.sum(), usable.size(), first["why_not"], strict=True)
     table["usable"] = [_usable(*reason, is_range) for reason in reasons]
     return pd.DataFrame(table)
+
+
+def _different(rows: pd.DataFrame, *columns: str) -> list[str]:
+    """Those of some columns in which rows differ."""
+    return [name for name in columns if rows[name].nunique() > 1]
+
+
+def _columns(
+    told: Quantity, known: Collection[str], is_range: bool, with_models: bool
+) -> dict[str, list[str]]:
+    """The columns of a table of thresholds that have values, by their heads."""
+    value, interval, measured = _heads(told)
+    columns = {value: [told.column()]}
+    if not is_range:
+        columns[interval] = [told.column("_low"), told.column("_high")]
+    if f"measured_{told.column()}" in known:
+        columns[measured] = [f"measured_{told.column()}"]
+    columns[USTAR_HEAD] = ["ustar0_m_s"]
+    columns[TAU_HEAD] = ["shields"]
+    columns[TAU_INTERVAL] = ["shields_low", "shields_high"]
+    if with_models and "shields_model_low" in known:
+        ends = ["shields_model_low", "shields_model_high"]
+        columns["interval of other models"] = ends
+    return columns
 
 
 def _with_tested(rows: pd.DataFrame, told: Quantity) -> pd.DataFrame:
@@ -382,15 +402,8 @@ def sizes(results: Results) -> Sheet | None:
     fraction = results.at_fraction["fraction"].iloc[0]
     rows = rows[rows["fraction"] == fraction]
     keys = labels.varying(rows, "fraction")
-    size = rows["size_over_d"]
-    number = np.rint(np.log(size) / np.log(STEP))
-    stress = rows[["hiding", "hiding_wilcock_crowe"]].mul(size, axis=0)
-    weight = (rows["rho_sol_kg_m3"] - rows["rho_f_kg_m3"]) * rows["g_m_s2"]
-    weight = weight * rows["d_m"] * size
-    in_pa = {
-        f"pa{end}": weight * rows[f"shields_own{end}"] for end in ("", "_low", "_high")
-    }
-    rows = rows.assign(size=1e3 * size * rows["d_m"], **stress, **in_pa)
+    number = np.rint(np.log(rows["size_over_d"]) / np.log(STEP))
+    rows = _with_stresses(rows)
     rows = _open_ended(rows, "shields_own_low", "shields_own_high")
     rows = _open_ended(rows, "pa_low", "pa_high")
     by = [*(rows[key] for key in keys), number]
@@ -398,38 +411,43 @@ def sizes(results: Results) -> Sheet | None:
     low = groups.min(numeric_only=True)
     high = groups.max(numeric_only=True)
     told = pd.DataFrame(labels.cells(groups.first()[[]].reset_index(), keys))
-    spans = {
-        "stress on the bed, Pa": ["pa"],
-        "interval, Pa": ["pa_low", "pa_high"],
-        "stress over that of d50": ["hiding"],
-        "measured (Wilcock & Crowe 2003)": ["hiding_wilcock_crowe"],
-        USTAR_HEAD: ["ustar0_m_s"],
-        "Shields number of its own size": ["shields_own"],
-    }
-    moved = []
-    for least, most in zip(
-        low["class_moved_low"], high["class_moved_high"], strict=True
-    ):
-        moved.append(labels.interval(100 * least, 100 * most, ".0f"))
+    # a bed is named once
+    is_repeated = told.eq(told.shift()).all(axis=1)
     grains = []
     counts = _ranges(low["count"], high["count"], "g")
     for count, is_few in zip(counts, groups["few"].any(), strict=True):
         grains.append(f"{count}: under ten" if is_few else count)
-    # a bed is named once
-    is_repeated = told.eq(told.shift()).all(axis=1)
     frame = pd.DataFrame(
         {
             **told.mask(is_repeated, ""),
             "size, mm": [f"{size:.3g}" for size in groups["size"].mean()],
-            **_spans(low, high, spans),
-            "part that had moved, %": moved,
+            **_spans(low, high, SPANS_OF_SIZES),
+            "part that had moved, %": _intervals(
+                100 * low["class_moved_low"], 100 * high["class_moved_high"], ".0f"
+            ),
             "exposed grains of a bed": grains,
         }
     )
-    percent = f"{fraction:.0%}".replace("%", " %")
-    shared = (f"part of each size that has moved: {percent}",)
-    terms = (TERMS["u*"], TERMS["shields"])
-    return Sheet("By size", frame, shared, terms, "tables/size_class.csv")
+    return Sheet(
+        title="By size",
+        frame=frame,
+        shared=(f"part of each size that has moved: {percent(fraction)}",),
+        terms=(TERMS["u*"], TERMS["shields"]),
+        file="tables/size_class.csv",
+    )
+
+
+def _with_stresses(rows: pd.DataFrame) -> pd.DataFrame:
+    """Rows of sizes with their diameters, mm, and stresses, Pa and over that of d50."""
+    size = rows["size_over_d"]
+    weight = (rows["rho_sol_kg_m3"] - rows["rho_f_kg_m3"]) * rows["g_m_s2"]
+    weight = weight * rows["d_m"] * size
+    stresses = {"size": 1e3 * size * rows["d_m"]}
+    for column in ("hiding", "hiding_wilcock_crowe"):
+        stresses[column] = rows[column] * size
+    for end in ("", "_low", "_high"):
+        stresses[f"pa{end}"] = weight * rows[f"shields_own{end}"]
+    return rows.assign(**stresses)
 
 
 def _open_ended(rows: pd.DataFrame, low: str, high: str) -> pd.DataFrame:
@@ -460,9 +478,16 @@ def _spans(
         if len(names) == 1:
             columns[head] = _ranges(low[names[0]], high[names[0]])
             continue
-        ends = zip(low[names[0]], high[names[1]], strict=True)
-        columns[head] = [labels.interval(least, most) for least, most in ends]
+        columns[head] = _intervals(low[names[0]], high[names[1]])
     return columns
+
+
+def _intervals(
+    low: Iterable[float], high: Iterable[float], form: str = "#.3g"
+) -> list[str]:
+    """The interval between each two values as a text, open where one is not known."""
+    ends = zip(low, high, strict=True)
+    return [labels.interval(least, most, form) for least, most in ends]
 
 
 def _ranges(

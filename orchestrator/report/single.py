@@ -8,6 +8,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from orchestrator.digits import percent
 from orchestrator.physics.beside import FIELD, GOES_ON
 from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.report.card import Card, Number, Worth, decimals
@@ -79,7 +80,18 @@ def known(value: Any) -> float:
 
 
 def quantity(row: Row) -> Quantity:
-    """Choose what the flow of a row is told by: wind, mean velocity, or stress."""
+    """Choose what the flow of a row is told by.
+
+    Parameters
+    ----------
+    row
+        A threshold with the columns of its scene.
+
+    Returns
+    -------
+    Quantity
+        In gases the wind, in liquids with a depth the mean velocity, else the stress.
+    """
     if is_gas(float(row["rho_f_kg_m3"])):
         return WIND
     return MEAN if known(row.get(MEAN.column())) > 0 else STRESS
@@ -164,13 +176,37 @@ def measured_ustar(row: Row, ustar: float) -> float:
 
 
 def is_level(row: Row) -> bool:
-    """Whether the bed of a row is level, with one stress everywhere."""
+    """Say whether the bed of a row is level, with one stress everywhere.
+
+    Parameters
+    ----------
+    row
+        A threshold with the columns of its scene.
+
+    Returns
+    -------
+    bool
+        Whether it is.
+    """
     is_shape = not isinstance(row.get("profile"), str)
     return row.get("bed_shape") == "flat" and is_shape
 
 
 def place_of(quantity_: Quantity, row: Row) -> str:
-    """Where a quantity of a row's flow is measured, in words."""
+    """Say where a quantity of a row's flow is measured.
+
+    Parameters
+    ----------
+    quantity_
+        The quantity.
+    row
+        A threshold with the columns of its scene.
+
+    Returns
+    -------
+    str
+        The place, in words.
+    """
     if quantity_ is MEAN:
         if known(row.get("bed_slope")) > 0:
             return f"of a wide channel that falls by {row['bed_slope']:g}"
@@ -295,8 +331,19 @@ def first_interval(row: Row) -> tuple[float, float]:
 
 
 def tested_on(row: Row) -> str:
-    """Say which measured thresholds the tested interval of a row held."""
-    part = f"{row['tested_held']:.0%}".replace("%", " %")
+    """Say which measured thresholds the tested interval of a row held.
+
+    Parameters
+    ----------
+    row
+        A threshold with a tested interval.
+
+    Returns
+    -------
+    str
+        The part of them that it held, and how many they are.
+    """
+    part = percent(row["tested_held"])
     return f"it held {part} of {row['tested_rows']:.0f} measured thresholds"
 
 

@@ -1,4 +1,4 @@
-"""How all figures look: settings of matplotlib, sizes, colours by meaning, legends, files."""
+"""How all figures look: settings, sizes, colours by meaning, legends, files."""
 
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -34,9 +34,8 @@ RC: dict[Any, Any] = {
     # numbers at minor ticks stand in line with those at major ones
     "xtick.minor.pad": 5,
     "ytick.minor.pad": 5,
-    "font.sans-serif": [
-        "DejaVu Sans"
-    ],  # which matplotlib brings: no font of the machine is used
+    # matplotlib brings it: no font of the machine is used
+    "font.sans-serif": ["DejaVu Sans"],
     "axes.linewidth": 0.6,
     "axes.titley": 1.0,  # else matplotlib looks for ticks above each panel
     "lines.linewidth": 1.2,
@@ -65,7 +64,7 @@ SHADES = {
     "fraction": ("YlGnBu", 0.35, 1.0),
     "d_m": ("turbo", 0.05, 0.95),
 }
-"""Colour maps of quantities that rise in steps, for more values than `DIAMETERS` has."""
+"""Colour maps of quantities that rise in steps; of diameters, if there are many."""
 FIGURES = "figures"
 """The folder of the figures, in a directory of results."""
 DIAMETERS = (
@@ -90,13 +89,32 @@ NOTE: Look = {"fontsize": 6.5, "color": "0.35", "gid": "note"}
 
 @dataclass(frozen=True)
 class Figure:
-    """A drawing: its file's stem, heading, caption and the directories of the cases behind it.
+    """A drawing, its words, and the directories of the cases behind it.
 
-    `image` (SVG or PNG) is what a page shows; until it is made there is a `drawing`, or a function
-    that draws it. `data` are for the page's script, a pointer or a slider; None if there are none.
-    A figure with `fold` is drawn on demand alone, and one that `leads` is at the page's head. One
-    that is `wide` has the whole width of the page. `number` is one that others gave it, such as
-    that of the paper.
+    Attributes
+    ----------
+    name
+        Stem of its file.
+    title
+        Its heading.
+    caption
+        What it shows.
+    cases
+        Names of the cases behind it.
+    drawing
+        A drawing of matplotlib, or a function that draws it; None where it is an image.
+    image
+        What a page shows, SVG or PNG; empty until it is made.
+    data
+        Data for the page's script, a pointer or a slider; None if there are none.
+    fold
+        Whether it is drawn on demand alone.
+    leads
+        Whether it is at the page's head.
+    wide
+        Whether it has the whole width of the page.
+    number
+        A number that others gave it, such as that of the paper.
     """
 
     name: str
@@ -118,14 +136,33 @@ class Figure:
 
 
 def settings() -> AbstractContextManager[None]:
-    """Draw by matplotlib's defaults and `RC` alone while a block runs, not by a matplotlibrc."""
+    """Draw by matplotlib's defaults and `RC` alone, not by a matplotlibrc.
+
+    Returns
+    -------
+    context manager
+        The settings hold while its block runs.
+    """
     defaults: dict[Any, Any] = dict(matplotlib.rcParamsDefault)
     del defaults["backend"]  # figures are made without a window
     return matplotlib.rc_context({**defaults, **RC})
 
 
 def palette(column: str, values: Sequence[float]) -> dict[float, str]:
-    """A colour for each value of a column, the same in every figure of a study."""
+    """Choose a colour for each value of a column, the same in every figure of a study.
+
+    Parameters
+    ----------
+    column
+        ``d_m``, or another key of `SHADES`.
+    values
+        All values of the study.
+
+    Returns
+    -------
+    dict of float to str
+        Colours in hexadecimal, by value.
+    """
     if column == "d_m" and len(values) <= len(DIAMETERS):
         return dict(zip(values, DIAMETERS, strict=False))
     name, first, last = SHADES[column]
@@ -137,7 +174,18 @@ def palette(column: str, values: Sequence[float]) -> dict[float, str]:
 
 
 def canvas(height: float) -> Canvas:
-    """An empty figure of full width; height in inches."""
+    """Make an empty figure of full width.
+
+    Parameters
+    ----------
+    height
+        Its height, inches.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure, laid out when it is drawn.
+    """
     return Canvas(figsize=(WIDTH, height), layout="compressed")
 
 
@@ -150,7 +198,7 @@ def grid(
     *,
     sharey: bool = True,
 ) -> tuple[Canvas, list[Axes]]:
-    """A figure of panels, which all share x.
+    """Make a figure of panels, which all share x.
 
     Its margins are fixed: to measure all texts takes as long as to draw them.
 
@@ -166,6 +214,13 @@ def grid(
         Panels beside each other, at most.
     sharey
         Whether all panels share y.
+
+    Returns
+    -------
+    figure : matplotlib.figure.Figure
+        The figure.
+    axes : list of Axes
+        Its panels, in the order of their titles.
     """
     columns = min(len(titles), columns)
     lines = -(-len(titles) // columns)
@@ -203,7 +258,15 @@ def grid(
 
 
 def extend(figure: Canvas, above: float, below: float) -> None:
-    """Make a figure of fixed margins higher above and below its panels, by inches."""
+    """Make a figure of fixed margins higher.
+
+    Parameters
+    ----------
+    figure
+        The figure.
+    above, below
+        What is added above and below its panels, inches.
+    """
     height = figure.get_figheight()
     places = figure.subplotpars
     bottom = places.bottom * height + below
@@ -214,7 +277,20 @@ def extend(figure: Canvas, above: float, below: float) -> None:
 
 
 def pages(panels: Sequence[Panel]) -> Iterator[tuple[str, str, Sequence[Panel]]]:
-    """At most six panels for each figure, after the endings of the figure's name and title."""
+    """Share panels out among figures, at most `PANELS` to each.
+
+    Parameters
+    ----------
+    panels
+        The panels.
+
+    Yields
+    ------
+    name, title : str
+        Endings of the figure's name and title; of the first figure empty.
+    panels : sequence
+        Its panels.
+    """
     for number, start in enumerate(range(0, len(panels), PANELS)):
         name = f"-{number + 1}" if number else ""
         title = f", more panels ({number})" if number else ""
@@ -222,7 +298,17 @@ def pages(panels: Sequence[Panel]) -> Iterator[tuple[str, str, Sequence[Panel]]]
 
 
 def legends(figure: Canvas, colours: Sequence[Artist], looks: Sequence[Artist]) -> None:
-    """Place the legend of colours above the panels and all other samples below them."""
+    """Place the legend of colours above the panels and all other samples below them.
+
+    Parameters
+    ----------
+    figure
+        The figure.
+    colours
+        Samples of colours.
+    looks
+        Samples of lines and marks.
+    """
     above = _legend(figure, colours, 6, "outside upper center")
     below = _legend(figure, looks, 3, "outside lower center")
     if not figure.get_layout_engine():
@@ -243,7 +329,19 @@ def _legend(figure: Canvas, items: Sequence[Artist], most: int, place: str) -> f
 
 
 def samples(axes: Sequence[Axes]) -> list[Artist]:
-    """Entries of a legend: what has a label and is in a frame; dark where colours differ."""
+    """Collect the entries of a legend.
+
+    Parameters
+    ----------
+    axes
+        The panels.
+
+    Returns
+    -------
+    list of Artist
+        One for each label of what is in a frame; dark where those of a label differ in
+        colour.
+    """
     entries: dict[str, Any] = {}
     for ax in axes:
         for item in (*ax.collections, *ax.lines):
@@ -259,7 +357,10 @@ def samples(axes: Sequence[Axes]) -> list[Artist]:
 
 
 def _is_in_frame(item: Artist, ax: Axes) -> bool:
-    """Whether a point of a line is in the frame of its panel; others and empty lines are."""
+    """Whether a point of a line is in the frame of its panel.
+
+    Other artists and empty lines are.
+    """
     if not isinstance(item, Line2D):
         return True
     points = np.asarray(item.get_xydata(), float)
@@ -267,12 +368,31 @@ def _is_in_frame(item: Artist, ax: Axes) -> bool:
 
 
 def entry(label: str, colour: str) -> Line2D:
-    """A legend's sample of a colour."""
+    """Make a legend's sample of a colour.
+
+    Parameters
+    ----------
+    label
+        What has the colour.
+    colour
+        The colour.
+
+    Returns
+    -------
+    Line2D
+        The sample.
+    """
     return Line2D([], [], color=colour, lw=2.5, label=label)
 
 
 def plain_ticks(axis: Axis) -> None:
-    """Numbers such as 0.01 or 20 on a logarithmic axis whose limits are set: at 1, 2 and 5."""
+    """Write numbers such as 0.01 or 20 on a logarithmic axis: at 1, 2 and 5.
+
+    Parameters
+    ----------
+    axis
+        The axis, whose limits are set.
+    """
     low, high = axis.get_view_interval()
     is_short = high < 5 * low
     axis.set_minor_locator(LogLocator(subs=range(2, 9) if is_short else (2, 5)))
@@ -284,7 +404,22 @@ def plain_ticks(axis: Axis) -> None:
 
 
 def saved(figure: Figure, folder: Folder, *, png: bool = False) -> Figure:
-    """A figure with its image, put as SVG; with `png` as PNG too, which is the image then."""
+    """Draw a figure and put it into a directory of results, as SVG.
+
+    Parameters
+    ----------
+    figure
+        The figure.
+    folder
+        The directory.
+    png
+        Whether it is put as PNG, too, which is its image then.
+
+    Returns
+    -------
+    Figure
+        The figure with its image.
+    """
     drawn = figure.canvas  # `savefig` would draw twice, once for the layout alone
     if drawn is None:
         folder.put(f"{FIGURES}/{figure.name}.svg", figure.image)
@@ -306,7 +441,18 @@ def _png(drawn: Canvas) -> bytes:
 
 
 def svg(drawn: Canvas) -> bytes:
-    """A drawing as SVG, the same bytes each time."""
+    """Write a drawing as SVG, the same bytes each time.
+
+    Parameters
+    ----------
+    drawn
+        The drawing.
+
+    Returns
+    -------
+    bytes
+        The SVG.
+    """
     out = BytesIO()
     canvas: Any = FigureCanvasSVG(drawn)
     canvas.print_svg(out, metadata={"Date": None})

@@ -54,7 +54,18 @@ class Quantity(NamedTuple):
     place: str
 
     def column(self, end: str = "") -> str:
-        """Its column with an ending such as ``_low``."""
+        """Name its column.
+
+        Parameters
+        ----------
+        end
+            Ending such as ``_low``.
+
+        Returns
+        -------
+        str
+            The name, with its unit.
+        """
         unit = {"m/s": "m_s", "Pa": "pa"}[self.unit]
         return f"{self.stem}{end}_{unit}"
 
@@ -67,7 +78,18 @@ USTAR = Quantity("ustar0", "m/s", "flow", "friction velocity", "of the flow upst
 
 
 def is_gas(density: float) -> bool:
-    """Whether a fluid is a gas, by its density, kg/m3."""
+    """Say whether a fluid is a gas.
+
+    Parameters
+    ----------
+    density
+        Its density, kg/m3.
+
+    Returns
+    -------
+    bool
+        Whether it is lighter than any liquid.
+    """
     return density < GAS_BELOW
 
 
@@ -105,6 +127,16 @@ def fluid(density: float, viscosity: float) -> str:
 def length(metres: float) -> str:
     """Write a length: in metres from 1 m on, else in millimetres.
 
+    Parameters
+    ----------
+    metres
+        The length, m.
+
+    Returns
+    -------
+    str
+        The text.
+
     Examples
     --------
     >>> length(40.0), length(3e-4)
@@ -116,10 +148,42 @@ def length(metres: float) -> str:
 
 
 def kind_of_grain(diameter: float) -> str:
-    """Name grains of a diameter, m: silt, sand, gravel, cobbles."""
+    """Name grains of a diameter.
+
+    Parameters
+    ----------
+    diameter
+        Their diameter, m.
+
+    Returns
+    -------
+    str
+        One of `SIZES`.
+
+    Examples
+    --------
+    >>> kind_of_grain(3e-4)
+    'sand'
+    """
     return next(name for limit, name in SIZES if diameter < limit)
 
 
 def solid(density: float) -> str:
-    """Name what grains of a density (kg/m3) are of."""
+    """Name what grains are of.
+
+    Parameters
+    ----------
+    density
+        Their density, kg/m3.
+
+    Returns
+    -------
+    str
+        Quartz, or the density.
+
+    Examples
+    --------
+    >>> solid(2650.0), solid(7800.0)
+    ('quartz', '7800 kg/m³')
+    """
     return "quartz" if density == QUARTZ else f"{density:g} kg/m³"
