@@ -128,11 +128,12 @@ def _run(options: argparse.Namespace) -> int:
         from orchestrator.calculator import river  # it loads numpy
 
         river.add_depth(table, options.bed_slope, "depth" in axes)
+    if options.csv:
+        print_csv(table)
+        return 0
     cells = zip(*(column.tolist() for column in table.values()), strict=True)
     rows = [dict(zip(table, row, strict=True)) for row in cells]
-    if options.csv:
-        print_csv(rows)
-    elif options.json:
+    if options.json:
         print(as_json(rows))
     else:
         varied = [name for name, axis in axes.items() if len(axis) > 1]

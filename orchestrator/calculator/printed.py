@@ -1,18 +1,19 @@
 """What the command `threshold` prints: lines for people, JSON, or CSV."""
 
-import csv
 import json
 import math
 import sys
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from orchestrator.calculator import OF_CRITERION, PARAMETERS, QUANTITIES
 from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.physics.fluids import PAPER
 
 if TYPE_CHECKING:  # this loads numpy
+    from numpy.typing import NDArray
+
     from orchestrator.types import Row
 
 SHOWN = (
@@ -28,19 +29,21 @@ TOO_MANY = ("drag_n", "lift_n")
 """Quantities that a table for people leaves out."""
 
 
-def print_csv(rows: Sequence["Row"]) -> None:
+def print_csv(table: Mapping[str, "NDArray[Any]"]) -> None:
     """Print a row for each point and law.
 
     Parameters
     ----------
-    rows
-        The rows of `table.thresholds`; a NaN is an empty cell, and every number has
+    table
+        The columns of `table.thresholds`; a NaN is an empty cell, and every number has
         nine digits, which are the same on all processors.
     """
-    writer = csv.writer(sys.stdout, lineterminator="\n")
-    writer.writerow(rows[0])
-    for row in _rounded(rows):
-        writer.writerow([None if _is_nan(value) else value for value in row.values()])
+    import pandas as pd
+
+    from orchestrator.digits import FORMAT
+
+    frame = pd.DataFrame(table)
+    frame.to_csv(sys.stdout, index=False, float_format=FORMAT, lineterminator="\n")
 
 
 def as_json(rows: Sequence["Row"]) -> str:
