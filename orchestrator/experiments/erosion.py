@@ -258,7 +258,7 @@ def solved(scene: Scene, threshold: float | None, cases: Path) -> Surface:
         (own,) = thresholds_of(scene.forces.law, [level])
         threshold = float(own.friction_velocity)
     over_wind = float(log_law_ustar(1.0, WIND_HEIGHT, scene.solve_roughness))
-    name = " and a ".join(map(str, bed.obstacles)) or "no obstacle"
+    name = " and a ".join(map(str, scene.obstacles)) or "no obstacle"
     return Surface(name, faces, over_wind, threshold)
 
 
@@ -276,7 +276,7 @@ def _faces(bed: PileBed, line: BedLine, stress: WallStress) -> pd.DataFrame:
     sides = [slope > LEVEL_DEG, slope < -LEVEL_DEG]
     part = np.select(sides, ["windward", "lee"], "top")
     columns = {
-        "x_m": x,
+        "x_m": bed.place(x),
         "z_m": z,
         "part": part,
         "share": stress.length_m,

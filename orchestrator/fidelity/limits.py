@@ -248,7 +248,8 @@ def _unfit(scene: Scene, bed: PileBed, line: BedLine) -> str:
     at = int(np.argmax(slopes))
     if slopes[at] <= limit + 1e-6:
         return ""
-    where = f"{slopes[at]:.3g} deg at x = {line.x[at]:.4g} ... {line.x[at + 1]:.4g} m"
+    first, last = sorted(bed.place(line.x[at : at + 2]).tolist())
+    where = f"{slopes[at]:.3g} deg at x = {first:.6g} ... {last:.6g} m"
     return f"{where} is beyond {why} = {limit:g} deg"
 
 
@@ -260,7 +261,7 @@ def _theory(scene: Scene, bed: PileBed) -> Iterator[Limit]:
     at = int(np.argmax(seen.slopes))
     slope = float(np.degrees(np.arctan(seen.slopes[at])))
     if slope > PILE_SLOPES_DEG[1] + 1e-6:
-        place = f"x = {seen.x[at]:.4g} m"
+        place = f"x = {float(bed.place(seen.x[at])):.6g} m"
         what = f"a bed that rises by {slope:.3g} deg at {place} is no low one"
         yield Limit("slope", "method.flow.model", what, 'choose "solve"')
 

@@ -1,4 +1,4 @@
-"""Beds that are more than one triangle: the stress along each, and where motion starts."""
+"""Beds that are more than one triangle: stress along each, and where motion starts."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -6,13 +6,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Canvas
 
 from orchestrator.grains.pile import Pile
 from orchestrator.report import labels, style
-from orchestrator.report.flows import FELT, REVERSED, USTAR
+from orchestrator.report.flows import FELT, REVERSED, USTAR, stress_on
 from orchestrator.report.page import caption
 from orchestrator.report.results import Results
 from orchestrator.report.style import Figure, Look
+from orchestrator.report.subjects import place_of_file
 from orchestrator.report.words import flow_at
 
 BEDS = 4  # more do not fit a page
@@ -20,7 +22,18 @@ FIRST = "#c1121f"  # colour of the place where motion starts
 
 
 def draw(results: Results) -> Iterator[Figure]:
-    """Each bed by its first scene: stress, threshold of each place or grain, bed line, in m."""
+    """Draw each bed by its first scene: stress, thresholds, bed line.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Yields
+    ------
+    Figure
+        One figure, or none.
+    """
     grains = results.tables.get("pile_grain", pd.DataFrame())
     scenes: dict[str, pd.DataFrame] = {}
     if len(grains):
@@ -28,31 +41,48 @@ def draw(results: Results) -> Iterator[Figure]:
     shown = _first_scenes(results, scenes)[:BEDS]
     if not shown:
         return
-    figure = style.canvas(5.0 * len(shown) + 0.9)
-    heights = [1.5, 1.3, 0.7] * len(shown)
-    axes = figure.subplots(3 * len(shown), 1, height_ratios=heights)
-    for panels, scene_id in zip(axes.reshape(-1, 3), shown, strict=True):
-        top, middle, below = panels
-        pile = results.plan.piles[scene_id]
-        dots = _thresholds(middle, scenes[scene_id])
-        _stress(results, pile, scenes[scene_id], top)
-        _bed_line(below, pile)
-        low, high = pile.model.line.x[1], pile.model.line.x[-2]
-        reach = 0.1 * (high - low)
-        for ax in panels:
-            ax.set_xlim(low - reach, high + reach)
-        for ax in (top, middle):
-            ax.tick_params(labelbottom=False)
-        _first(results, scene_id, (top, middle, below))
-    bar = figure.colorbar(dots, ax=list(axes), location="bottom", aspect=60, pad=0.02)
-    bar.set_label("part that has gone by then, n/N")
-    style.legends(figure, [], style.samples([*axes]))
+    figure = _beds(results, {scene_id: scenes[scene_id] for scene_id in shown})
     piles = [results.plan.piles[scene_id] for scene_id in shown]
     names = tuple(dict.fromkeys(run.name for pile in piles for run in pile.runs))
     is_local = any(pile.length == 0 for pile in piles)
     leads = is_local or bool(piles[0].bed.profile)
     text = caption("where", local=is_local)
     yield Figure("where", "Where motion starts", text, names, figure, leads=leads)
+
+
+def _beds(results: Results, scenes: Mapping[str, pd.DataFrame]) -> Canvas:
+    """Three panels for each scene, by the thresholds of its grains."""
+    figure = style.canvas(5.0 * len(scenes) + 0.9)
+    heights = [1.5, 1.3, 0.7] * len(scenes)
+    axes = figure.subplots(3 * len(scenes), 1, height_ratios=heights)
+    for panels, (scene_id, rows) in zip(
+        axes.reshape(-1, 3), scenes.items(), strict=True
+    ):
+        dots = _bed(results, scene_id, rows, tuple(panels))
+    bar = figure.colorbar(dots, ax=list(axes), location="bottom", aspect=60, pad=0.02)
+    bar.set_label("part that has gone by then, n/N")
+    style.legends(figure, [], style.samples([*axes]))
+    return figure
+
+
+def _bed(
+    results: Results, scene_id: str, rows: pd.DataFrame, panels: tuple[Axes, ...]
+) -> Any:
+    """The panels of a bed; the dots of its thresholds."""
+    top, middle, below = panels
+    pile = results.plan.piles[scene_id]
+    dots = _thresholds(middle, rows)
+    _stress(results, pile, rows, top)
+    _bed_line(below, pile)
+    ends = pile.model.line.x[1], pile.model.line.x[-2]
+    low, high = sorted(pile.bed.place(ends).tolist())
+    reach = 0.1 * (high - low)
+    for ax in panels:
+        ax.set_xlim(low - reach, high + reach)
+    for ax in (top, middle):
+        ax.tick_params(labelbottom=False)
+    _first(results, scene_id, panels)
+    return dots
 
 
 def _first_scenes(results: Results, scenes: Mapping[str, pd.DataFrame]) -> list[str]:
@@ -67,17 +97,22 @@ def _first_scenes(results: Results, scenes: Mapping[str, pd.DataFrame]) -> list[
 
 
 def _bed_line(ax: Axes, pile: Pile) -> None:
-    x, z = pile.model.line.corners.T
+    bed = pile.bed
+    x = bed.place(pile.model.line.x)
+    z = bed.level(pile.model.line.z)
     ax.fill_between(x, z, z.min() - 0.1 * np.ptp(z), color=style.BED, lw=0)
     ax.plot(x, z, color="0.2", lw=0.8, gid="bed")
-    ax.set(xlabel="x, m, from the foot of the first form", ylabel="z, m")
+    where = "x, m, from the foot of the first form"
+    if bed.profile:
+        towards = f"the flow goes towards {bed.profile.towards}"
+        where = f"x of {bed.profile.name}, m; {towards}"
+    ax.set(xlabel=where, ylabel="z, m")
 
 
 def _stress(results: Results, pile: Pile, rows: pd.DataFrame, ax: Axes) -> None:
-    """Friction velocity along a bed: of the flow that was solved, and as the grains feel it."""
+    """Friction velocity along a bed: by the solved flow, and as the grains feel it."""
     if pile.model.cases:
-        table = results.tables["wall_stress"]
-        wall = table[table["flow_case"] == pile.flow.name]
+        wall = stress_on(pile, results)
         x = wall["x_m"].to_numpy()
         ustar = wall["ustar_over_ustar0_wall"].to_numpy()
         ax.plot(x, ustar, color="black", lw=1.1, label="wall stress", gid="wall")
@@ -90,7 +125,7 @@ def _stress(results: Results, pile: Pile, rows: pd.DataFrame, ax: Axes) -> None:
 
 
 def _title(results: Results, pile: Pile) -> str:
-    """A bed by its shape, height and obstacles, and the fields in which flows differ."""
+    """A bed by its shape, height, obstacles, and the fields in which flows differ."""
     bed = pile.bed
     if bed.profile:
         shape = bed.profile.name
@@ -103,7 +138,7 @@ def _title(results: Results, pile: Pile) -> str:
     values = pd.Series([first[name] for name in names], names, dtype=object)
     values["alpha_deg"] = bed.slope_deg
     values["d_m"] = pile.scene.grain.diameter
-    obstacles = [str(obstacle) for obstacle in bed.obstacles]
+    obstacles = [str(obstacle) for obstacle in pile.scene.obstacles]
     title = [shape, f"h = {bed.height:.3g} m", *obstacles, labels.panel(values, names)]
     return ", ".join(title)
 
@@ -139,9 +174,10 @@ def _first(results: Results, scene_id: str, axes: tuple[Axes, ...]) -> None:
         return
     for ax in axes:
         ax.axvline(x, color=FIRST, lw=0.8, zorder=0.5)
-    text = f"x = {x:.4g} m\n{flow_at(row, ustar)}".replace(" (", "\n").replace(
-        ", ", "\n"
-    )
+    profile = results.plan.piles[scene_id].bed.profile
+    place = place_of_file(x, profile) if profile else f"{x:.4g}"
+    text = f"x = {place} m\n{flow_at(row, ustar)}"
+    text = text.replace(" (", "\n").replace(", ", "\n")
     text = text.rstrip(")").replace("u*₀", r"$u^\star_0$")
     low, high = axes[1].get_xlim()
     has_room = x < low + 0.8 * (high - low)

@@ -22,12 +22,15 @@ from orchestrator.report.subjects import (
     STRESS,
     TERMS,
     Quantity,
+    digits_of_place,
     fluid,
     is_gas,
     kind_of_grain,
     length,
+    place_of_file,
     solid,
 )
+from orchestrator.study.profile import WITH_X
 from orchestrator.tables.quoted import grain_ustar
 from orchestrator.types import BoolArray, FloatArray
 
@@ -151,8 +154,11 @@ def _scene(row: pd.Series, pile: Pile) -> str:
     count = f"{row['count']:.0f} counted grains"
     if row["method"] == "local":
         count = "too many grains to follow each"
-    if len(bed.obstacles):
-        shape += f", behind {', '.join(map(str, bed.obstacles))}"
+    obstacles = pile.scene.obstacles
+    if obstacles:
+        shape += f", behind {', '.join(map(str, obstacles))}"
+    if pile.scene.flow.towards != WITH_X:
+        shape += f", {single.quantity(row).flow} towards {pile.scene.flow.towards}"
     within = fluid(float(row["rho_f_kg_m3"]), float(row["nu_m2_s"]))
     return f"{shape[:1].upper()}{shape[1:]}; {grains}; {count}; in {within}."
 
@@ -233,17 +239,30 @@ def _place(row: pd.Series, pile: Pile, results: Results) -> Number:
     crest = float(line.crest[0])
     x = float(row["first_x_m"])
     low, high = _places(row, results)
+    of_what = "places whose threshold is within the known error of the lowest"
+    profile = pile.bed.profile
+    if profile:
+        top = place_of_file(float(profile.place(crest)), profile)
+        return Number(
+            x,
+            "m",
+            "x where motion starts",
+            f"x of {profile.name}, whose top is at {top} m",
+            low=low,
+            high=high,
+            interval_of=of_what,
+            decimals=digits_of_place(profile),
+        )
     unit, scale = ("m", 1.0) if abs(line.x[-2]) >= 1 else ("mm", 1e3)
-    from_where = "the first point of the profile" if pile.bed.profile else "the foot"
     top = f"the top is at {scale * crest:.3g} {unit}"
     return Number(
         scale * x,
         unit,
         "along the bed: here motion starts",
-        f"from {from_where}; {top}",
+        f"from the foot; {top}",
         low=scale * low,
         high=scale * high,
-        interval_of="places whose threshold is within the known error of the lowest",
+        interval_of=of_what,
     )
 
 

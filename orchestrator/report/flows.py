@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
+from matplotlib.image import AxesImage
 from matplotlib.patches import Rectangle
 from numpy.lib.stride_tricks import sliding_window_view
 
@@ -19,6 +20,7 @@ from orchestrator.report import labels, style
 from orchestrator.report.page import caption
 from orchestrator.report.results import Results, measured_hills
 from orchestrator.report.style import Figure, Look
+from orchestrator.report.subjects import place_of_file
 from orchestrator.runs.case import is_whole
 from orchestrator.runs.files import state_of
 from orchestrator.study import fields
@@ -79,19 +81,27 @@ def _solved(directory: Path) -> SolvedFlow:
 
 @lru_cache(maxsize=16)
 def _solved_once(directory: Path, mesh: tuple[tuple[int, ...], ...]) -> SolvedFlow:
-    """The flow in the directory, whose mesh is read once: that takes a fifth of a second."""
+    """The flow in the directory; its mesh is read once, in a fifth of a second."""
     return SolvedFlow(directory)
 
 
 def _title(results: Results, pile: Pile) -> str:
-    """A pile by its slope, height and roughness, and the fields in which flows differ."""
+    """A pile by its slope, height and roughness, and fields in which flows differ.
+
+    That of a profile says where its x/h is zero.
+    """
     names = ["alpha_deg", "h_m", "z0_m", *results.flow_fields]
     values = [fields.COLUMNS[name].used(pile.scene) for name in names]
-    return labels.panel(pd.Series(values, names, dtype=object), names)
+    title = labels.panel(pd.Series(values, names, dtype=object), names)
+    profile = pile.bed.profile
+    if profile is None:
+        return title
+    zero = f"x/h from x = {place_of_file(profile.origin[0], profile)} m"
+    return f"{title}, {zero} towards {profile.towards}"
 
 
 def _kinds(results: Results) -> list[list[Pile]]:
-    """Piles with flows, of each slope, height and value of the fields that vary, by rising z0."""
+    """Piles with flows by slope, height and fields that vary, each by rising z0."""
 
     def kind(pile: Pile) -> tuple[float, float, str]:
         varied = [
@@ -116,7 +126,7 @@ def drawn(results: Results) -> list[Pile]:
 
 
 def stress(results: Results) -> Iterator[Figure]:
-    """The friction velocity along the bed, a panel for each slope at its least and largest z0."""
+    """The friction velocity along beds, for each slope at its least and largest z0."""
     piles = []
     for smoothest, *rougher in _kinds(results):
         piles += [smoothest, *rougher[-1:]]
@@ -151,13 +161,39 @@ def _stress(results: Results, piles: list[Pile]) -> Canvas:
     return figure
 
 
+def stress_on(pile: Pile, results: Results) -> pd.DataFrame:
+    """Find the stress along the bed of a pile whose flow is solved.
+
+    Parameters
+    ----------
+    pile
+        The pile.
+    results
+        The study with its tables.
+
+    Returns
+    -------
+    DataFrame
+        Rows of the table ``wall_stress``. Scenes may share a flow and be of files with
+        other axes: x is that of the pile's.
+    """
+    table = results.tables.get("wall_stress", pd.DataFrame())
+    if table.empty:
+        return table
+    rows: pd.DataFrame = table[table["flow_case"] == pile.flow.name]
+    if rows.empty or not pile.bed.profile:
+        return rows
+    along = results.flows[pile.flow.name].bed.along(rows["x_m"])
+    return rows.assign(x_m=pile.bed.place(along))
+
+
 def _along(results: Results, pile: Pile, ax: Axes) -> None:
     """Friction velocities along the bed of a pile, over the bed."""
-    h = pile.bed.height
-    rows = results.tables["wall_stress"]
-    rows = rows[rows["flow_case"] == pile.flow.name]
+    bed = pile.bed
+    h = bed.height
+    rows = stress_on(pile, results)
     rows = rows.replace([np.inf, -np.inf], np.nan)
-    x = rows["x_m"].to_numpy() / h
+    x = bed.along(rows["x_m"]) / h
     wall = rows["ustar_over_ustar0_wall"].to_numpy()
     for name, look in ESTIMATES.items():
         ax.plot(x, rows[f"ustar_over_ustar0_{name}"], gid=name, **look)
@@ -169,7 +205,8 @@ def _along(results: Results, pile: Pile, ax: Axes) -> None:
     if len(grains):
         # of the scenes that share the flow, the last
         grains = grains[grains["scene_id"] == grains["scene_id"].max()]
-        ax.plot(grains["x_m"] / h, grains["ustar_over_ustar0"], **FELT)
+        bed = results.plan.piles[str(grains["scene_id"].iloc[0])].bed
+        ax.plot(bed.along(grains["x_m"]) / h, grains["ustar_over_ustar0"], **FELT)
     ax.margins(y=0.25)
     line = pile.model.line
     low = min(line.z) / h
@@ -183,7 +220,20 @@ def _along(results: Results, pile: Pile, ax: Axes) -> None:
 def eq10_over_wall(
     results: Results, flow_cases: tuple[str, ...]
 ) -> tuple[float, float]:
-    """Relative difference of u* by Eq. 10: mean of the windward faces, largest at their crests."""
+    """Compare u* by Eq. 10 with that of the wall stress.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+    flow_cases
+        Names of the flows.
+
+    Returns
+    -------
+    mean, crest : float
+        Relative differences: the mean of windward faces, the largest of their crests.
+    """
     table = results.tables["wall_stress"]
     means = []
     crests = []
@@ -271,12 +321,17 @@ def _speeds(results: Results, shown: Sequence[Pile]) -> Canvas:
         _streamlines(ax, window, velocity)
         _draw_bed(ax, pile)
         ax.set(aspect="auto", xlim=(left, right), ylim=(bottom, top), yticks=range(4))
+    _speed_bar(figure, image)
+    return figure
+
+
+def _speed_bar(figure: Canvas, image: AxesImage) -> None:
+    """The bar of the colours of speeds, below the panels."""
     style.extend(figure, 0.0, 0.55)
     inch = 1 / figure.get_figheight()
     place = figure.add_axes((0.1, 0.4 * inch, 0.88, 0.1 * inch))
     bar = figure.colorbar(image, cax=place, orientation="horizontal")
     bar.set_label("speed over that of the approaching flow at 10 h, |u|/Uₑ")
-    return figure
 
 
 def _draw_bed(ax: Axes, pile: Pile) -> None:
@@ -287,26 +342,41 @@ def _draw_bed(ax: Axes, pile: Pile) -> None:
 
 
 def _streamlines(ax: Axes, window: Window, velocity: FloatArray) -> None:
-    """Contours of the stream function, integrated from above; from the bed where flow runs back."""
+    """Contours of the stream function.
+
+    It is integrated from above, from the bed where the flow runs back.
+    """
     rows, columns, _ = velocity.shape
     left, right, bottom, top = window
     x = np.linspace(left, right, columns)
     z = np.linspace(bottom, top, rows)
-    u = velocity[..., 0]
-    w_at_top = velocity[-1, :, 2]
-    above_bed = np.cumsum(np.nan_to_num(u), axis=0) * (z[1] - z[0])
-    through_top = above_bed[-1, 0] - np.cumsum(w_at_top) * (x[1] - x[0])
-    from_above = through_top - (above_bed[-1] - above_bed)
+    from_above, above_bed = _stream_functions(x, z, velocity)
     forward = np.linspace(0, above_bed[-1, 0], 12)[1:]
     back = np.nanmin(above_bed) * BACK
+    look: Look = {"colors": "white", "linewidths": 0.45, "linestyles": "solid"}
     for psi, levels in ((from_above, forward), (above_bed, back[back < 0])):
-        # the grid meets the bed in steps, which the integral from there carries upwards
-        half = SMOOTH.size // 2
-        wide = np.pad(psi, ((0, 0), (half, half)), "symmetric")
-        smooth = sliding_window_view(wide, SMOOTH.size, axis=1) @ SMOOTH
-        inside = np.where(np.isnan(u), np.nan, smooth)
-        look: Look = {"colors": "white", "linewidths": 0.45, "linestyles": "solid"}
+        inside = np.where(np.isnan(velocity[..., 0]), np.nan, _smooth(psi))
         ax.contour(x, z, inside, levels, **look)
+
+
+def _stream_functions(
+    x: FloatArray, z: FloatArray, velocity: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """The stream function integrated from above, and that from the bed."""
+    w_at_top = velocity[-1, :, 2]
+    above_bed = np.cumsum(np.nan_to_num(velocity[..., 0]), axis=0) * (z[1] - z[0])
+    through_top = above_bed[-1, 0] - np.cumsum(w_at_top) * (x[1] - x[0])
+    return through_top - (above_bed[-1] - above_bed), above_bed
+
+
+def _smooth(psi: FloatArray) -> FloatArray:
+    """A stream function without the steps in which the grid meets the bed.
+
+    The integral from there carries them upwards.
+    """
+    half = SMOOTH.size // 2
+    wide = np.pad(psi, ((0, 0), (half, half)), "symmetric")
+    return np.asarray(sliding_window_view(wide, SMOOTH.size, axis=1) @ SMOOTH)
 
 
 def mesh(results: Results) -> Iterator[Figure]:
@@ -390,7 +460,18 @@ def read_edges(case: Path) -> FloatArray:
 
 
 def hills(results: Results) -> Iterator[Figure]:
-    """Hills over which others measured the flow, a panel each: computed beside measured."""
+    """Draw hills over which others measured the flow: computed beside measured.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Yields
+    ------
+    Figure
+        One figure with a panel for each hill, or none.
+    """
     listed = list(measured_hills(results))
     if not listed:
         return
@@ -423,7 +504,7 @@ def hills(results: Results) -> Iterator[Figure]:
 
 
 def _draw_hill(ax: Axes, results: Results, rows: pd.DataFrame) -> None:
-    """The friction velocity over one hill and the reversed flow behind it, by turbulence model."""
+    """The stress on one hill and the reversed flow behind it, by turbulence model."""
     table = results.tables["wall_stress"]
     for place, (_, row) in enumerate(rows.iterrows()):
         stress = table[table["flow_case"] == row["flow_case"]]

@@ -27,9 +27,11 @@ from orchestrator.report.drawing import (
     margins,
     ratio,
 )
+from orchestrator.report.flows import stress_on
 from orchestrator.report.results import Results
 from orchestrator.report.style import Look
-from orchestrator.report.subjects import Quantity
+from orchestrator.report.subjects import Quantity, place_of_file
+from orchestrator.study.profile import WITH_X
 
 HIGHEST = 2.6
 """Largest flow that the panel of a bed shows, over that of the first motion."""
@@ -55,12 +57,13 @@ def along(row: pd.Series, pile: Pile, results: Results) -> Head:
     told = single.quantity(row)
     x = float(row["first_x_m"])
     value = single.in_unit(row, single.known(row["first_ustar0_m_s"]), told)
+    place = _place(x, pile)
     title = (
         f"Three panels along the bed: the {told.name} that moves each place, lowest "
-        f"at {x:.4g} m; the stress of the flow on the bed; the bed line"
+        f"at {place}; the stress of the flow on the bed; the bed line"
     )
     caption = (
-        f"Motion starts where the curve of the {told.name} is lowest: at {x:.4g} m, "
+        f"Motion starts where the curve of the {told.name} is lowest: at {place}, "
         f"{value:.3g} {told.unit}. Orange: computed, with the known error of the "
         "method as a band; dashed: with the measured threshold. Shaded: the flow runs "
         "back."
@@ -72,16 +75,24 @@ def along(row: pd.Series, pile: Pile, results: Results) -> Head:
         axes = canvas.subplots(3, 1, sharex=True, height_ratios=heights)
         margins(canvas, 38, 8, 22, 24)
         canvas.subplots_adjust(hspace=0.42)
-        _thresholds_along(axes[0], row, results, told, narrow)
-        _stress_along(axes[1], row, results, narrow)
+        _thresholds_along(axes[0], row, pile, results, told, narrow)
+        _stress_along(axes[1], row, pile, results, narrow)
         _line(axes[2], row, pile, results, told, narrow)
         line = pile.model.line
-        axes[0].set_xlim(line.x[1], line.x[-2])
+        axes[0].set_xlim(*sorted(pile.bed.place([line.x[1], line.x[-2]]).tolist()))
         for ax in axes:
             ax.axvline(x, color=ANSWER, lw=0.9, ls=(0, (2, 2)), zorder=1)
         return canvas
 
     return Head(draw, title, caption)
+
+
+def _place(x: float, pile: Pile) -> str:
+    """A place with its unit, of a profile with the digits that matter."""
+    profile = pile.bed.profile
+    if profile:
+        return f"x = {place_of_file(x, profile)} m"
+    return f"{x:.4g} m"
 
 
 def grains_of(row: pd.Series, results: Results) -> pd.DataFrame:
@@ -98,7 +109,7 @@ def _parted(x: Any) -> Any:
 
 
 def _thresholds_along(
-    ax: Axes, row: pd.Series, results: Results, told: Quantity, narrow: bool
+    ax: Axes, row: pd.Series, pile: Pile, results: Results, told: Quantity, narrow: bool
 ) -> None:
     """The flow at which each place goes, with a band, and by the measured threshold."""
     grains = grains_of(row, results)
@@ -121,7 +132,7 @@ def _thresholds_along(
     _names_above(ax, narrow)
     x_first = float(row["first_x_m"])
     is_left = x_first < (x[0] + x[-1]) / 2
-    text = f"{x_first:.4g} m, {first:.3g} {told.unit}"
+    text = f"{_place(x_first, pile)}, {first:.3g} {told.unit}"
     ax.annotate(
         text if narrow else f"motion starts here: {text}",
         (x_first, 1.0),
@@ -161,12 +172,13 @@ def _broken(x: Any, y: Any, cuts: Any) -> tuple[Any, Any]:
     return np.insert(x, cuts, np.nan), np.insert(y, cuts, np.nan)
 
 
-def _stress_along(ax: Axes, row: pd.Series, results: Results, narrow: bool) -> None:
+def _stress_along(
+    ax: Axes, row: pd.Series, pile: Pile, results: Results, narrow: bool
+) -> None:
     """The stress on the bed over that of the undisturbed flow."""
-    table = results.tables.get("wall_stress", pd.DataFrame())
-    flow = row["flow_case"]
-    if len(table):
-        table = table[table["flow_case"] == flow]
+    table = pd.DataFrame()
+    if pd.notna(row["flow_case"]):
+        table = stress_on(pile, results)
     if len(table):
         x = table["x_m"].to_numpy(float)
         ustar = table["ustar_over_ustar0_wall"].to_numpy(float)
@@ -187,28 +199,34 @@ def _line(
     ax: Axes, row: pd.Series, pile: Pile, results: Results, told: Quantity, narrow: bool
 ) -> None:
     """The bed line, with the part that has moved at the fraction of the card."""
-    x, z = pile.model.line.corners.T
+    bed = pile.bed
+    x = bed.place(pile.model.line.x)
+    z = bed.level(pile.model.line.z)
     low = float(z.min())
     ax.fill_between(x, z, low - 0.08 * np.ptp(z), color=SAND, lw=0)
     ax.plot(x, z, color=EDGE, lw=1)
     grains = grains_of(row, results)
     places = grains["x_m"].to_numpy(float)
     has_moved = grains["ustar0_m_s"].to_numpy(float) <= float(row["ustar0_m_s"])
-    height = np.asarray(pile.model.line.height(places), float)
+    height = bed.level(pile.model.line.height(bed.along(places)))
     ax.plot(*_moved(places, height, has_moved), color=ANSWER, lw=3.5)
     part = f"{row['fraction']:.0%}".replace("%", " %")
     flow = single.in_unit(row, float(row["ustar0_m_s"]), told)
     told_at = f"orange: the {part} that moves by {flow:.3g} {told.unit}"
     ax.set_title("Bed line, m" if narrow else f"Bed line, m; {told_at}")
     ax.set_ylim(low - 0.08 * np.ptp(z), None)
-    ax.set_xlabel("m along the bed" if narrow else "")
-    ax.annotate(
-        "→ flow",
-        (0.01, 0.7),
-        xycoords="axes fraction",
-        color=FLOW,
-        weight="bold",
-    )
+    along = "x, m" if bed.profile else "m along the bed"
+    ax.set_xlabel(along if narrow else "")
+    _arrow(ax, pile)
+
+
+def _arrow(ax: Axes, pile: Pile) -> None:
+    """Where the flow goes, at the end of the bed that it comes from."""
+    look: Look = {"xycoords": "axes fraction", "color": FLOW, "weight": "bold"}
+    if pile.scene.flow.towards == WITH_X:
+        ax.annotate("→ flow", (0.01, 0.7), **look)
+    else:
+        ax.annotate("flow ←", (0.99, 0.7), ha="right", **look)
 
 
 def _moved(x: Any, y: Any, has_moved: Any) -> tuple[Any, Any]:

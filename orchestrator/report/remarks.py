@@ -14,8 +14,9 @@ from orchestrator.report import labels, sheets, single, theory
 from orchestrator.report.card import Remark
 from orchestrator.report.page import caption
 from orchestrator.report.results import Results
-from orchestrator.report.subjects import is_gas, length
+from orchestrator.report.subjects import is_gas, length, place_of_file
 from orchestrator.study.parts import PileBed
+from orchestrator.study.scene import Scene
 from orchestrator.tables.usable import ROW_HOLD
 
 MOST = 6
@@ -133,8 +134,8 @@ def _of_piles(results: Results, piles: pd.DataFrame) -> Iterator[Remark]:
     for _, row in results.exemplars.head(1).iterrows():
         pile = results.plan.piles[str(row["scene_id"])]
         yield from _smoothing(row, pile.bed)
-        yield from _counted(row, pile.bed)
-        yield from _closed_form(row)
+        yield from _counted(pile.scene, pile.bed)
+        yield from _closed_form(row, pile.bed)
         yield from _model(row, results)
     beyond = piles[piles["frozen_bed"] > FROZEN_BED]
     if len(beyond):
@@ -154,13 +155,13 @@ def _smoothing(row: pd.Series, bed: PileBed) -> Iterator[Remark]:
         yield Remark("Smoothing moves the answer.", text)
 
 
-def _counted(row: pd.Series, bed: PileBed) -> Iterator[Remark]:
+def _counted(scene: Scene, bed: PileBed) -> Iterator[Remark]:
     """Which part of a bed is counted, where that is not plain from its shape."""
     if not (bed.profile or bed.counted):
         return
-    counts = bed.counts
+    counts = scene.counts
     rest = 'another part: `bed.counted = "all"`'
-    if not isinstance(counts, str):
+    if isinstance(counts, tuple):
         start, end = counts
         where = f"The bed between x = {start:g} and {end:g} m is counted."
         rest = "shares are of the grains between them"
@@ -172,7 +173,7 @@ def _counted(row: pd.Series, bed: PileBed) -> Iterator[Remark]:
     yield Remark(where, f"{rest[0].upper()}{rest[1:]}.")
 
 
-def _closed_form(row: pd.Series) -> Iterator[Remark]:
+def _closed_form(row: pd.Series, bed: PileBed) -> Iterator[Remark]:
     """That a bed was answered along its line, and what checks that."""
     if row["method"] != "local":
         return
@@ -182,6 +183,8 @@ def _closed_form(row: pd.Series) -> Iterator[Remark]:
     )
     if pd.notna(row["pivot_x_m"]):
         place = length(float(row["pivot_x_m"]))
+        if bed.profile:
+            place = f"x = {place_of_file(float(row['pivot_x_m']), bed.profile)} m"
         text += (
             f" The grains around the answer, turned one by one, start at {place} and a "
             f"friction velocity of {row['pivot_first_m_s']:#.3g} m/s."

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.physics.fluids import PAPER
+from orchestrator.study.profile import Profile
 
 SIZES = (
     (6.3e-5, "silt"),
@@ -145,6 +146,42 @@ def length(metres: float) -> str:
     if abs(metres) >= 1:
         return f"{metres:.3g} m"
     return f"{1e3 * metres:.3g} mm"
+
+
+def digits_of_place(profile: Profile) -> int:
+    """Count the digits behind the point that places on a profile are told with, m.
+
+    They are known to a hundredth or a thousandth of its length.
+
+    Parameters
+    ----------
+    profile
+        The profile.
+
+    Returns
+    -------
+    int
+        The count.
+    """
+    return max(0, 2 - math.floor(math.log10(profile.x[-1])))
+
+
+def place_of_file(x: float, profile: Profile) -> str:
+    """Write x of the file of a profile with the digits that matter.
+
+    Parameters
+    ----------
+    x
+        The place, m.
+    profile
+        The profile.
+
+    Returns
+    -------
+    str
+        The number.
+    """
+    return f"{x:.{digits_of_place(profile)}f}"
 
 
 def kind_of_grain(diameter: float) -> str:

@@ -27,7 +27,7 @@ from orchestrator.study.declare import (
     Viscosity,
     field,
 )
-from orchestrator.study.profile import Profile
+from orchestrator.study.profile import WITH_X, Profile
 from orchestrator.study.shapes import SHAPES, Shape
 from orchestrator.types import FloatArray
 
@@ -160,8 +160,9 @@ class Grain(Part):
     sizes: Sizes | None = _poured(None)
     """mixture of a poured bed, by mass, in one plane by area: a sieve table, rows of
     diameter (m, rising) and fraction or a CSV file with columns diameter_m and
-    fraction, whose d50 is the diameter; or log-normal, { sigma_g = 1.3, smallest = 0.6,
-    largest = 1.7 }, cut off in d, by default at two geometric standard deviations"""
+    fraction, or sieve_mm and passing_percent, whose d50 is the diameter; or log-normal,
+    { sigma_g = 1.3, smallest = 0.6, largest = 1.7 }, cut off in d, by default at two
+    geometric standard deviations"""
 
 
 class Forces(Part):
@@ -241,6 +242,12 @@ class Flow(Part):
     )
     """depth of open water or of a closed channel over the flat bed, at least three
     heights of forms and obstacles, over a level bed three of the largest grains"""
+    towards: Literal["+x", "-x"] = field(
+        WITH_X, label="the flow goes towards", scope="profiles", since=True
+    )
+    """where the flow goes along x of the profile's file
+    - +x: towards larger x
+    - -x: towards smaller x"""
 
 
 class Obstacle(Part):
@@ -249,7 +256,8 @@ class Obstacle(Part):
     kind: Literal["fence", "block", "half-cylinder"]
     """what it is; all have steep sides, none is upright"""
     x: float
-    """place of its middle, downstream of the foot of the first form"""
+    """place of its middle, downstream of the foot of the first form; with a profile its
+    x"""
     height: Height
     """height over the bed"""
     length: Length | None = None
@@ -342,15 +350,17 @@ class PileBed(Bed):
     relative to the study file"""
     smoothing: float = field(0.0, unit="m", scope="profiles", since=True, ge=0, le=1e3)
     """length over which a noisy profile is smoothed"""
-    obstacles: Annotated[tuple[Obstacle, ...], List] = _pile((), since=True)
+    obstacles: Annotated[tuple[Obstacle, ...], List] = _pile(
+        (), since=True, read="obstacles"
+    )
     """fences, blocks and half-cylinders, which carry no grains: tables with `kind`,
     `x`, `height` and, of a block, `length`"""
     counted: Literal["windward", "all"] | Range | None = _pile(
         None, label="counted grains", since=True, read="counts"
     )
-    """exposed grains that are counted, or their range of x, which on a bed of more than
-    5000 grains is packed alone; by default those of windward sides, of a flat bed and a
-    step down all
+    """exposed grains that are counted, or their range of x, with a profile that of its
+    file, which on a bed of more than 5000 grains is packed alone; by default those of
+    windward sides, of a flat bed and a step down all
     - windward: on sides that rise, of a profile where the flow goes up them
     - all: all"""
     packing: Packing = _pile("aligned")
@@ -411,6 +421,56 @@ class PileBed(Bed):
         if self.counted:
             return self.counted
         return "windward" if self.profile else self.form.counted
+
+    def place(self, x: ArrayLike) -> FloatArray:
+        """Find places of the user: of a profile those of its file.
+
+        Parameters
+        ----------
+        x
+            x of the bed line, m, of any shape.
+
+        Returns
+        -------
+        ndarray
+            x as the user has it, m, of the same shape.
+        """
+        if self.profile:
+            return self.profile.place(x)
+        return np.asarray(x, float)
+
+    def along(self, x: ArrayLike) -> FloatArray:
+        """Find x of the bed line, of places that `place` gives.
+
+        Parameters
+        ----------
+        x
+            x as the user has it, m, of any shape.
+
+        Returns
+        -------
+        ndarray
+            x of the bed line, m, of the same shape.
+        """
+        if self.profile:
+            return self.profile.along(x)
+        return np.asarray(x, float)
+
+    def level(self, z: ArrayLike) -> FloatArray:
+        """Find heights of the user: of a profile those of its file.
+
+        Parameters
+        ----------
+        z
+            z of the bed line, m, of any shape.
+
+        Returns
+        -------
+        ndarray
+            z as the user has it, m, of the same shape.
+        """
+        up = self.profile.origin[1] if self.profile else 0.0
+        return up + np.asarray(z, float)
 
     @property
     def is_level(self) -> bool:

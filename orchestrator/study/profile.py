@@ -3,17 +3,21 @@
 import csv
 import io
 import json
+import math
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from hashlib import sha256
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from orchestrator.digits import on_grid
+from orchestrator.digits import on_grid, rounded
 from orchestrator.errors import InputError
 from orchestrator.runs.files import digest_text, opened
 from orchestrator.study.noise import needed_smoothing
@@ -21,7 +25,18 @@ from orchestrator.study.shapes import SHAPES
 from orchestrator.study.units import number
 from orchestrator.types import FloatArray
 
-LARGEST, LARGEST_NUMBER = 20 * 2**20, 1e5  # bytes of a file, and largest coordinate, m
+LARGEST, LARGEST_NUMBER = 20 * 2**20, 1e5  # bytes of a file, and largest number, m
+LARGEST_X = 1e7
+"""Largest x of a profile, m: eastings and northings of maps."""
+ALSO = {
+    "x_m": ("x", "easting", "northing", "chainage", "distance", "station"),
+    "z_m": ("z", "elevation", "height", "level", "altitude"),
+}
+"""What surveyors call the columns of a profile, with or without the unit m."""
+CLASSES = ("diameter_m", "fraction")
+"""Columns of a sieve table of classes."""
+PASSING = ("sieve_mm", "passing_percent")
+"""Columns of a sieve table as laboratories write it."""
 MOST_CORNERS = (
     3000  # most corners of a bed line, each of which is a grid line of the flow's mesh
 )
@@ -35,10 +50,13 @@ OVER = (
     0.5  # each of the two lengths whose means give the slope of a line, over its height
 )
 
+WITH_X, AGAINST_X = "+x", "-x"
+"""Where the flow goes in the file of a profile."""
+
 
 @dataclass(frozen=True)
 class Profile:
-    """A bed line of n points that begins at the origin.
+    """A bed line of n points that begins at the origin and goes on with the flow.
 
     Two profiles with one digest are one bed.
 
@@ -54,6 +72,11 @@ class Profile:
         Digest of the corners.
     needs
         Smoothing that the noise of the points needs, m.
+    origin
+        Place and height of the first point in the file, m. It is the first that the
+        flow meets.
+    towards
+        Where the flow goes in the file: "+x" or "-x".
     """
 
     name: str = field(compare=False)  # the file's
@@ -62,9 +85,47 @@ class Profile:
     text: str = field(compare=False, repr=False)  # the file itself
     digest: str  # of the corners: two profiles with one digest are one bed
     needs: float = field(default=0.0, compare=False)  # smoothing for its noise, m
+    origin: tuple[float, float] = field(default=(0.0, 0.0), compare=False)
+    towards: str = field(default=WITH_X, compare=False)
 
     def __str__(self) -> str:
         return f"{self.name} ({self.digest[:12]})"
+
+    @property
+    def sign(self) -> int:
+        """1 where the flow goes towards +x of the file, -1 towards -x."""
+        return -1 if self.towards == AGAINST_X else 1
+
+    def place(self, x: ArrayLike) -> FloatArray:
+        """Find the places of the file.
+
+        Parameters
+        ----------
+        x
+            Distances along x from the first point, with the flow, m, of any shape.
+
+        Returns
+        -------
+        ndarray
+            x of the file, m, of the same shape.
+        """
+        return self.origin[0] + self.sign * np.asarray(x, float)
+
+    def along(self, x: ArrayLike) -> FloatArray:
+        """Find the distances of places of the file from the first point.
+
+        Parameters
+        ----------
+        x
+            x of the file, m, of any shape.
+
+        Returns
+        -------
+        ndarray
+            Distances along x, with the flow, to nine digits of the length, m.
+        """
+        away = self.sign * (np.asarray(x, float) - self.origin[0])
+        return on_grid(away, self.x[-1])
 
     def smoothed(self, length: float) -> dict[str, Any]:
         """Make the fields of a bed with the points smoothed over another length.
@@ -79,7 +140,9 @@ class Profile:
         dict
             Values by the names of the fields.
         """
-        return _fields(read_profile(self.text, self.name, self.name, length))
+        return _fields(
+            read_profile(self.text, self.name, self.name, length, self.towards)
+        )
 
 
 def steepest_deg(profile: Profile, height: float) -> float:
@@ -131,6 +194,33 @@ def _fields(profile: Profile) -> dict[str, Any]:
     return {"profile": profile, "height": height, "slope_deg": slope}
 
 
+def _from_first_point(bed: Mapping[str, Any], profile: Profile) -> dict[str, Any]:
+    """The places in the table of a bed, from the first point of its profile.
+
+    Values of a wrong type are left to the validation of the scene.
+    """
+    moved: dict[str, Any] = {}
+    counted = bed.get("counted")
+    if isinstance(counted, list) and all(map(_is_number, counted)):
+        moved["counted"] = profile.along(counted)[:: profile.sign].tolist()
+    obstacles = bed.get("obstacles")
+    if isinstance(obstacles, list):
+        moved["obstacles"] = [_moved(one, profile) for one in obstacles]
+    return moved
+
+
+def _moved(obstacle: Any, profile: Profile) -> Any:
+    """The table of an obstacle with its place from the first point of a profile."""
+    if not isinstance(obstacle, dict) or not _is_number(obstacle.get("x")):
+        return obstacle
+    return obstacle | {"x": float(profile.along(obstacle["x"]))}
+
+
+def _is_number(value: Any) -> bool:
+    """Whether a value of a study file is a number."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
 @dataclass
 class Files:
     """The files that a study names: profiles and sieve tables.
@@ -155,19 +245,23 @@ class Files:
     added: str = ""
     _read: dict[str, str] = field(default_factory=dict)
 
-    def bed(self, bed: dict[str, Any], where: str) -> dict[str, Any]:
+    def bed(self, bed: dict[str, Any], where: str, towards: str) -> dict[str, Any]:
         """Fields of a bed that names a profile.
 
         Parameters
         ----------
         bed
-            The table of the bed; its `profile` is the name of a file.
+            The table of the bed; its `profile` is the name of a file. A range of
+            `counted` and `obstacles` have x of that file.
         where
             The study file, for messages.
+        towards
+            Where the flow goes in the file, "+x" or "-x".
 
         Returns
         -------
-        The profile, and the height (m) and the slope (degrees) that follow from it.
+        The profile, the height (m) and the slope (degrees) that follow from it, and the
+        range and the obstacles with x from its first point.
 
         Raises
         ------
@@ -184,11 +278,11 @@ class Files:
             smoothing = 0.0  # the declaration of bed.smoothing refuses the value
         place = self._place(name, where)
         text = self._text(name, where)
-        profile = read_profile(text, Path(name).name, place, smoothing)
-        return _fields(profile)
+        profile = read_profile(text, Path(name).name, place, smoothing, towards)
+        return _fields(profile) | _from_first_point(bed, profile)
 
     def sieve(self, name: str, where: str) -> list[list[float]]:
-        """Read a sieve table.
+        """Read a sieve table: classes, or the per cent that passes each sieve.
 
         Parameters
         ----------
@@ -201,11 +295,19 @@ class Files:
         -------
         list of list
             Rows of diameter, m, and fraction of the mass.
+
+        Raises
+        ------
+        InputError
+            If the file is no sieve table.
         """
         where = f"{where}: grain.sizes"
         place = self._place(name, where)
         text = self._text(name, where)
-        return read_columns(text, ("diameter_m", "fraction"), place)[1]
+        header = text.partition("\n")[0]
+        if PASSING[1] in header:
+            return _classes(read_columns(text, PASSING, place)[1], place)
+        return read_columns(text, CLASSES, place)[1]
 
     def _place(self, name: str, where: str) -> str:
         """The path of a file, for messages."""
@@ -239,6 +341,33 @@ class Files:
             self.added = "\n[profiles]\n"
         self.added += f"{json.dumps(name)} = {string}\n"
         return text
+
+
+def _classes(rows: list[list[float]], where: str) -> list[list[float]]:
+    """The classes between sieves, of the per cent of the mass that passes each.
+
+    A class has the geometric mean of its two sieves as diameter, m.
+    """
+    rows = sorted(rows)
+    remedy = "begin with the sieve that all pass, end with one that nothing passes"
+    if len(rows) < 2:
+        raise InputError("one class lies between two sieves", where, remedy)
+    passing = [percent for _, percent in rows]
+    if passing[0] != 0:
+        what = f"{passing[0]:g} % pass the smallest sieve, not 0"
+        raise InputError(what, where, remedy)
+    if passing[-1] != 100:
+        what = f"{passing[-1]:g} % pass the largest sieve, not 100"
+        raise InputError(what, where, remedy)
+    classes = []
+    for (smaller, below), (larger, above) in pairwise(rows):
+        if above < below or larger == smaller:
+            what = f"{above:g} % pass {larger:g} mm, and {below:g} % {smaller:g} mm"
+            raise InputError(what, where, "a larger sieve lets more pass")
+        if above > below:
+            diameter = 1e-3 * math.sqrt(smaller * larger)
+            classes.append([rounded(diameter), rounded((above - below) / 100)])
+    return classes
 
 
 def read_bytes(path: Path, largest: int, where: str) -> bytes:
@@ -321,7 +450,7 @@ def read_columns(
     text
         The file.
     names
-        The names of the columns, in metres or without a unit.
+        The names of the columns; those of a profile may have others, see `ALSO`.
     where
         The file, for messages.
 
@@ -337,9 +466,10 @@ def read_columns(
     reader = csv.DictReader(io.StringIO(text))
     lines, values = [], []
     try:
-        reader.fieldnames = _header(reader.fieldnames or (), names)
+        reader.fieldnames = [cell.strip() for cell in reader.fieldnames or ()]
+        columns = [_column(reader.fieldnames, name, names) for name in names]
         for row in reader:
-            pair = [_cell(row, name) for name in names]
+            pair = [_cell(row, column) for column in columns]
             if None in row:
                 count = len(reader.fieldnames)
                 more = len(row[None])
@@ -356,22 +486,35 @@ def read_columns(
     return lines, values
 
 
-def _header(cells: Sequence[str], names: tuple[str, str]) -> list[str]:
-    """The names of the columns in the header.
+def _column(header: Sequence[str], name: str, names: tuple[str, str]) -> str:
+    """What a header calls a column, by its own name or by one of `ALSO`.
 
-    It is a ValueError unless each is there once.
+    It is a ValueError unless just one column is meant.
     """
-    header = [cell.strip() for cell in cells]
-    if all(header.count(name) == 1 for name in names):
-        return header
+    if header.count(name) == 1:
+        return name
+    meant = [cell for cell in header if _plain(cell) in ALSO.get(name, ())]
+    if name not in header and len(meant) == 1:
+        return meant[0]
+    if name not in header and len(meant) > 1:
+        listed = " or ".join(meant)
+        raise ValueError(f"which column is {name}: {listed}? Name that one {name}")
     what = f"not one column {names[0]} and one {names[1]} in {','.join(header)!r}"
     if len(header) == 1 and ";" in header[0]:
         what = f"{what}: commas between the cells, no semicolons"
     raise ValueError(what)
 
 
+def _plain(cell: str) -> str:
+    """The name of a column without its unit, if that is m, in small letters."""
+    return re.sub(r"[ _,]*(\(m\)|\[m\]|(?<=[ _,])m)$", "", cell.lower())
+
+
 def _cell(row: Mapping[str | None, Any], name: str) -> float:
     """The number in a cell; a ValueError for any other text."""
+    largest = LARGEST_NUMBER
+    if name == "x_m" or _plain(name) in ALSO["x_m"]:
+        largest = LARGEST_X
     text = row[name]
     if text is None or not text.strip():
         raise ValueError(f"the cell of {name} is empty")
@@ -379,10 +522,8 @@ def _cell(row: Mapping[str | None, Any], name: str) -> float:
         value = number(text)
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
-    if not abs(value) <= LARGEST_NUMBER:
-        raise ValueError(
-            f"{name}: {text.strip()} is not a number up to {LARGEST_NUMBER:g}"
-        )
+    if not abs(value) <= largest:
+        raise ValueError(f"{name}: {text.strip()} is not a number up to {largest:g}")
     return value
 
 
@@ -409,7 +550,9 @@ class _Refusal:
 
 
 @cache
-def read_profile(text: str, name: str, where: str, smoothing: float) -> Profile:
+def read_profile(
+    text: str, name: str, where: str, smoothing: float, towards: str = WITH_X
+) -> Profile:
     """Read a profile and smooth it.
 
     Parameters
@@ -423,6 +566,13 @@ def read_profile(text: str, name: str, where: str, smoothing: float) -> Profile:
     smoothing
         Twice the standard deviation of the Gaussian weights of a mean along x, m; 0
         for none.
+    towards
+        Where the flow goes in the file, "+x" or "-x".
+
+    Returns
+    -------
+    Profile
+        The bed line, its points in the order in which the flow meets them.
 
     Raises
     ------
@@ -435,6 +585,18 @@ def read_profile(text: str, name: str, where: str, smoothing: float) -> Profile:
         raise refusal.whole(f"{len(points)} points make no bed", "write 3 at least")
     x, z = np.array(points).T
     _check_steps(x, refusal)
+    sign = 1
+    if towards == AGAINST_X:
+        # turned before all else, so that a bed is what its mirror image is in the
+        # opposite flow
+        sign = -1
+        x, z = -x[::-1], z[::-1]
+        refusal = _Refusal(refusal.where, refusal.lines[::-1])
+    origin = (float(sign * x[0]) + 0.0, float(z[0]))
+    # to nine digits of the length: means are known no better, and the name of a bed is
+    # its corners; before means are taken, which a last digit would change
+    length = np.ptp(x)
+    x = on_grid(x - x[0], length)
     needs = needed_smoothing(x, z)
     more = "give bed.smoothing, a length in m"
     if smoothing:
@@ -444,15 +606,12 @@ def read_profile(text: str, name: str, where: str, smoothing: float) -> Profile:
     corners = _count_of_corners(x, smoothing, more, refusal)
     if smoothing:
         x, z = _smoothed(x, z, smoothing, max(corners, DENSE))
-    _check_heights(x, z, more, refusal)
-    # to nine digits of the length: means are known no better, and the name of a bed is
-    # its corners
-    length = np.ptp(x)
-    xs = tuple(on_grid(x - x[0], length).tolist())
+    _check_heights(x, z, more, refusal, origin[0] + sign * x)
+    xs = tuple(on_grid(x, length).tolist())
     zs = tuple(on_grid(z - z[0], length).tolist())
     lines_of_corners = [f"{a!r},{b!r}" for a, b in zip(xs, zs, strict=True)]
     digest = digest_text("\n".join(lines_of_corners))
-    return Profile(name, xs, zs, text, digest, needs)
+    return Profile(name, xs, zs, text, digest, needs, origin, towards)
 
 
 def _check_steps(x: FloatArray, refusal: _Refusal) -> None:
@@ -489,15 +648,20 @@ def _count_of_corners(
     return int(np.ceil(count))
 
 
-def _check_heights(x: FloatArray, z: FloatArray, more: str, refusal: _Refusal) -> None:
-    """Refuse a line that is level or too steep; `more` is the remedy against noise."""
+def _check_heights(
+    x: FloatArray, z: FloatArray, more: str, refusal: _Refusal, places: FloatArray
+) -> None:
+    """Refuse a line that is level or too steep; `more` is the remedy against noise.
+
+    The file has its points at other `places`.
+    """
     if np.ptp(z) == 0:
         what = "level: it has no height to measure by"
         raise refusal.whole(what, 'ask for shape = "flat" with a height')
     slopes = np.degrees(np.arctan2(np.diff(z), np.diff(x)))
     steep = int(np.argmax(np.abs(slopes)))
     if abs(slopes[steep]) > STEEPEST_DEG:
-        slope = f"{slopes[steep]:.0f} deg at x = {x[steep]:g} m"
+        slope = f"{slopes[steep]:.0f} deg at x = {places[steep]:g} m"
         what = f"{slope}, above {STEEPEST_DEG:g}"
         remedy = f"{more}; check that x and z are both in m"
         raise refusal.at(steep + 1, what, remedy)

@@ -10,7 +10,7 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from orchestrator.digits import SLACK
+from orchestrator.digits import SLACK, rounded
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.threshold import LAWS_OF, PAPER, weight
@@ -21,6 +21,7 @@ from orchestrator.study.parts import (
     Forces,
     Grain,
     GrainBed,
+    Obstacle,
     PileBed,
     Range,
     Sizes,
@@ -28,6 +29,7 @@ from orchestrator.study.parts import (
     extremes,
     percentile,
 )
+from orchestrator.study.profile import WITH_X
 from orchestrator.study.shapes import SHAPES
 
 BUILDABLE_DEG = (1.0, 60.0)
@@ -81,8 +83,30 @@ class Question(Part):
 
     @property
     def counts(self) -> str | Range | None:
-        """Which exposed grains of a pile are counted; None on a bed of one grain."""
-        return self.bed.counts if isinstance(self.bed, PileBed) else None
+        """Which exposed grains of a pile are counted; None on a bed of one grain.
+
+        With a profile a range is of x of its file.
+        """
+        if not isinstance(self.bed, PileBed):
+            return None
+        counts = self.bed.counts
+        if isinstance(counts, str) or self.bed.profile is None:
+            return counts
+        first, last = sorted(map(rounded, self.bed.place(counts).tolist()))
+        return first, last
+
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """The obstacles on a bed, with a profile at x of its file."""
+        if not isinstance(self.bed, PileBed):
+            return ()
+        if self.bed.profile is None:
+            return self.bed.obstacles
+        moved = []
+        for each in self.bed.obstacles:
+            x = rounded(float(self.bed.place(each.x)))
+            moved.append(each.model_copy(update={"x": x}))
+        return tuple(moved)
 
     @property
     def is_turned(self) -> bool:
@@ -173,6 +197,7 @@ def _check(question: Question) -> None:
         what = "each update is a solve of the flow"
         raise UnfitError("threshold.update", what, f"0, or at least {LEAST_UPDATE:g}")
     _check_top(question.flow)
+    _check_towards(question)
     _check_criterion(question)
     if isinstance(question.bed, PileBed):
         _check_pile(question, question.bed)
@@ -296,6 +321,13 @@ def _check_not_poured(question: Question) -> None:
         raise UnfitError("bed.width", what, POURED)
 
 
+def _check_towards(question: Question) -> None:
+    is_profile = isinstance(question.bed, PileBed) and question.bed.profile is not None
+    if question.flow.towards != WITH_X and not is_profile:
+        what = "it is of profiles: other beds are built with the flow"
+        raise UnfitError("flow.towards", what, OUT)
+
+
 def _check_top(flow: Flow) -> None:
     remedy = "see flow.top"
     if flow.top == "boundary layer" and flow.depth:
@@ -338,6 +370,9 @@ def _check_pile(question: Question, bed: PileBed) -> None:
     _check_obstacles(bed)
     if bed.profile is None:
         _check_shape(bed)
+    elif bed.profile.towards != question.flow.towards:
+        what = f"the profile was read for a flow towards {bed.profile.towards}"
+        raise UnfitError("flow.towards", what, "read it again")
     _check_depth(question.flow, bed, largest * d)
 
 

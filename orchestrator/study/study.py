@@ -39,7 +39,13 @@ from orchestrator.study.keys import (
     nested,
 )
 from orchestrator.study.parts import PileBed, Sizes, percentile
-from orchestrator.study.profile import LARGEST_NUMBER, Files, decoded, read_bytes
+from orchestrator.study.profile import (
+    LARGEST_NUMBER,
+    WITH_X,
+    Files,
+    decoded,
+    read_bytes,
+)
 from orchestrator.study.scene import Scene, roughness_length
 from orchestrator.study.shapes import SHAPES
 from orchestrator.study.source import Source, find, presets
@@ -642,7 +648,7 @@ def _read_files(tables: Tables, files: Files, where: str) -> None:
     bed = tables["bed"]
     grain = tables["grain"]
     if bed["kind"] == "pile" and isinstance(bed.get("profile"), str):
-        bed.update(files.bed(bed, where))
+        bed.update(files.bed(bed, where, str(tables["flow"].get("towards", WITH_X))))
     if isinstance(grain.get("sizes"), str):
         grain["sizes"] = files.sieve(grain["sizes"], where)
 

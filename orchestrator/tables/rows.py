@@ -284,8 +284,8 @@ def wall_stress(pile: Pile, cases: Path) -> Row:
         "z0_m": pile.flow.roughness_m,
         "s_m": stress.s_m,
         "s_over_h": stress.s_m / pile.bed.height,
-        "x_m": stress.x_m,
-        "z_m": stress.z_m,
+        "x_m": pile.bed.place(stress.x_m),
+        "z_m": pile.bed.level(stress.z_m),
         "ustar_over_ustar0_wall": stress.ustar_over_ustar0_wall,
         "ustar_over_ustar0_eq10": stress.ustar_over_ustar0_eq10,
         "ustar_over_ustar0_eq10_printed": stress.ustar_over_ustar0_eq10_printed,
@@ -474,7 +474,7 @@ def pile_grain(answer: Answer) -> Row:
         "scene_id": answer.scene_id,
         "grain_id": np.flatnonzero(counted) + 1,
         "s_m": packing.arc_length[counted] * d,
-        "x_m": packing.centres[counted, 0] * d,
+        "x_m": pile.bed.place(packing.centres[counted, 0] * d),
         "ustar_over_ustar0": answer.speed,
         "moved_in_load_step": motion.level,
         "fallen_in_load_step": motion.fallen,
@@ -587,12 +587,13 @@ def _starts(answer: Answer) -> Row:
     first_x, first_ustar0 = answer.first
     low, high = _first_interval(answer)
     pivot_x, pivot_ustar0 = answer.checked
+    bed = answer.pile.bed
     return {
-        "first_x_m": first_x,
+        "first_x_m": float(bed.place(first_x)),
         "first_ustar0_m_s": first_ustar0,
         "first_ustar0_low_m_s": low,
         "first_ustar0_high_m_s": high,
-        "pivot_x_m": pivot_x,
+        "pivot_x_m": float(bed.place(pivot_x)),
         "pivot_first_m_s": pivot_ustar0,
     }
 

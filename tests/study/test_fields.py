@@ -30,6 +30,7 @@ UNCHANGEABLE = (
     "bed.profile",
     "bed.smoothing",
     "bed.obstacles",
+    "flow.towards",  # with the profile that is read
 )
 NEEDED: dict[str, dict[str, Any]] = {
     "bed.windward": {"bed.shape": "dune"},

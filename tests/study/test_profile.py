@@ -157,6 +157,119 @@ def test_a_scene_is_what_a_profile_holds_and_a_study_is_whole_without_the_file(
     assert again.text == asked.text
 
 
+def surveyed(mirrored: bool = False) -> str:
+    """A noisy dune with x from 112.4 m and z from 2.29 m, or its image about x = 300 m.
+
+    The wind is towards larger x, of the image towards smaller x.
+    """
+    x = np.linspace(0, 60, 301)
+    z = 2.29 + 0.05 * np.maximum(0, 30 - np.abs(x - 32))
+    z += 2e-3 * np.random.default_rng(4).standard_normal(len(x))
+    x += 112.4
+    if mirrored:
+        x, z = 600 - x[::-1], z[::-1]
+    rows = zip(x.tolist(), z.tolist(), strict=True)
+    return points(*(f"{a:.3f},{b:.5f}" for a, b in rows))
+
+
+TOWARDS = """
+grain = {{ diameter = 1e-3 }}
+flow.towards = "{towards}"
+method.flow.model = "flat"
+[bed]
+kind = "pile"
+profile = "scan.csv"
+smoothing = 1.0
+counted = {counted}
+obstacles = [{{ kind = "fence", x = {fence}, height = 0.1 }}]
+"""
+
+
+def test_a_profile_is_its_mirror_image_in_the_opposite_wind(tmp_path: Path) -> None:
+    scenes = []
+    for mirrored, places in (
+        (False, ("[130, 140.5]", 120)),
+        (True, ("[459.5, 470]", 480)),
+    ):
+        text = TOWARDS.format(
+            counted=places[0], fence=places[1], towards="-x" if mirrored else "+x"
+        )
+        scenes.append(scene_of(tmp_path, surveyed(mirrored), text))
+    one, other = scenes
+    assert isinstance(one.bed, PileBed)
+    assert isinstance(other.bed, PileBed)
+    assert one.bed == other.bed
+    assert one.bed.profile
+    assert other.bed.profile
+    assert one.bed.profile.x == other.bed.profile.x
+    assert one.bed.profile.z == other.bed.profile.z
+    assert (one.bed.profile.origin[0], other.bed.profile.origin[0]) == (112.4, 487.6)
+    assert one.bed.counts == (17.6, 28.1)
+    # what is told has x of the file
+    assert (asked(one)["counted"], asked(other)["counted"]) == (
+        "130.0; 140.5",
+        "459.5; 470.0",
+    )
+    assert str(asked(other)["obstacles"]).endswith("at 480 m")
+    np.testing.assert_allclose(one.bed.place([0, 60]), [112.4, 172.4])
+    np.testing.assert_allclose(other.bed.place([0, 60]), [487.6, 427.6])
+    np.testing.assert_allclose(other.bed.along(other.bed.place([3.0, 7.5])), [3, 7.5])
+
+
+def test_the_wind_towards_smaller_x_is_of_profiles(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"flow.towards: 'west' is not accepted"):
+        scene_of(tmp_path, GOOD, STUDY + 'flow.towards = "west"\n')
+    pile = 'grain = { diameter = 1e-3 }\nbed.kind = "pile"\nflow.towards = "-x"\n'
+    with pytest.raises(InputError, match=r"flow.towards: it is of profiles"):
+        scene_of(tmp_path, GOOD, pile)
+
+
+def test_a_refusal_has_x_of_the_file(tmp_path: Path) -> None:
+    steep = points("412,2", "413,2.1", "413.01,2.9", "415,2")
+    for towards, place in (("+x", 413), ("-x", 413.01)):
+        text = STUDY + f'flow.towards = "{towards}"\n'
+        with pytest.raises(InputError, match=f"89 deg at x = {place} m, above"):
+            scene_of(tmp_path, steep, text)
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "Easting (m),Elevation (m)",
+        "point,chainage_m,height_m",
+        "distance,z",
+        "STATION [m],Level",
+        "x,altitude",
+    ],
+)
+def test_surveyors_may_call_the_columns_as_they_do(header: str, tmp_path: Path) -> None:
+    rows = GOOD.splitlines()[1:]
+    if header.startswith("point"):
+        rows = [f"a,{row}" if row else "" for row in rows]
+    content = "\n".join([header, *rows, ""])
+    assert scene_of(tmp_path, content).id == scene_of(tmp_path, GOOD).id
+
+
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        ("easting,northing,z", "which column is x_m: easting or northing. Name that"),
+        ("x_mm,z_mm", "not one column x_m and one z_m in 'x_mm,z_mm'"),
+        ("chainage,depth", "not one column x_m and one z_m"),
+    ],
+)
+def test_a_column_that_may_be_another_is_asked_about(
+    header: str, message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match=f"line 1: {message}"):
+        scene_of(tmp_path, f"{header}\n0,0,0\n1,1,1\n")
+
+
+def test_places_on_a_map_may_be_large(tmp_path: Path) -> None:
+    content = points("5412345.2,0", "5412345.25,0.01", "5412345.3,0.02", "5412345.34,0")
+    assert scene_of(tmp_path, content).id == scene_of(tmp_path, GOOD).id
+
+
 def test_noise_is_smoothed_and_the_ends_stay() -> None:
     x = np.linspace(0, 1, 10_000)
     hill = 0.02 * np.exp(-(((x - 0.5) / 0.1) ** 2))

@@ -124,6 +124,27 @@ def test_a_sieve_table_may_be_a_file_beside_the_study(tmp_path: Path) -> None:
     assert again.scenes[0].id == asked.scenes[0].id
 
 
+def test_the_per_cent_that_passes_each_sieve_makes_classes(tmp_path: Path) -> None:
+    sieve = tmp_path / "sieve.csv"
+    source = tmp_path / "mixed.toml"
+    source.write_text(f"{BED % 'd/30'}\ngrain = {{ sizes = 'sieve.csv' }}\n")
+    head = "sieve_mm,passing_percent\n"
+    # coarse sieves first, as a laboratory lists them; nothing lies between 1 and 2 mm
+    sieve.write_text(f"{head}4,100\n2,63.2\n1,63.2\n0.5,0\n")
+    (scene,) = study.load(str(source)).scenes
+    assert scene.grain.sizes == ((0.000707106781, 0.632), (0.00282842712, 0.368))
+    for rows, message in {
+        "4,100\n2,60\n1,5\n": "5 % pass the smallest sieve, not 0",
+        "4,95\n2,60\n1,0\n": "95 % pass the largest sieve, not 100",
+        "4,100\n2,20\n1,60\n0.5,0\n": "20 % pass 2 mm, and 60 % 1 mm",
+        "4,100\n": "one class lies between two sieves",
+        "4,100\n2,\n1,0\n": "line 3: the cell of passing_percent is empty",
+    }.items():
+        sieve.write_text(head + rows)
+        with pytest.raises(InputError, match=message):
+            study.load(str(source))
+
+
 def test_beds_that_differ_in_their_scale_alone_are_poured_once() -> None:
     bed = '{ kind = "pile", shape = "flat", length = %g, packing = "poured" }'
     text = f"bed = {bed}\ngrain = {{ diameter = %g, sizes = {{ sigma_g = 1.3 }} }}"
