@@ -317,7 +317,9 @@ def _speeds(results: Results, shown: Sequence[Pile]) -> Canvas:
     for ax, pile in zip(axes, shown, strict=True):
         velocity = over_u_e(pile, results.cases, window, pile.bed.height)
         speed = np.linalg.norm(velocity, axis=-1)
-        image = ax.imshow(speed, origin="lower", extent=window, vmin=0, vmax=1.1)
+        image = ax.imshow(
+            speed, origin="lower", extent=window, vmin=0, vmax=1.1, interpolation="none"
+        )
         _streamlines(ax, window, velocity)
         _draw_bed(ax, pile)
         ax.set(aspect="auto", xlim=(left, right), ylim=(bottom, top), yticks=range(4))

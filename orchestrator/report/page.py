@@ -10,6 +10,7 @@ from importlib import metadata
 from pathlib import Path
 from platform import python_version
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from orchestrator.report.style import Figure
 
 HERE = Path(__file__).parent
+IN_ADDRESS = " <>/=:;,.'()!*?[]{}|~+-"
+"""Letters that stand for themselves in the address of a picture."""
 PACKAGES = (
     "gmsh",
     "matplotlib",
@@ -147,10 +150,14 @@ def address(image: bytes) -> str:
     Returns
     -------
     str
-        A ``data:`` address.
+        A ``data:`` address, which may stand in double quotation marks.
     """
-    kind = "png" if image.startswith(b"\x89PNG") else "svg+xml"
-    return f"data:image/{kind};base64,{base64.b64encode(image).decode('ascii')}"
+    if image.startswith(b"\x89PNG"):
+        return f"data:image/png;base64,{base64.b64encode(image).decode('ascii')}"
+    # a text takes less room as it is than in base64; browsers drop the ends of lines
+    text = " ".join(image.decode("utf-8").split("\n"))
+    text = re.sub('"([^"\']*)"', r"'\1'", text)
+    return Markup("data:image/svg+xml;utf8," + quote(text, safe=IN_ADDRESS))
 
 
 def _inline(figure: "Figure") -> Markup:

@@ -65,6 +65,16 @@ SHADES = {
     "d_m": ("turbo", 0.05, 0.95),
 }
 """Colour maps of quantities that rise in steps; of diameters, if there are many."""
+IN_ONE_CLIP = re.compile(
+    rb'(<g clip-path="[^"]*">)\s*<use [^>]*/>\s*</g>'
+    rb"(?:\s*\1\s*<use [^>]*/>\s*</g>)+"
+)
+"""Points of a drawing that follow each other, each in a group of its own."""
+IN_ONE_STYLE = re.compile(
+    rb'<use [^>]*? style="((?:(?!(?<!-)opacity)[^"])*)"/>'
+    rb'(?:\s*<use [^>]*? style="\1"/>)+'
+)
+"""Points that have the same style, but for an opacity, which of a group is another."""
 FIGURES = "figures"
 """The folder of the figures, in a directory of results."""
 DIAMETERS = (
@@ -457,4 +467,20 @@ def svg(drawn: Canvas) -> bytes:
     canvas: Any = FigureCanvasSVG(drawn)
     canvas.print_svg(out, metadata={"Date": None})
     # hundredths of a point are enough; a scale stays as it is
-    return re.sub(rb"(?<!\(0)(\.\d\d)\d{3,}", rb"\1", out.getvalue())
+    text = re.sub(rb"(?<!\(0)(\.\d\d)\d{2,}", rb"\1", out.getvalue())
+    text = IN_ONE_CLIP.sub(_in_one_group, text)
+    text = IN_ONE_STYLE.sub(_with_one_style, text)
+    return re.sub(rb"\n +", b"\n", text)
+
+
+def _in_one_group(found: re.Match[bytes]) -> bytes:
+    """Points in one group that have a group each."""
+    points = re.findall(rb"<use [^>]*/>", found[0])
+    return b"\n".join([found[1], *points, b"</g>"])
+
+
+def _with_one_style(found: re.Match[bytes]) -> bytes:
+    """Points in a group with their style, which each of them has."""
+    style = b' style="' + found[1] + b'"'
+    points = found[0].replace(style, b"")
+    return b"<g" + style + b">" + points + b"</g>"

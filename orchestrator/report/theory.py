@@ -1,7 +1,8 @@
 """Lines to compare thresholds with: closed form, published curves, and measurements.
 
-A law's line in (Re*, tau) depends on the bed alone; density, viscosity and gravity say which part
-of it a grain is on. Measurements judge each line over the Re* that a study has grains of.
+A law's line in (Re*, tau) depends on the bed alone; density, viscosity and gravity say
+which part of it a grain is on. Measurements judge each line over the Re* that a study
+has grains of.
 """
 
 from collections.abc import Iterable, Sequence
@@ -30,7 +31,10 @@ from orchestrator.report.results import Results, split
 from orchestrator.types import BoolArray, FloatArray
 
 PAIR = LAWS_OF["transition"]
-"""The two laws of the paper, which hold at no common Re*: their lines need not be told apart."""
+"""The two laws of the paper, which hold at no common Re*.
+
+Their lines need not be told apart.
+"""
 Dash = Any
 """A line's style, as matplotlib has it."""
 _BROKEN = (0, (4, 1.5))
@@ -47,7 +51,10 @@ LOOKS: tuple[tuple[str, Dash], ...] = (
     ("#009e73", _BROKEN),
     ("#7b3294", _BROKEN),
 )
-"""Colour and dash where colours mean laws, in the order of `LAWS`: variants share a colour."""
+"""Colour and dash where colours mean laws, in the order of `LAWS`.
+
+Variants share a colour.
+"""
 DASHES: tuple[Dash, ...] = (
     "-",
     (0, (5, 1.2)),
@@ -104,7 +111,7 @@ def look(name: str) -> tuple[str, Dash]:
 
 
 def drawn(names: Iterable[str]) -> list[str]:
-    """The laws that are drawn for some scenes: of the paper's pair both if either is used."""
+    """The laws drawn for some scenes: of the paper's pair both if either is used."""
     used = set(names)
     if used & set(PAIR):
         used |= set(PAIR)
@@ -137,9 +144,10 @@ class Bed(NamedTuple):
 
 @dataclass(frozen=True)
 class Line:
-    """The closed form of one grain by a law on a bed, and the Re* between which a study has grains.
+    """The closed form of one grain by a law on a bed, and where a study has grains.
 
-    `first` and `last` are infinite and 0 if it has none of that law.
+    That is between the Re* `first` and `last`, which are infinite and 0 if it has none
+    of that law.
     """
 
     law: str
@@ -160,11 +168,11 @@ class Line:
         return ", ".join(self.words)
 
     def tau(self, reynolds: FloatArray) -> FloatArray:
-        """Tau of the grain whose threshold is at some Re*, whether or not the law holds."""
+        """Tau of the grain whose threshold is at some Re*, also where no law holds."""
         return shields_at(LAWS[self.law], reynolds, **self.bed._asdict())
 
     def holds(self, reynolds: FloatArray) -> BoolArray:
-        """Whether the law holds at some Re*; in units of d, nu and rho_f they are u*."""
+        """Whether the law holds at some Re*; in units of d, nu, rho_f they are u*."""
         unit = Exposure(
             diameter=1.0,
             roughness=self.bed.roughness_ratio,
@@ -179,9 +187,13 @@ class Line:
         return np.asarray((reynolds >= self.first) & (reynolds <= self.last))
 
     def answers(self, reynolds: FloatArray) -> FloatArray:
-        """Tau where the study has grains and the law holds, else NaN."""
-        is_answered = self.holds(reynolds) & self.near(reynolds)
-        return np.where(is_answered, self.tau(reynolds), np.nan)
+        """Tau where the study has grains and the law holds, else NaN.
+
+        No answer is a threshold of 0: such a grain lies loose.
+        """
+        tau = self.tau(reynolds)
+        is_answered = self.holds(reynolds) & self.near(reynolds) & (tau > 0)
+        return np.where(is_answered, tau, np.nan)
 
     @cached_property
     def met(self) -> BoolArray:
@@ -196,7 +208,7 @@ class Line:
 
     @cached_property
     def factors(self) -> FloatArray:
-        """Factor from the median of each range of Re*, above or below; NaN without an answer."""
+        """Factor from each measured median, above or below; NaN without an answer."""
         ratio = self.answers(MIDDLES) / MEDIANS
         return np.where(MIDDLES >= FACTORS_FROM, np.maximum(ratio, 1 / ratio), np.nan)
 
@@ -215,7 +227,7 @@ class Line:
 
 
 def lines(scenes: pd.DataFrame) -> list[Line]:
-    """The lines through some scenes, by rising slope, entrainment angle, z0/d and lift."""
+    """The lines through some scenes, by rising slope, entrainment angle, z0, lift."""
     listed = []
     for key, group in split(
         scenes[[*GRAIN_COLUMNS.values(), "z0_over_d", "force_law"]], *BED
@@ -252,10 +264,10 @@ def in_gas(scenes: pd.DataFrame) -> "pd.Series[bool]":
 def air_lines(
     scenes: pd.DataFrame, slope: float = 0.0
 ) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """Re* and theta_c of the curves for air, by name, for the grains and the gas of some scenes.
+    """Re* and theta_c of the curves for air, by name, for the grains of some scenes.
 
-    The factor of the slope (degrees) is on u*. Of several gases the one of the least viscosity is
-    taken; without a gas there are no lines.
+    The factor of the slope (degrees) is on u*. Of several gases the one of the least
+    viscosity is taken; without a gas there are no lines.
     """
     scenes = scenes[in_gas(scenes)]
     if scenes.empty:
@@ -279,7 +291,8 @@ def air_lines(
     return listed
 
 
-@cache  # one of the curves is found by iteration, for each panel and slope of a figure anew
+# one of the curves is found by iteration, for each panel and slope of a figure anew
+@cache
 def _ustar(name: str, air: Air, first: float, last: float) -> FloatArray:
     """Threshold friction velocity of a curve for air over diameters (m), m/s."""
     return curves.AIR[name](np.geomspace(first, last, POINTS), air)
@@ -287,9 +300,10 @@ def _ustar(name: str, air: Air, first: float, last: float) -> FloatArray:
 
 @lru_cache(maxsize=1)
 def ranked(results: Results) -> list[Line]:
-    """The lines of a study's single grains on a flat bed: the widest within measurements first.
+    """The lines of a study's single grains on a flat bed.
 
-    Equally wide ones go by their factor from the medians.
+    The widest within measurements comes first; equally wide ones go by their factor
+    from the medians.
     """
     grains = results.beds("grain")
     every = lines(grains[grains["alpha_deg"] == 0])
@@ -325,7 +339,10 @@ def _ranges(chosen: BoolArray) -> str:
 
 
 def section(results: Results) -> dict[str, Any] | None:
-    """The words of the page's section on measurements; None without single grains on a flat bed."""
+    """The words of the page's section on measurements.
+
+    It is None without single grains on a flat bed.
+    """
     listed = ranked(results)
     if not listed:
         return None
@@ -339,7 +356,7 @@ def section(results: Results) -> dict[str, Any] | None:
 
 
 def sheet(listed: Iterable[Line]) -> pd.DataFrame:
-    """A row for each line: law, entrainment angle, z0/d, and how it compares with measurements."""
+    """A row for each line: law, entrainment angle, z0/d, and how near it is to data."""
     rows = []
     for line in listed:
         worst, at = line.worst
@@ -354,14 +371,14 @@ def sheet(listed: Iterable[Line]) -> pd.DataFrame:
 
 
 def nearest(results: Results) -> list[str]:
-    """The law and bed nearest to measurements in water, what none meets, the nearest in air."""
+    """The law and bed nearest to data in water, what none meets, the nearest in air."""
     listed = ranked(results)
     in_air = _nearest_in_air(results, listed)
     return [*_nearest_in_water(listed), *_unmet(listed), *in_air]
 
 
 def _nearest_in_water(listed: Sequence[Line]) -> list[str]:
-    """The sentence on the line that is within the measured ranges over most decades of Re*."""
+    """The sentence on the line that is within measured ranges over most decades."""
     first = listed[0]
     _, at = first.worst
     if not (at and first.decades):
@@ -378,7 +395,7 @@ def _nearest_in_water(listed: Sequence[Line]) -> list[str]:
 
 
 def _unmet(listed: Sequence[Line]) -> list[str]:
-    """The sentence on the Re* at which lines answer, none within the measured range."""
+    """The sentence on the Re* at which lines answer, none within measured ranges."""
     is_answered = np.any([np.isfinite(line.answers(GRID)) for line in listed], axis=0)
     is_met = np.any([line.met for line in listed], axis=0)
     unmet = is_answered & ~is_met
@@ -399,17 +416,18 @@ def _nearest_in_air(results: Results, listed: Sequence[Line]) -> list[str]:
         return []
     mean = np.exp(np.nanmean(np.array(read)[:, is_covered], axis=0))
     x = MIDDLES[is_covered]
+    ends = f"{_number(x[0])} … {_number(x[-1])}"
     off = []
+    answered = []
     for line in listed:
         ratio = line.answers(x) / mean
         factors = np.maximum(ratio, 1 / ratio)
+        answered.append(int(np.isfinite(factors).sum()))
         # infinite where a law does not hold: few of the curves' Re* judge no line
         off.append(float(np.median(np.nan_to_num(factors, nan=np.inf))))
-    sentence = caption(
-        "best_in_air",
-        fit=listed[int(np.argmin(off))],
-        off=min(off),
-        of_first=off[0],
-        ends=f"{_number(x[0])} … {_number(x[-1])}",
-    )
-    return [sentence]
+    if np.isinf(min(off)):
+        most = f"{max(answered)} of {len(x)}"
+        return [caption("none_in_air", count=len(listed), ends=ends, most=most)]
+    of_first = None if np.isinf(off[0]) else off[0]
+    fit = listed[int(np.argmin(off))]
+    return [caption("best_in_air", fit=fit, off=min(off), of_first=of_first, ends=ends)]

@@ -1,5 +1,6 @@
 """The figures hold what the tables say: the axes' data, not their pixels."""
 
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
@@ -256,3 +257,23 @@ def test_a_class_whose_interval_ends_at_its_threshold_is_drawn() -> None:
     (bars,) = ax.containers
     assert isinstance(bars, ErrorbarContainer)
     assert bars.has_yerr
+
+
+def test_points_of_one_style_have_it_once_and_none_is_lost() -> None:
+    drawn = style.canvas(2.0)
+    ax = drawn.subplots()
+    count = 40
+    places = np.arange(count, dtype=float)
+    ax.plot(places, places, "s", color="#123456", gid="line")
+    ax.scatter(places, places[::-1], c=places, gid="dots")
+    ax.scatter(places, places + 1, color="#654321", alpha=0.5, gid="pale")
+    text = style.svg(drawn).decode()
+    for name in ("line", "dots", "pale"):
+        group = text[text.index(f'id="{name}"') :]
+        group = group[: group.index('<g id="')]
+        assert len(re.findall("<use [^>]*/>", group)) == count
+    line = text[text.index('id="line"') :]
+    assert line[: line.index('<g id="')].count("#123456") <= 3
+    # the opacity of a group is not that of each point in it; that of a fill is
+    assert "fill-opacity: 0.5" in text
+    assert re.search('<g style="(?:[^"]*[^-])?opacity', text) is None

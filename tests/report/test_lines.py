@@ -62,6 +62,31 @@ def test_only_where_the_study_has_grains_is_a_law_judged() -> None:
     assert theory.sheet([nowhere]).iloc[0].tolist()[3:] == ["nowhere", "0.0", "—", "—"]
 
 
+def test_a_grain_that_lies_loose_is_no_answer_of_a_line() -> None:
+    steep = Line("bridged", Bed(0.0, 100.0, 1 / 30, 1.615), 0.01, 1e3)
+    assert (steep.tau(MIDDLES) <= 0).any()
+    assert np.isnan(steep.answers(MIDDLES)).all()
+    assert np.isnan(steep.factors).all()
+    assert theory.sheet([steep]).iloc[0].tolist()[3:] == ["nowhere", "0.0", "—", "—"]
+
+
+def test_laws_that_answer_at_few_re_are_not_compared_with_the_curves_for_air(
+    results: Results,
+) -> None:
+    """Eq. 2 and Eq. 4 hold below 3 and from 30 on: their median factor was infinite."""
+    low = Line("low", BED, 1.7, 55.0)
+    high = Line("high", BED, 1.7, 55.0)
+    (sentence,) = theory._nearest_in_air(results, [low, high])
+    assert sentence.startswith("None of the 2 combinations can be compared")
+    assert "inf" not in sentence
+    (sentence,) = theory._nearest_in_air(results, [low, bridged(0.1, 170.0)])
+    assert "nearest in water has no answer at half of these Re*" in sentence
+    assert "inf" not in sentence
+    (sentence,) = theory._nearest_in_air(results, [bridged(), bridged(0.1, 170.0)])
+    assert "nearest in water is off by" in sentence
+    assert "inf" not in sentence
+
+
 @pytest.fixture
 def bed(results: Results) -> pd.DataFrame:
     """Grains on one flat bed."""

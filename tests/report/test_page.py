@@ -1,6 +1,7 @@
 """The page: well formed, in need of nothing else, with links that lead somewhere."""
 
 import base64
+import re
 import shutil
 import subprocess
 from dataclasses import replace
@@ -73,7 +74,7 @@ def parsed(html: str) -> Page:
 def test_page_needs_nothing_else(html: str, parsed: Page) -> None:
     kinds = [src.split(",")[0] for src in parsed.all("img", "src")]
     folded = html.count("<code>python -m orchestrator report DIR --all</code>")
-    assert (set(kinds), folded) == ({"data:image/svg+xml;base64"}, 1)
+    assert (set(kinds), folded) == ({"data:image/svg+xml;utf8"}, 1)
     assert "6 more figures, drawn on demand" in parsed.text
     assert not {"link", "iframe", "object"} & {tag for tag, _ in parsed.tags}
     scripts = [values for tag, values in parsed.tags if tag == "script"]
@@ -306,3 +307,15 @@ def test_page_of_an_experiment_holds_all_of_its_sections(tmp_path: Path) -> None
     ] * 2
     files = {path.name for path in (tmp_path / "figures").iterdir()}
     assert files == {"first.png", "first.svg", "second.png", "second.svg"}
+
+
+def test_the_address_of_a_figure_is_its_text(html: str, page: Path) -> None:
+    first = re.search(r'href="(figures/[^"]+)"><img src="([^"]+)"', html)
+    assert first is not None
+    kind, _, text = first[2].partition(",")
+    assert kind == "data:image/svg+xml;utf8"
+    assert "\n" not in text
+    assert "#" not in text
+    shown = unquote(text)
+    kept = (page.parent / first[1]).read_text(encoding="utf-8")
+    assert re.sub(r"[\s\"']+", " ", shown) == re.sub(r"[\s\"']+", " ", kept)
