@@ -27,7 +27,7 @@ def write(directory: Path) -> Path:
     Returns
     -------
     Path
-        The page.
+        The page; one that was there is replaced.
 
     Raises
     ------
@@ -43,7 +43,7 @@ def write(directory: Path) -> Path:
         remedy = "name the directory that holds directories of studies, such as results"
         raise InputError(what, where=str(directory), remedy=remedy)
     folder = Folder(directory.absolute())
-    folder.put(NAME, page.fill("gallery.html.j2", title="Studies", cards=cards))
+    folder.note(NAME, page.fill("gallery.html.j2", title="Studies", cards=cards))
     return folder.root / NAME
 
 

@@ -156,7 +156,6 @@ class PouredBed(Case):
     recipe: ClassVar[int] = 6
     results: ClassVar[tuple[str, ...]] = (SETTLING, DUMP)
     derived: ClassVar[tuple[str, ...]] = (BED,)
-    made: ClassVar[tuple[str, ...]] = ("log.liggghts",)
 
     @property
     def parameters(self) -> dict[str, Any]:

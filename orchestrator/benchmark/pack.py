@@ -476,7 +476,7 @@ def write(
         about = {"kind": workspace.PACK.word, "name": name}
         folder.note(MANIFEST, text_of(about))  # it is no pack until all is there
         listed = [one for one in problems if one.expected["tolerance"].notna().any()]
-        scenes = folder.clear(SCENES, lambda path: bool(_IN_SCENES.fullmatch(path)))
+        scenes = folder.clear(SCENES)
         for one in listed:
             one.write(scenes / one.scene)
         expected = pd.concat([one.expected.assign(scene=one.scene) for one in listed])

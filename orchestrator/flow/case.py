@@ -134,7 +134,6 @@ class FlowCase(Case):
         "[1-9]*/uniform/functionObjects/functionObjectProperties",
     )
     needs_bulky: ClassVar[bool] = True
-    made: ClassVar[tuple[str, ...]] = ("log.simpleFoam", "log.wallShearStress")
 
     @property
     def parameters(self) -> dict[str, Any]:

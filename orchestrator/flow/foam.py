@@ -477,7 +477,6 @@ class SolvedFlow:
         s = np.cumsum(lengths) - lengths[:toe].sum() - lengths / 2.0
         z_e = ((middles - centres) * normals).sum(axis=1)
         eq10 = log_law_ustar(speed, z_e, z0) / self.ustar0
-        printed = log_law_ustar(speed, z_e, z0, printed=True) / self.ustar0
         # The first face is that of the column before the inlet.
         return WallStress(
             s_m=s[1:],
@@ -487,7 +486,6 @@ class SolvedFlow:
             z_e_m=z_e[1:],
             tau_wall=(on_wall / self.ustar0**2)[1:],
             ustar_over_ustar0_eq10=eq10[1:],
-            ustar_over_ustar0_eq10_printed=printed[1:],
         )
 
     def column_speed(self) -> float:

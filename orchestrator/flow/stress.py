@@ -63,8 +63,6 @@ class WallStress:
     ustar_over_ustar0_eq10
         Eq. 10 at the first cell's centre, 0.41 u_t / ln((z_e + z0)/z0), in units of
         u*_0.
-    ustar_over_ustar0_eq10_printed
-        Eq. 10 as the paper prints it, 0.41 u_t / ln(z_e/z0), in units of u*_0.
     """
 
     s_m: FloatArray
@@ -74,7 +72,6 @@ class WallStress:
     z_e_m: FloatArray
     tau_wall: FloatArray
     ustar_over_ustar0_eq10: FloatArray
-    ustar_over_ustar0_eq10_printed: FloatArray
 
     @cached_property
     def ustar_over_ustar0_wall(self) -> FloatArray:

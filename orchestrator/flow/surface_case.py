@@ -157,11 +157,6 @@ class SurfaceFlowCase(Case):
         *(f"[1-9]*/uniform/{name}" for name in ("time", "cumulativeContErr")),
         "[1-9]*/uniform/functionObjects/functionObjectProperties",
     )
-    made: ClassVar[tuple[str, ...]] = (
-        *("log.decomposePar", "log.simpleFoam", "log.reconstructPar"),
-        "log.wallShearStress",
-        *("/".join(["processor[0-9]*", *["*"] * depth]) for depth in range(1, 6)),
-    )
 
     @property
     def parameters(self) -> dict[str, Any]:

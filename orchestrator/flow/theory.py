@@ -269,7 +269,6 @@ def _wall_stress(
         z_e_m=np.full(len(tau), np.nan),
         tau_wall=tau,
         ustar_over_ustar0_eq10=ustar,
-        ustar_over_ustar0_eq10_printed=ustar,
     )
 
 

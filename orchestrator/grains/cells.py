@@ -67,7 +67,6 @@ class GrainCase(Case):
         "bed.dump",
     )
     derived: ClassVar[tuple[str, ...]] = ("load_steps.csv", "motion.csv")
-    made: ClassVar[tuple[str, ...]] = ("log.liggghts", "counted.csv")
     bulky: ClassVar[tuple[str, ...]] = ("passage.dump", "bed.dump")
 
     def versions(self) -> dict[str, str]:

@@ -123,7 +123,6 @@ class GoingCase(Case):
     recipe: ClassVar[int] = 1
     results: ClassVar[tuple[str, ...]] = ("settling.csv", "samples.csv", GOING, GONE)
     derived: ClassVar[tuple[str, ...]] = ("load_steps.csv", "motion.csv")
-    made: ClassVar[tuple[str, ...]] = ("log.liggghts",)
 
     @cached_property
     def geometry(self) -> Geometry:

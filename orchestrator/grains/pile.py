@@ -169,7 +169,6 @@ class WornFlow(Case):
     results: ClassVar[tuple[str, ...]] = FlowCase.results
     derived: ClassVar[tuple[str, ...]] = FlowCase.derived
     bulky: ClassVar[tuple[str, ...]] = FlowCase.bulky
-    made: ClassVar[tuple[str, ...]] = FlowCase.made
 
     @cached_property
     def geometry(self) -> Geometry:

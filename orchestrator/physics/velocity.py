@@ -65,8 +65,6 @@ def log_law_ustar(
     speed: ArrayLike,
     height: ArrayLike,
     roughness: ArrayLike,
-    *,
-    printed: bool = False,
 ) -> FloatArray:
     """Compute the friction velocity from a speed above the bed by the log law (Eq. 10).
 
@@ -81,8 +79,6 @@ def log_law_ustar(
         Height z above the bed, m.
     roughness
         Roughness length z0 of the bed, m.
-    printed
-        Whether the profile is that which the paper prints.
 
     Returns
     -------
@@ -95,8 +91,7 @@ def log_law_ustar(
     [0.4451 0.5934]
     """
     over = np.asarray(height, float) / np.asarray(roughness, float)
-    profile = np.log(over) if printed else np.log1p(over)
-    return np.asarray(KARMAN * np.asarray(speed, float) / profile)
+    return np.asarray(KARMAN * np.asarray(speed, float) / np.log1p(over))
 
 
 def log_law_speed(

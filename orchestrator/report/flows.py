@@ -38,11 +38,6 @@ ESTIMATES: dict[str, Look] = {
         "color": "#0072b2",
         "lw": 1.0,
     },
-    "eq10_printed": {
-        "label": "Eq. 10 as printed, ln(zₑ/z₀)",
-        "color": "#56b4e9",
-        "ls": "--",
-    },
 }
 """Looks of the estimates of the friction velocity, by the ending of their column."""
 FELT: Look = {

@@ -5,7 +5,7 @@ import os
 import re
 import stat
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from fnmatch import fnmatchcase
 from functools import cache, cached_property
 from hashlib import sha256
@@ -28,7 +28,6 @@ DONE = "done.json"
 FAILED = "failed.json"
 CHECKSUMS = "results.sha256"
 LOG = "log.Allrun"
-STATE = (IDENTITY, DONE, FAILED, CHECKSUMS, LOG)
 GENERATED = (
     "[1-9]",
     "[1-9][0-9]",
@@ -140,8 +139,6 @@ class Case(ABC):
     """
     needs_bulky: ClassVar[bool] = False
     """Whether its inputs are also made of bulky files of the cases that it needs."""
-    made: ClassVar[tuple[str, ...]] = ()
-    """Patterns of other files that a run writes or leaves: its own files fit one."""
 
     @property
     @abstractmethod
@@ -236,8 +233,7 @@ class Case(ABC):
 def prepare(case: Case, cases: Path) -> Path:
     """Make the case's directory afresh, with inputs and identity.
 
-    The files that a former run left there are removed. Other files, also inputs that a
-    user has changed, are kept aside: a solver might read them.
+    What was in it is removed, whoever wrote it: a solver might read it.
 
     Parameters
     ----------
@@ -252,8 +248,7 @@ def prepare(case: Case, cases: Path) -> Path:
         Its directory.
     """
     cases.mkdir(parents=True, exist_ok=True)
-    is_ours = _whose(case, cases / case.name)
-    directory = Folder(cases.parent).clear(f"{cases.name}/{case.name}", is_ours)
+    directory = Folder(cases.parent).clear(f"{cases.name}/{case.name}")
     directory.mkdir()
     inputs = inputs_written(case, directory, cases)
     identity = {
@@ -296,21 +291,6 @@ def inputs_written(case: Case, directory: Path, cases: Path) -> dict[str, str]:
     case.write(directory, cases)
     written = [path for path in directory.rglob("*") if path.is_file()]
     return files.digest_files(written, root=directory)
-
-
-def _whose(case: Case, directory: Path) -> Callable[[str], bool]:
-    """A test whether a file in the directory of a former run is that run's own."""
-    inputs = read_json(directory / IDENTITY).get("inputs_sha256")
-    patterns = (*STATE, *case.results, *case.derived, *case.bulky, *case.made)
-    names = {path for path, _, _ in template_files(case.template)}
-
-    def is_ours(name: str) -> bool:
-        if isinstance(inputs, dict) and name in inputs and not _fits(name, case.made):
-            return bool(inputs[name] == files.digest_file(directory / name))
-        final = re.sub(r"(^|/)\.([^/]+)\.tmp$", r"\1\2", name)
-        return final in names or _fits(final, patterns)
-
-    return is_ours
 
 
 def finish(case: Case, directory: Path, **times: float) -> None:

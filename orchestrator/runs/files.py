@@ -1,4 +1,4 @@
-"""State on disk: canonical JSON, digests, durable writing, and files of others."""
+"""State on disk: canonical JSON, digests, durable writing, directories of results."""
 
 import contextlib
 import errno
@@ -6,8 +6,8 @@ import hashlib
 import json
 import os
 import re
-import warnings
-from collections.abc import Callable, Iterable, Iterator
+import shutil
+from collections.abc import Iterable, Iterator
 from io import BufferedReader
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -20,8 +20,6 @@ RECORD = "written.sha256"
 `sha256sum` reads it. A line is added before its file is written: a killed process
 leaves no file that is not listed.
 """
-KEPT = "kept"
-"""Directory for files that stand in the way and that this program did not write."""
 _NO_LINKS = "remove the link; the directory as a whole may lie elsewhere: --out"
 _LISTED = re.compile(r"(?m)^([0-9a-f]{64})  (.+)(?<!\.json)$")
 """A line of the record.
@@ -282,12 +280,12 @@ def _files_below(directory: Path) -> list[Path]:
 class Folder:
     """A directory that this program writes.
 
-    It is the one way for files to get into the directory and out of it. Only files that
-    this program wrote are replaced or removed. Anything else that stands in their place
-    is moved to `KEPT` with a warning.
+    It is the one way for files to get into the directory and out of it. The names that
+    are written are this program's: what is there under such a name is replaced. Files
+    under other names stay, but for those in a sub-directory that is made anew.
 
-    Names are paths relative to the directory. A link in the way raises InputError; the
-    directory itself may be one.
+    Names are paths relative to the directory. A link in the way, or a directory in the
+    place of a file, raises InputError; the directory itself may be a link.
 
     Parameters
     ----------
@@ -332,8 +330,6 @@ class Folder:
     def put(self, name: str, content: str | bytes) -> None:
         """Write a file in one step, and record it.
 
-        A file of its name that was not put there is kept aside.
-
         Parameters
         ----------
         name
@@ -347,9 +343,7 @@ class Folder:
         write_durably(self._place(name), data)
 
     def note(self, name: str, content: str | bytes) -> None:
-        """Write a file whose name is this program's whatever it holds.
-
-        It is not recorded.
+        """Write a file in one step without recording it, as the state of a study is.
 
         Parameters
         ----------
@@ -358,50 +352,43 @@ class Folder:
         content
             Its content.
         """
-        write_durably(self._place(name, is_ours=True), content)
+        write_durably(self._place(name), content)
 
     def drop(self, name: str) -> None:
-        """Remove a file whose name is this program's whatever it holds.
+        """Remove a file, if it is there.
 
         Parameters
         ----------
         name
             Its path relative to the directory.
         """
-        self._place(name, is_ours=True).unlink(missing_ok=True)
+        self._place(name).unlink(missing_ok=True)
 
-    def clear(self, name: str, is_ours: Callable[[str], bool]) -> Path:
-        """Make way for a sub-directory; files that are not ours are kept aside.
+    def clear(self, name: str) -> Path:
+        """Remove a sub-directory with all that is in it; no link in it is followed.
 
         Parameters
         ----------
         name
             Path of the sub-directory relative to the directory.
-        is_ours
-            Whether a file is this program's, by its path relative to the sub-directory.
 
         Returns
         -------
         Path
             The path of the sub-directory, which is not made.
         """
-        path = self.path(name)
-        for place, _, names in os.walk(path, topdown=False):
-            for each in names:
-                file = Path(place, each)
-                if not file.is_symlink() and is_ours(file.relative_to(path).as_posix()):
-                    file.unlink()
-            # it stays while something is in it
-            with contextlib.suppress(OSError):
-                os.rmdir(place)
-        return self._place(name)
+        path = self._place(name, of_folder=True)
+        if path.is_dir():
+            shutil.rmtree(path)
+        else:
+            path.unlink(missing_ok=True)
+        return path
 
     @contextlib.contextmanager
     def renewed(self) -> Iterator[None]:
         """Put all files anew within the block; those not put again are removed.
 
-        A file that has changed since stays, and so do all where the block ends with an
-        exception.
+        All stay where the block ends with an exception.
 
         Yields
         ------
@@ -412,8 +399,8 @@ class Folder:
         yield
         new = self._listed()[len(before) :]
         names = {name for _, name in new}
-        for digest, name in before:
-            if name not in names and self._digest(name) == digest:
+        for _, name in before:
+            if name not in names:
                 self.drop(name)
         self._record(dict.fromkeys(new))
 
@@ -466,51 +453,21 @@ class Folder:
             raise OrchestratorError(what, where=str(path), remedy=remedy)
         return data
 
-    def _place(self, name: str, *, is_ours: bool = False) -> Path:
-        """The path of a name, free to be written.
-
-        Its directory is made, and what is not this program's is moved away.
-        """
+    def _place(self, name: str, *, of_folder: bool = False) -> Path:
+        """The path of a name, where a file, or a sub-directory, can be written."""
         path = self.path(name)
-        self._make_folders(path)
         # an empty directory is in nobody's way
         with contextlib.suppress(OSError):
             path.rmdir()
-        is_put = is_ours or (self._digest(name), name) in self._listed()
-        is_replaceable = is_put and path.is_file()
-        if os.path.lexists(path) and not is_replaceable:
-            self._keep(name)
+        if path.is_dir() and not of_folder:
+            what = "a directory is where this program writes a file"
+            raise InputError(what, where=str(path), remedy="move it away")
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except (FileExistsError, NotADirectoryError):
+            what = "a file is where this program writes a directory"
+            raise InputError(what, str(path.parent), "move it away") from None
         return path
-
-    def _make_folders(self, path: Path) -> None:
-        """Make the directories above a path; files in their place are moved away."""
-        *folders, _ = path.relative_to(self.root).parents
-        for folder in reversed(folders):
-            place = self.root / folder
-            if os.path.lexists(place) and not place.is_dir():
-                self._keep(folder.as_posix())
-            place.mkdir(exist_ok=True)
-
-    def _keep(self, name: str) -> None:
-        """Move something that is not this program's to a free place below `KEPT`."""
-        kept = self._free_place(name)
-        path = self.root / name
-        path.rename(self.root / kept)
-        what = f"{path} is not what this program wrote: it is kept as {kept}"
-        warnings.warn(what, stacklevel=2)
-
-    def _free_place(self, name: str) -> str:
-        """A name below `KEPT`, or below the next of its kind, that nothing has."""
-        count = 1
-        while True:
-            kept = KEPT if count == 1 else f"{KEPT}-{count}"
-            count += 1
-            place = self.path(f"{kept}/{name}")
-            # a file that was kept before may stand where a directory is needed
-            with contextlib.suppress(FileExistsError, NotADirectoryError):
-                place.parent.mkdir(parents=True, exist_ok=True)
-                if not os.path.lexists(place):
-                    return f"{kept}/{name}"
 
     def _digest(self, name: str) -> str | None:
         """Digest of a file; None where it is missing or cannot be read."""

@@ -288,7 +288,6 @@ def wall_stress(pile: Pile, cases: Path) -> Row:
         "z_m": pile.bed.level(stress.z_m),
         "ustar_over_ustar0_wall": stress.ustar_over_ustar0_wall,
         "ustar_over_ustar0_eq10": stress.ustar_over_ustar0_eq10,
-        "ustar_over_ustar0_eq10_printed": stress.ustar_over_ustar0_eq10_printed,
     }
 
 

@@ -26,7 +26,7 @@ def stress() -> WallStress:
         random.uniform(2e-4, 4e-4, 60),
     )
     x, z = random.normal(size=(2, 60))
-    return WallStress(s, x, z, length, z_e, tau, eq10, 1.04 * eq10)
+    return WallStress(s, x, z, length, z_e, tau, eq10)
 
 
 def overlap_mean(

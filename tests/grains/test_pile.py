@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.optimize import linprog
 
 from orchestrator.errors import Exploded, InputError
 from orchestrator.grains.loads import Loads
@@ -386,6 +387,48 @@ def test_grains_in_a_plane_roll_over_their_foremost_contact(mixed: Results) -> N
         along, up = pile.tangents[grain]
         ahead = np.arctan2(-(x * along + z * up), z * along - x * up)
         assert angle == pytest.approx(np.degrees(ahead).max(), abs=1e-5)
+
+
+def test_grains_in_space_roll_where_their_contacts_bear_the_tilted_weight_no_more(
+    strip: Results,
+) -> None:
+    """The bed is tilted downstream until no pushes of the contacts balance the weight.
+
+    The largest tilt at which some do is the solution of a linear program.
+    """
+    pile = _pile(strip, "pivot")
+    packed = pile.packing
+    counted = np.flatnonzero(packed.windward)
+    made = strip.tables["pile_grain"]
+    of_pile = made[made["scene_id"] == next(iter(strip.plan.piles))]
+    assert of_pile["grain_id"].tolist() == (counted + 1).tolist()
+    width = packed.places.width
+    assert width == 3.0
+    rolls, locked = 0, 0
+    for grain, angle in zip(counted, of_pile["pivot_deg"], strict=True):
+        apart = packed.places.xyz - packed.places.xyz[grain]
+        apart[:, 1] -= width * np.round(apart[:, 1] / width)
+        distance = np.linalg.norm(apart, axis=1)
+        reach = (packed.sizes[grain] + packed.sizes) / 2
+        touching = (distance < reach * 1.001) & (distance > 0)
+        contacts = (apart[touching] / distance[touching, None]).T
+        # pushes of the contacts, and the tangent of the tilt, which is to be the largest
+        unknown = contacts.shape[1] + 1
+        tilt = np.eye(unknown)[-1]
+        found = linprog(
+            -tilt,
+            A_eq=np.column_stack([contacts, [-1.0, 0.0, 0.0]]),
+            b_eq=[0.0, 0.0, -1.0],
+            bounds=[(0, None)] * (unknown - 1) + [(None, None)],
+        )
+        if found.status == 0:
+            assert angle == pytest.approx(np.degrees(np.arctan(-found.fun)), abs=1e-4)
+            rolls += 1
+        else:
+            assert np.isnan(angle)
+            locked += 1
+    assert rolls >= 5
+    assert locked >= 1
 
 
 def test_each_size_class_has_its_threshold(mixed: Results) -> None:

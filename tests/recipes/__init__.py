@@ -166,7 +166,6 @@ def _stress(x: tuple[float, ...], flat: WallStress) -> WallStress:
         z_e_m=0.1 * flat.length_m,
         tau_wall=tau,
         ustar_over_ustar0_eq10=np.sqrt(tau),
-        ustar_over_ustar0_eq10_printed=np.sqrt(tau),
     )
 
 

@@ -242,18 +242,17 @@ def studies(tmp_path: Path) -> Path:
     return tmp_path / "all"
 
 
-def test_gallery_of_studies_keeps_a_page_of_the_users(studies: Path) -> None:
-    (studies / gallery.NAME).write_text("mine")
-    with pytest.warns(UserWarning, match=f"kept as kept/{gallery.NAME}"):
-        gallery.write(studies)
-    assert (studies / "kept" / gallery.NAME).read_text() == "mine"
+def test_gallery_of_studies_is_written_anew(studies: Path) -> None:
+    (studies / gallery.NAME).write_text("an earlier one")
+    (studies / "mine.html").write_text("mine")
+    gallery.write(studies)
+    assert (studies / "mine.html").read_text() == "mine"
     html = (studies / gallery.NAME).read_text("utf-8")
     assert '<a href="two%20%26%20more/report.html">two &amp; more</a>' in html
     gallery.write(studies)
     assert (studies / gallery.NAME).read_text("utf-8") == html
-    assert [path.name for path in (studies / "kept").iterdir()] == [gallery.NAME]
     with pytest.raises(InputError, match="no study with a page"):
-        gallery.write(studies / "kept")
+        gallery.write(studies / "one")
 
 
 def test_a_study_of_another_version_costs_its_own_sentences(studies: Path) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator.errors import InputError
 from orchestrator.runs import workspace
-from orchestrator.runs.files import KEPT, RECORD, Folder
+from orchestrator.runs.files import RECORD, Folder
 
 
 @pytest.fixture
@@ -24,7 +24,7 @@ def outside(tmp_path: Path) -> Path:
     return path
 
 
-def test_only_files_that_were_put_are_replaced_or_removed(folder: Folder) -> None:
+def test_only_names_that_were_put_are_replaced_or_removed(folder: Folder) -> None:
     for name in ("tables/a.csv", "tables/b.csv", "tables/c.csv"):
         folder.put(name, "one")
     folder.note("study.json", "{}")
@@ -35,39 +35,33 @@ def test_only_files_that_were_put_are_replaced_or_removed(folder: Folder) -> Non
     tables = {
         path.name: path.read_text() for path in (folder.root / "tables").iterdir()
     }
-    assert tables == {"a.csv": "two", "c.csv": "changed", "mine.csv": "mine"}
+    assert tables == {"a.csv": "two", "mine.csv": "mine"}
     assert folder.written().keys() == {"tables/a.csv"}
     with pytest.raises(ValueError, match="for this test"), folder.renewed():
         raise ValueError("for this test")
     assert folder.is_whole()
     assert (folder.root / "study.json").is_file()
-    assert not (folder.root / KEPT).exists()
 
 
-@pytest.mark.filterwarnings("ignore:.*not what this program wrote")
-def test_directories_in_the_place_of_files_and_the_reverse_are_kept(
+def test_directories_in_the_place_of_files_and_the_reverse_are_refused(
     folder: Folder,
 ) -> None:
     for name in ("full", "empty"):
         (folder.root / name).mkdir()
     (folder.root / "full" / "notes.txt").write_text("mine")
     (folder.root / "tables").write_text("a file where a directory goes")
-    for name in ("full", "empty", "tables/a.csv"):
-        folder.put(name, "ours")
-        assert (folder.root / name).read_text() == "ours"
-    kept = folder.root / KEPT
-    assert {path.name for path in kept.iterdir()} == {"full", "tables"}
-    assert (kept / "full" / "notes.txt").read_text() == "mine"
-    # where that file is now, no directory can be
-    (folder.root / "tables" / "a.csv").write_text("mine")
-    with pytest.warns(
-        UserWarning, match=r"out/tables/a\.csv is not what this program wrote"
-    ):
-        folder.put("tables/a.csv", "ours")
-    assert (folder.root / f"{KEPT}-2" / "tables" / "a.csv").read_text() == "mine"
+    folder.put("empty", "ours")
+    assert (folder.root / "empty").read_text() == "ours"
+    with pytest.raises(InputError, match="full: a directory is where"):
+        folder.put("full", "ours")
+    for name in ("tables/a.csv", "tables/deep/a.csv"):
+        with pytest.raises(InputError, match="a file is where this program writes a"):
+            folder.put(name, "ours")
+    assert (folder.root / "full" / "notes.txt").read_text() == "mine"
+    assert (folder.root / "tables").read_text() == "a file where a directory goes"
 
 
-@pytest.mark.parametrize("link", ["tables", "tables/a.csv", KEPT, RECORD])
+@pytest.mark.parametrize("link", ["tables", "tables/a.csv", RECORD])
 def test_no_link_is_followed(folder: Folder, outside: Path, link: str) -> None:
     path = folder.root / link
     (folder.root / "tables").mkdir()
@@ -76,8 +70,6 @@ def test_no_link_is_followed(folder: Folder, outside: Path, link: str) -> None:
     path.symlink_to(
         outside if path.suffix not in (".csv", ".sha256") else outside / "a.csv"
     )
-    if link == KEPT:
-        (folder.root / "tables" / "a.csv").write_text("mine")
     with pytest.raises(InputError, match=f"{path}: it is a link"):
         folder.put("tables/a.csv", "ours")
     assert path.is_symlink()
@@ -92,7 +84,7 @@ def test_no_link_is_followed(folder: Folder, outside: Path, link: str) -> None:
 def test_no_name_leads_out(folder: Folder, name: str) -> None:
     for write in (
         lambda: folder.put(name, "ours"),
-        lambda: folder.clear(name, lambda _: True),
+        lambda: folder.clear(name),
     ):
         with pytest.raises(InputError, match="out of the directory"):
             write()
@@ -129,33 +121,29 @@ def test_a_directory_belongs_to_one_kind_and_one_name(
     assert [path.name for path in outside.iterdir()] == ["a.csv"]
 
 
-@pytest.mark.filterwarnings("ignore:.*not what this program wrote")
 @pytest.mark.parametrize("harm", [b"", b"\xff\xfe not a record\n"])
-def test_without_its_record_nothing_is_lost(folder: Folder, harm: bytes) -> None:
+def test_a_harmed_record_is_written_again(folder: Folder, harm: bytes) -> None:
     folder.put("tables/a.csv", "one")
     (folder.root / RECORD).write_bytes(harm)
     folder.put("tables/a.csv", "two")
-    assert (folder.root / KEPT / "tables" / "a.csv").read_text() == "one"
+    assert (folder.root / "tables" / "a.csv").read_text() == "two"
+    assert folder.written().keys() == {"tables/a.csv"}
     assert folder.is_whole()
 
 
-@pytest.mark.filterwarnings("ignore:.*not what this program wrote")
-def test_a_cleared_directory_leaves_what_is_not_ours(
+def test_a_cleared_directory_is_gone_and_no_link_in_it_is_followed(
     folder: Folder, outside: Path
 ) -> None:
     scene = folder.root / "scene"
     (scene / "deep").mkdir(parents=True)
     (scene / "answer.csv").write_text("ours")
-    (scene / "deep" / "log.txt").write_text("ours")
     (scene / "deep" / "notes.txt").write_text("mine")
     (scene / "link").symlink_to(outside)
-    ours = {"answer.csv", "deep/log.txt"}
-    assert folder.clear("scene", ours.__contains__) == scene
-    assert not scene.exists()
-    kept = folder.root / KEPT / "scene"
-    found = {path.relative_to(kept).as_posix() for path in kept.rglob("*")}
-    assert found == {"deep", "deep/notes.txt", "link"}
+    assert folder.clear("scene") == scene
+    assert list(folder.root.iterdir()) == []
     assert (outside / "a.csv").read_text() == "precious"
+    scene.write_text("a file where the directory goes")
+    folder.clear("scene").mkdir()
 
 
 def test_another_name_of_a_file_keeps_its_content(
@@ -169,12 +157,9 @@ def test_another_name_of_a_file_keeps_its_content(
         folder.put("tables/a.csv", f"two {name}")
         assert second.read_bytes() == before
         second.unlink()
-    assert not (folder.root / KEPT).exists()
 
 
-@pytest.mark.filterwarnings("ignore:.*not what this program wrote")
-def test_a_pipe_in_the_place_of_a_file_is_kept(folder: Folder) -> None:
+def test_a_pipe_in_the_place_of_a_file_is_replaced(folder: Folder) -> None:
     os.mkfifo(folder.root / "pipe")
     folder.put("pipe", "ours")
     assert (folder.root / "pipe").read_text() == "ours"
-    assert (folder.root / KEPT / "pipe").is_fifo()
