@@ -1,7 +1,6 @@
 """The command line: parse, call, print."""
 
 import argparse
-import difflib
 import os
 import sys
 import warnings
@@ -14,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from orchestrator import __version__, examples
 from orchestrator.benchmark import cli as benchmark
 from orchestrator.calculator import cli as calculator
-from orchestrator.errors import Fault, InputError, of_exception
+from orchestrator.errors import Fault, InputError, of_exception, suggestion
 from orchestrator.runs import terminal
 from orchestrator.runs.cluster import SYSTEMS, Queue
 from orchestrator.study.units import number, whole_number
@@ -136,8 +135,7 @@ class _Parser(argparse.ArgumentParser):
             name = word.partition("=")[0]
             if not name.startswith("--") or name == "--" or name in known:
                 continue
-            near = difflib.get_close_matches(name, known, 1)
-            advice = f"did you mean {near[0]}?" if near else "--help lists all"
+            advice = suggestion(name, known) or "--help lists all"
             self.error(f"there is no option {name}: {advice}")
 
 
@@ -184,8 +182,8 @@ def _add_run_options(command: argparse.ArgumentParser, preset: str) -> None:
     if preset:
         text = f"study file, or name of a preset; default: {preset}"
         add("source", nargs="?", default=preset, metavar="FILE|PRESET", help=text)
-    text = "directory of the results; default: results/ and the name of the "
-    text += "file" if preset == "first-look" else "command"
+    of_what = "file" if preset == "first-look" else "command"
+    text = f"directory of the results; default: results/ and the name of the {of_what}"
     add("--out", type=Path, metavar="DIR", help=text)
     count = os.cpu_count() or 1
     text = "number of cases at a time; default: one for each processor"
@@ -231,7 +229,9 @@ def _study(options: Namespace) -> int:
     studies = []
     if "source" in options:
         studies = [load(options.source, options.tolerance)]
-    name = studies[0].name if is_study else options.command
+    name = options.command
+    if is_study:
+        name = studies[0].name
     out = options.out or Path("results") / name
     cases = out.absolute() / "cases"
     if is_study:
@@ -305,7 +305,8 @@ def _other(options: Namespace) -> int:
 
         findings = list(doctor.examine())
         print(doctor.text(findings))
-        return 0 if all(finding.good for finding in findings) else 1
+        is_good = all(finding.good for finding in findings)
+        return int(not is_good)
     if options.command == "status":
         from orchestrator.runs import workspace
 
@@ -334,4 +335,6 @@ def _end(finished: "Finished") -> int:
     print(finished.page)
     if finished.failures:
         return 3
-    return 1 if finished.undrawn else 0
+    if finished.undrawn:
+        return 1
+    return 0

@@ -144,6 +144,31 @@ def whole_up(value: float) -> int:
     return int(np.ceil(value - SLACK))
 
 
+def number(count: int, noun: str) -> str:
+    """Write how many things there are.
+
+    Parameters
+    ----------
+    count
+        How many.
+    noun
+        What they are, in the singular.
+
+    Returns
+    -------
+    str
+        The number with its noun.
+
+    Examples
+    --------
+    >>> number(1, "case"), number(3, "case")
+    ('1 case', '3 cases')
+    """
+    if count == 1:
+        return f"{count} {noun}"
+    return f"{count} {noun}s"
+
+
 def percent(part: float) -> str:
     """Write a part of a whole in percent.
 

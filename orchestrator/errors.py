@@ -1,9 +1,11 @@
 """Failures that a user can act on: each says what, where and what to do."""
 
+import difflib
 import errno
 import os
 import shutil
 import traceback
+from collections.abc import Iterable
 from pathlib import Path
 from typing import ClassVar
 
@@ -58,6 +60,31 @@ class OrchestratorError(Exception):
         if self.remedy:
             text = f"{text} ({one_line(self.remedy)})"
         return text
+
+
+def suggestion(word: str, known: Iterable[str]) -> str:
+    """Suggest a known word for one that may be misspelt.
+
+    Parameters
+    ----------
+    word
+        What was written.
+    known
+        What could be meant.
+
+    Returns
+    -------
+    str
+        A question; empty where none is near.
+
+    Examples
+    --------
+    >>> suggestion("watr", ["air", "water"])
+    'did you mean water?'
+    """
+    for near in difflib.get_close_matches(word, known, n=1):
+        return f"did you mean {near}?"
+    return ""
 
 
 def one_line(text: str) -> str:

@@ -125,20 +125,15 @@ def _describe(space: Workspace, study: Study, planned: Plan) -> bool:
     about = {"study": study.text, "tolerance": study.tolerance}
     before = read_marker(space.root, STUDY)
     changed = any(before.get(key, value) != value for key, value in about.items())
-    source = study.source.described(space.root) if study.source else {}
-    other = _file_of(before)
-    is_other = other not in ("", source.get("file", ""))
-    if changed and is_other and (space.root / other).is_file():
+    source: dict[str, object] = {}
+    if study.source:
+        source = study.source.described(space.root)
+    other = space.file_of_another(STUDY, source.get("file"))
+    if changed and other:
         what = f"the directory holds the study of another file, {other}"
         raise InputError(what, str(space.root), "choose another with --out")
     space.describe(STUDY, study.name, list(planned.cases), **about, source=source)
     return changed
-
-
-def _file_of(about: Mapping[str, Any]) -> str:
-    """The study file of a directory, by its description; empty for none."""
-    source = about.get("source")
-    return str(source.get("file", "")) if isinstance(source, dict) else ""
 
 
 def complete(

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.digits import number
 from orchestrator.fidelity import decision, limits, smoothing
 from orchestrator.fidelity.decision import Decision, decide
 from orchestrator.grains.cells import SingleGrainCase, batches
@@ -27,13 +28,12 @@ from orchestrator.study.study import Study
 START_S, SCENE_S, GRAIN_S = 2.5, 4e-3, 4e-5
 """Times of imports and first figures, of a scene, and of a grain of a bed without a
 run, s."""
-BESIDE = (
-    1.3  # time of a case with the Python beside its solver, over that of the solver
-)
-SORT_S = (
-    4.3e-3  # of `pace` on the machine of these times and of those that cases expect, s
-)
-BYTES = 2.2e6  # mean size of a case of the preset `paper`
+BESIDE = 1.3
+"""Time of a case with the Python beside its solver, over that of the solver."""
+SORT_S = 4.3e-3
+"""Time of `pace` on the machine of these times and of those that cases expect, s."""
+BYTES = 2.2e6
+"""Mean size of a case of the preset `paper`."""
 BY_DEM = (
     'method.kind = "dem", without a tolerance, answers its scenes as they are written'
 )
@@ -71,9 +71,8 @@ class Plan:
     @property
     def drawing_s(self) -> float:
         """Expected time of tables, figures and grains without a run, s."""
-        lengths = sum(
-            pile.length for pile in self.piles.values() if not pile.method.cases
-        )
+        without_run = [pile for pile in self.piles.values() if not pile.method.cases]
+        lengths = sum(pile.length for pile in without_run)
         return START_S + SCENE_S * len(self.decisions) + GRAIN_S * lengths
 
     @property
@@ -82,18 +81,16 @@ class Plan:
 
         No scene as it is written needs them, and no check by DEM.
         """
-        piles = [
-            pile
-            for asked, pile in self.piles.items()
-            if not self.decisions[asked].is_chosen
-        ]
+        piles = [*self.checks.values()]
+        for asked, pile in self.piles.items():
+            if not self.decisions[asked].is_chosen:
+                piles.append(pile)
         for smoothed in self.smoothings.values():
             piles += smoothed.values()
-        needed = {
-            run.name for pile in (*piles, *self.checks.values()) for run in pile.runs
-        }
-        cells = {cell.name for cell in self.cells}
-        return frozenset(self.cases) - needed - cells
+        needed = {cell.name for cell in self.cells}
+        for pile in piles:
+            needed.update(run.name for run in pile.runs)
+        return frozenset(self.cases) - needed
 
     @property
     def ids(self) -> dict[str, str]:
@@ -121,22 +118,19 @@ class Plan:
             The markers, by name.
         """
         names = [name for name in self.cases if name not in but]
+        cases = [self.cases[name] for name in names]
         with ThreadPoolExecutor() as pool:  # gigabytes of results are read
-            found = pool.map(
-                lambda name: done_state(self.cases[name], directory), names
-            )
-            states = dict(zip(names, found, strict=True))
+            states = pool.map(partial(done_state, cases=directory), cases)
         done: dict[str, dict[str, Any]] = {}
         outdated: set[str] = set()
-        for name in names:
-            state, case = states[name], self.cases[name]
+        for case, state in zip(cases, states, strict=True):
             if not state:
                 continue
             needs = {need.name for need in case.needs}
             if needs & outdated or not reuse.is_as_made_now(case, directory):
-                outdated.add(name)
+                outdated.add(case.name)
             else:
-                done[name] = state
+                done[case.name] = state
         if outdated:
             what = f"{len(outdated)} cases were made by other code of this program"
             warnings.warn(f"{what}, which now makes them otherwise", stacklevel=2)
@@ -158,12 +152,14 @@ class Plan:
             Those not done, and those pruned that they need, by name.
         """
         missing = {name: case for name, case in self.cases.items() if name not in done}
-        starts = (
-            need for case in missing.values() if case.needs_bulky for need in case.needs
-        )
-        return {
-            case.name: case for case in starts if not is_whole(case, directory)
-        } | missing
+        starts = {}
+        for case in missing.values():
+            if not case.needs_bulky:
+                continue
+            for need in case.needs:
+                if not is_whole(need, directory):
+                    starts[need.name] = need
+        return starts | missing
 
 
 def make(study: Study, cases: Path | None = None) -> Plan:
@@ -189,7 +185,9 @@ def make(study: Study, cases: Path | None = None) -> Plan:
     """
     limits.check_study(study)
     decisions = {scene.id: decide(scene, study.tolerance) for scene in study.scenes}
-    checks = decision.checks(decisions.values()) if study.tolerance else {}
+    checks = {}
+    if study.tolerance:
+        checks = decision.checks(decisions.values())
     return of(decisions, checks, cases)
 
 
@@ -216,31 +214,33 @@ def of(
     """
     piles = _piles(decisions, cases)
     checking = _piles(checks or {}, cases)
-    scenes = [answer.scene for asked, answer in decisions.items() if asked not in piles]
-    grains = {scene.id: scene for scene in scenes if scene.method.kind == "dem"}
+    grains = {}
+    for asked, answer in decisions.items():
+        if asked not in piles and answer.scene.method.kind == "dem":
+            grains[answer.scene.id] = answer.scene
     cells = tuple(batches(grains.values()))
+    every = [*piles.values(), *checking.values()]
     smoothings = {}
     for asked, pile in piles.items():
-        scenes_of = smoothing.compared(pile.scene)
-        if scenes_of:
-            made = {factor: Pile(scene, cases) for factor, scene in scenes_of.items()}
+        scenes = smoothing.compared(pile.scene)
+        if scenes:
+            made = {factor: Pile(scene, cases) for factor, scene in scenes.items()}
             smoothings[asked] = made
-    every = [*piles.values(), *checking.values()]
-    for smoothed in smoothings.values():
-        every += smoothed.values()
-    runs = [run for pile in every for run in pile.runs]
+            every += made.values()
+    runs: list[Case] = []
+    for pile in every:
+        runs += pile.runs
     listing = listed((*runs, *cells))
     return Plan(dict(decisions), piles, cells, checking, listing, smoothings)
 
 
 def _piles(decisions: Mapping[str, Decision], cases: Path | None) -> dict[str, Pile]:
     """The piles that answer, by the keys of their decisions."""
-    scenes = {asked: answer.scene for asked, answer in decisions.items()}
-    return {
-        asked: Pile(scene, cases)
-        for asked, scene in scenes.items()
-        if isinstance(scene.bed, PileBed)
-    }
+    piles = {}
+    for asked, answer in decisions.items():
+        if isinstance(answer.scene.bed, PileBed):
+            piles[asked] = Pile(answer.scene, cases)
+    return piles
 
 
 def listed(cases: Iterable[Case]) -> dict[str, Case]:
@@ -287,15 +287,15 @@ def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
     """
     plan = make(study, directory)
     regimes = _counted(regime_of(scene) for scene in study.scenes)
-    yield f"{study.title}: {_number(len(study.scenes), 'scene')}; regimes: {regimes}"
-    if outside := sum(not law_holds(scene) for scene in study.scenes):
+    yield f"{study.title}: {number(len(study.scenes), 'scene')}; regimes: {regimes}"
+    outside = sum(not law_holds(scene) for scene in study.scenes)
+    if outside:
         yield f"  in {outside} the force law does not hold for a single grain"
-    for why, times in Counter(
-        answer.why for answer in plan.decisions.values()
-    ).most_common():
+    reasons = Counter(answer.why for answer in plan.decisions.values())
+    for why, times in reasons.most_common():
         yield f"  {times} answered: {why}"
     if plan.smoothings:
-        noisy = _number(len(plan.smoothings), "noisy profile")
+        noisy = number(len(plan.smoothings), "noisy profile")
         other = "half and twice the smoothing, and with what it needs"
         yield f"  {noisy}: also with {other}"
     yield from expected(plan, directory, workers)
@@ -319,20 +319,20 @@ def expected(plan: Plan, directory: Path, workers: int) -> Iterator[str]:
         Lines of text: cases by kind, expected time and disk.
     """
     missing = plan.missing(directory, plan.done(directory)).values()
-    kinds, todo = (
-        _counted(case.kind for case in each) for each in (plan.cases.values(), missing)
-    )
-    every = f"{_number(len(plan.cases), 'case')}: {kinds or 'none'}"
-    yield f"{every}; to run: {todo or 'none'}"
+    kinds = _counted(case.kind for case in plan.cases.values()) or "none"
+    todo = _counted(case.kind for case in missing) or "none"
+    yield f"{number(len(plan.cases), 'case')}: {kinds}; to run: {todo}"
     # a chain of cases takes at least the sum of its times, however many run beside it
     walls = {case.name: case.cost_s / min(case.ranks, workers) for case in missing}
-    chains = (
-        sum(walls.get(run.name, 0.0) for run in (case, *case.needs)) for case in missing
-    )
-    slower, alone_s = pace(), sum(case.cost_s for case in missing)
-    runs = slower * BESIDE * max(alone_s / workers, max(chains, default=0.0))
+    longest_s = 0.0
+    for case in missing:
+        chain_s = sum(walls.get(run.name, 0.0) for run in (case, *case.needs))
+        longest_s = max(longest_s, chain_s)
+    alone_s = sum(case.cost_s for case in missing)
+    slower = pace()
+    runs = slower * BESIDE * max(alone_s / workers, longest_s)
     drawing = slower * plan.drawing_s
-    wall = f"about {human(runs + drawing)} with {_number(workers, 'worker')}"
+    wall = f"about {human(runs + drawing)} with {number(workers, 'worker')}"
     rest = f"{human(drawing)} of them for tables and figures"
     yield f"expected: {wall}, {rest}; {len(missing) * BYTES / 1e6:.0f} MB"
 
@@ -351,8 +351,5 @@ def pace() -> float:
 
 
 def _counted(names: Iterable[str]) -> str:
+    """Each name with how often it is there."""
     return ", ".join(f"{name} {count}" for name, count in Counter(names).most_common())
-
-
-def _number(count: int, noun: str) -> str:
-    return f"{count} {noun}{'' if count == 1 else 's'}"

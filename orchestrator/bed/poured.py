@@ -219,10 +219,14 @@ class PouredBed(Case):
             part = FILLED
         return digits.whole_up(area * part / mean)
 
+    @property
+    def dimensions(self) -> int:
+        """Dimensions of the bed: three of a strip, else two."""
+        return 3 if self.width else 2
+
     def _drawn(self, count: int, seed: int) -> FloatArray:
         """Diameters of so many of its grains, d."""
-        dimensions = 3 if self.width else 2
-        return drawn(self.sizes, self.diameter, count, seed, dimensions)
+        return drawn(self.sizes, self.diameter, count, seed, self.dimensions)
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -267,7 +271,7 @@ class PouredBed(Case):
             X, y and z of the centres, d, shape (n, 3).
         """
         rng = np.random.default_rng(self.seed)
-        chance = rng.uniform(size=(len(sizes), 3 if self.width else 2))
+        chance = rng.uniform(size=(len(sizes), self.dimensions))
         places = np.zeros((len(sizes), 3))
         # with no room to the sides each lane would stay a bed in a plane
         lanes = max(int(self.width / ((1 + LOOSE) * float(sizes.max()))), 1)

@@ -18,6 +18,7 @@ from orchestrator.benchmark import judge, pack, page
 from orchestrator.benchmark.export import Ours
 from orchestrator.benchmark.judge import ANSWER, ANSWER_BYTES, MIB, OURS, USED, name_of
 from orchestrator.benchmark.pack import Pack
+from orchestrator.digits import number
 from orchestrator.errors import InputError, printable
 from orchestrator.runs import process, workspace
 from orchestrator.runs.files import Folder, opened, read_json, text_of
@@ -138,8 +139,7 @@ def run(root: Path, command: str, out: Path | None, options: Options) -> Outcome
             level = chosen.scenes[name]["level"]
             if level not in begun:
                 begun.add(level)
-                scenes = "scene" if counts[level] == 1 else "scenes"
-                text = f"level {level}: {counts[level]} {scenes}"
+                text = f"level {level}: {number(counts[level], 'scene')}"
                 print(text, file=sys.stderr, flush=True)
             _solve(words, chosen.root / pack.SCENES / name, options, folder, name)
             answer, times = ours.answer(name)

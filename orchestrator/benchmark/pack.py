@@ -22,8 +22,13 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from orchestrator.errors import InputError
 from orchestrator.runs import workspace
-from orchestrator.runs.case import PACKAGE
-from orchestrator.runs.files import canonical_json, digest_files, digest_text, text_of
+from orchestrator.runs.files import (
+    beside,
+    canonical_json,
+    digest_files,
+    digest_text,
+    text_of,
+)
 from orchestrator.types import Row
 
 SCHEMA = 2
@@ -534,9 +539,7 @@ def contract() -> str:
     str
         The page from its section "Write a solver" to the links at its end.
     """
-    inside = PACKAGE / "docs"
-    folder = inside if inside.is_dir() else PACKAGE.parent / "docs"
-    page = (folder / "benchmark.md").read_text(encoding="utf-8")
+    page = (beside("docs") / "benchmark.md").read_text(encoding="utf-8")
     return page[page.index(CONTRACT) : page.index(AFTER_CONTRACT)]
 
 

@@ -102,6 +102,11 @@ class Surface(NamedTuple):
     threshold: float
     line: pd.DataFrame | None = None
 
+    @property
+    def drawn(self) -> pd.DataFrame:
+        """The faces that the figure has."""
+        return self.faces if self.line is None else self.line
+
     def potential(self, winds: ArrayLike) -> FloatArray:
         """Mean erosion potential of the surface.
 
@@ -613,14 +618,14 @@ def _draw(axes: Sequence[Axes], pile: Pile, winds: Sequence[float]) -> None:
         colour = COLOURS[number % len(COLOURS)]
         _draw_shares(middle, surface, colour, "-")
         right.plot(axis, surface.potential(axis), color=colour)
-        line = surface.faces if surface.line is None else surface.line
+        line = surface.drawn
         left.plot(line["x_m"], line["ratio"], ".", ms=2.5, color=colour)
     for surface, line_style in zip(pile.by_epa, LINES, strict=False):
         _draw_shares(middle, surface, GREY, line_style)
         right.plot(axis, surface.potential(axis), color=GREY, ls=line_style)
     bed = left.twinx()
     first = pile.surfaces[0]
-    line = first.faces if first.line is None else first.line
+    line = first.drawn
     x, z = line[["x_m", "z_m"]].to_numpy().T
     bed.fill_between(x, z, color=style.BED, lw=0)
     bed.set(ylim=(0, 4 * (z.max() or 1)), yticks=[])

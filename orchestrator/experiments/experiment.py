@@ -18,7 +18,7 @@ from orchestrator.report.card import lines
 from orchestrator.report.page import Section
 from orchestrator.runs import case
 from orchestrator.runs.files import Folder
-from orchestrator.runs.workspace import EXPERIMENT, Workspace, claimed, read_marker
+from orchestrator.runs.workspace import EXPERIMENT, Workspace, claimed
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.source import Source
@@ -193,11 +193,11 @@ class Experiment:
         All experiments of a name have one directory by default, whatever file they are
         on.
         """
-        source = self.source.described(space.root) if self.source else {}
-        before = read_marker(space.root, EXPERIMENT).get("source")
-        other = str(before.get("file", "")) if isinstance(before, dict) else ""
-        is_other = other not in ("", source.get("file", ""))
-        if is_other and (space.root / other).is_file():
+        source: dict[str, object] = {}
+        if self.source:
+            source = self.source.described(space.root)
+        other = space.file_of_another(EXPERIMENT, source.get("file"))
+        if other:
             what = f"the directory holds the {self.name} of another file, {other}"
             raise InputError(what, str(space.root), "choose another with --out")
         space.describe(EXPERIMENT, self.name, list(self.planned.cases), source=source)
@@ -266,7 +266,7 @@ def _form(bed: PileBed) -> list[str]:
     slope = f"{bed.slope_deg:g}°"
     if bed.is_triangle:
         return [slope]
-    return ["profile" if bed.profile else bed.shape, slope]
+    return [bed.shape_name, slope]
 
 
 def _packing(bed: PileBed) -> str:

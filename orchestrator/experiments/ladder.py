@@ -10,7 +10,7 @@ import time
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -216,7 +216,9 @@ def _pairs(scene: Scene, bed: PileBed) -> Iterator[Fidelity]:
             yield _pair(flow, PEELING)
     if not is_dem:
         return
-    best = FLAT if bed.is_level else REFERENCE.flow
+    best = REFERENCE.flow
+    if bed.is_level:
+        best = FLAT
     for grains in taken(GRAINS):
         yield _pair(best, grains)
     if is_solved and exposed <= MOST_WHOLE:
@@ -258,13 +260,15 @@ def points(pairs: Mapping[str, Decision], runs: Runs) -> pd.DataFrame:
 def _about(scene: Scene, pair: Fidelity, count: int) -> Row:
     """The columns of a point about its scene, its pair and the number of its grains."""
     assert isinstance(scene.bed, PileBed)
-    level = ", level bed" if scene.bed.is_level else ""
+    packed = packing(scene)
+    if scene.bed.is_level:
+        packed += ", level bed"
     floor = spread.floors().get(spread.model_class(scene), math.nan)
     return {
         "scene_id": scene.id,
         "scene": label(scene),
         **point(scene),
-        "packing": packing(scene) + level,
+        "packing": packed,
         "asked": scene.method.kind,
         **{f"class_{part}": scene_class(part, scene) for part in RUNGS},
         "count": count,
@@ -277,7 +281,9 @@ def _about(scene: Scene, pair: Fidelity, count: int) -> Row:
 
 def _costs(pile: Pile, runs: Runs) -> Row:
     """The columns of a point about its cost, core-s."""
-    here_s = 0.0 if pile.method.cases else time_alone_s(pile, runs.cases)
+    here_s = 0.0
+    if not pile.method.cases:
+        here_s = time_alone_s(pile, runs.cases)
     flows: list[Case] = []
     for flow in pile.model.cases:
         flows += [*flow.needs, flow]
@@ -389,7 +395,9 @@ def together(points: pd.DataFrame) -> pd.DataFrame:
     """
 
     def largest(values: pd.Series) -> float:
-        return math.nan if values.isna().any() else float(max(values, key=abs))
+        if values.isna().any():
+            return math.nan
+        return float(max(values, key=abs))
 
     rows = points[points["asked"] == "dem"].groupby(["packing", *PAIR], sort=False)
     columns: dict[str, Any] = {
@@ -583,7 +591,11 @@ def chart(pairs: pd.DataFrame, columns: Mapping[str, str]) -> Canvas:
     colours = pairs["grain_rung"].map(METHODS).fillna(METHODS["DEM"])
     table = pairs.assign(name=names, number=pd.factorize(names)[0] + 1, colour=colours)
     packings = [rows for _, rows in table.groupby("packing", sort=False)]
-    of_row = 2.6 if is_single else 1.7
+    of_row = 1.7
+    numbered = table[table["pareto"]]
+    if is_single:
+        of_row = 2.6
+        numbered = table
     height = of_row * len(packings) + 0.06 * table["number"].nunique() + 1.2
     canvas = style.canvas(height)
     grid = canvas.subplots(
@@ -598,7 +610,6 @@ def chart(pairs: pd.DataFrame, columns: Mapping[str, str]) -> Canvas:
         for tolerance in TOLERANCES:
             ax.axhline(tolerance, color="0.45", lw=0.7, ls=(0, (4, 2)), zorder=1)
     grid[-1, len(columns) // 2].set_xlabel("cost, s of one core")
-    numbered = table if is_single else table[table["pareto"]]
     samples = _samples(numbered.drop_duplicates("number"), has_front=is_single)
     style.legends(canvas, [style.entry(*method) for method in METHODS.items()], samples)
     canvas.draw_without_rendering()  # labels are placed in a finished layout
@@ -613,14 +624,15 @@ def _row_of_panels(
     """Draw the panels of a packing; return the labels of each."""
     is_single = len(columns) == 1
     title = f"{rows['packing'].iloc[0]} packing"
+    aligned: Literal["left", "center"] = "center"
+    axes[0].set_ylabel(f"{title}\nerror of $τ_c$, %")
     if is_single:
+        aligned = "left"
         axes[0].set_ylabel("largest error of $τ_c$, %")
-    else:
-        axes[0].set_ylabel(f"{title}\nerror of $τ_c$, %")
     ends = [rows["reference_error"].max(), rows["model_floor"].min()]
     tags = []
     for ax, (column, head) in zip(axes, columns.items(), strict=True):
-        ax.set_title(head or title, loc="left" if is_single else "center")
+        ax.set_title(head or title, loc=aligned)
         for number, (end, (_, colour)) in enumerate(zip(ends, BANDS, strict=True)):
             order = 0.2 - number / 10
             ax.axhspan(0, np.nan_to_num(end), color=colour, lw=0, zorder=order)
@@ -663,8 +675,9 @@ def _points(ax: Axes, rows: pd.DataFrame, column: str, *, named: bool) -> list[T
     shown = rows[(rows["cost_core_s"] > 0) & rows[column].notna()]
     shown = shown.assign(y=shown[column].abs().clip(lower=FLOOR))
     halo = [Stroke(linewidth=1.8, foreground="white"), Normal()]
-    size = 6.0 if named else 5.5
-    look: Look = {"fontsize": size, "color": "0.1", "zorder": 5, "path_effects": halo}
+    look: Look = {"fontsize": 5.5, "color": "0.1", "zorder": 5, "path_effects": halo}
+    if named:
+        look["fontsize"] = 6.0
     mark: Look = {"gid": "point", "zorder": 3, "ms": 5, "mew": 0.9}
     tags: list[Text] = []
     each: Any = shown.itertuples(index=False)

@@ -319,8 +319,9 @@ def _judged(one: Map, place: Place, runs: Runs, fraction: float | None) -> _Judg
     error = max(_errors(one, place, runs, fraction), key=abs, default=math.nan)
     if math.isnan(error):
         return _Judged("wrong", error, "its reference failed")
-    verdict = "good" if abs(error) <= WRONG else "wrong"
-    return _Judged(verdict, error, "")
+    if abs(error) <= WRONG:
+        return _Judged("good", error, "")
+    return _Judged("wrong", error, "")
 
 
 def _failure(scene: Scene, runs: Runs) -> _Judged | None:
@@ -334,9 +335,10 @@ def _failure(scene: Scene, runs: Runs) -> _Judged | None:
     if not lost:
         return None
     ended, cause = case.failure(runs.cases / lost[0])
-    verdict = ended if ended in NOTICED else "stalled"
+    if ended not in NOTICED:
+        ended = "stalled"
     note = cause.replace(f"{runs.cases}/", "") or "it did not run"
-    return _Judged(verdict, math.nan, note)
+    return _Judged(ended, math.nan, note)
 
 
 def _errors(
@@ -372,7 +374,9 @@ def _errors_of_pile(
 
     A fraction that neither reached has none.
     """
-    fractions = scene.threshold.fractions if fraction is None else (fraction,)
+    fractions = scene.threshold.fractions
+    if fraction is not None:
+        fractions = (fraction,)
     pile = runs.planned.piles[scene.id]
     other = runs.planned.piles[reference.id]
     found = pile.thresholds(runs.cases, fractions)
@@ -410,7 +414,11 @@ def draw(maps: Sequence[Map], table: pd.DataFrame) -> Canvas:
     starts = range(0, len(maps), columns)
     ratios = [max(counts[start : start + columns]) for start in starts]
     # height of a cell, inches, and size of its text, points
-    cell, font = (0.42, 9) if columns == 1 else (0.31, 5.4)
+    cell = 0.42
+    font = 9.0
+    if columns > 1:
+        cell = 0.31
+        font = 5.4
     canvas = style.canvas(cell * sum(ratios) + 0.85 * len(ratios) + 0.55)
     grid = canvas.subplots(len(ratios), columns, squeeze=False, height_ratios=ratios)
     axes = grid.ravel()

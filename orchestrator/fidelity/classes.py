@@ -78,7 +78,9 @@ def scene_class(part: str, scene: Scene) -> str:
 
 
 def _flow_class(scene: Scene) -> str:
-    bed, stress = scene.bed, scene.forces.stress
+    """The class of a pile for the errors of its flow."""
+    bed = scene.bed
+    stress = scene.forces.stress
     assert isinstance(bed, PileBed)
     if bed.is_level:
         return LEVEL_BED
@@ -92,20 +94,30 @@ def _flow_class(scene: Scene) -> str:
         return stress
     if _is_random(bed):
         return f"{stress}, random beds"
-    name = stress + LIMITING if is_limiting(scene) else stress
-    return name + SMALL if is_small(scene) else name
+    name: str = stress
+    if is_limiting(scene):
+        name += LIMITING
+    if is_small(scene):
+        name += SMALL
+    return name
 
 
 def _grain_class(scene: Scene) -> str:
-    bed, name = scene.bed, packing(scene)
+    """The class of a pile for the errors of its grains."""
+    bed = scene.bed
     assert isinstance(bed, PileBed)
+    name = packing(scene)
     if name == "disordered":
-        is_slight = bed.disorder <= LEAST_DISORDER
-        name += f" up to {LEAST_DISORDER if is_slight else MOST_DISORDER:g} d"
+        most = MOST_DISORDER
+        if bed.disorder <= LEAST_DISORDER:
+            most = LEAST_DISORDER
+        name += f" up to {most:g} d"
     is_near_row = name in NEAR_ROWS
     if lift_over_weight(scene) > 1:
         # a lifted grain does not roll over those beside it: slight gaps change nothing
-        return f"{'aligned' if is_near_row else name}, lifted"
+        if is_near_row:
+            name = "aligned"
+        return f"{name}, lifted"
     if bed.shape == "flat" and not bed.profile:
         return f"{name}, level bed"
     if is_curved(bed):
@@ -219,15 +231,20 @@ def unmeasured(scene: Scene) -> str:
         if name.startswith("method.flow.") and not is_solved:
             continue
         value = value_of(scene, name)
-        is_other = value < default if name in AT_LEAST else value != default
+        is_other = value != default
+        if name in AT_LEAST:
+            is_other = value < default
         if is_other:
             return f"{name} = {value}"
-    return _unmeasured_solve(scene) if is_solved else ""
+    if is_solved:
+        return _unmeasured_solve(scene)
+    return ""
 
 
 def _unmeasured_solve(scene: Scene) -> str:
     """The number of a solved flow for which nothing was measured, in words."""
-    bed, roughness = scene.bed, scene.method.flow.roughness
+    bed = scene.bed
+    roughness = scene.method.flow.roughness
     assert isinstance(bed, PileBed)
     default = default_first_cell_height(bed.relief, scene.solve_roughness)
     if abs(scene.first_cell_height / default - 1) > SAME_CELL:

@@ -63,17 +63,18 @@ def model_class(scene: Scene) -> str:
     str
         The class.
     """
-    bed, reynolds = scene.bed, float(closed_form(scene).reynolds)
+    bed = scene.bed
     assert isinstance(bed, PileBed)
-    regime = (
-        "viscous"
-        if reynolds < VISCOUS
-        else "transitional"
-        if reynolds < ROUGH
-        else "rough"
-    )
-    shape = "" if bed.is_triangle else f", {'profile' if bed.profile else bed.shape}"
-    return f"{bed.packing}, {regime}{shape}"
+    reynolds = float(closed_form(scene).reynolds)
+    regime = "rough"
+    if reynolds < VISCOUS:
+        regime = "viscous"
+    elif reynolds < ROUGH:
+        regime = "transitional"
+    words = [bed.packing, regime]
+    if not bed.is_triangle:
+        words.append(bed.shape_name)
+    return ", ".join(words)
 
 
 def spread(scene: Scene, fraction: float) -> Spread:

@@ -484,8 +484,11 @@ class PileCase(GrainCase):
         if self.scene.threshold.update:
             asked["threshold"]["goal"] = goal_part(self.scene, self.flow)
         # rules for which grains there are that came after other beds were run
-        new = {"turned": self.geometry.turned, "part": self.geometry.is_part}
-        return {**asked, **{rule: True for rule, holds in new.items() if holds}}
+        if self.geometry.turned:
+            asked["turned"] = True
+        if self.geometry.is_part:
+            asked["part"] = True
+        return asked
 
     @property
     def cost_s(self) -> float:
@@ -495,12 +498,13 @@ class PileCase(GrainCase):
         load_steps = np.log(3.5) / np.log1p(method.load_increment) / rounds(self.scene)
         # of a lattice the layers that may move take the time, and decks of one of four
         # were timed
-        size, exposed = 4 * self._length * self._layers, np.nan
+        size = 4 * self._length * self._layers
+        exposed = np.nan
         if self.geometry.pouring:
-            size, exposed = (
-                self._size * (IN_SPACE if width else 1),
-                self._length * (width or 1),
-            )
+            size = self._size
+            exposed = self._length * (width or 1)
+            if width:
+                size *= IN_SPACE
         grain = self.scene.grain
         return deck.cost_s(load_steps, size, REST, method, grain, exposed)
 
@@ -521,14 +525,18 @@ class PileCase(GrainCase):
         A pile is half its rows thick on average.
         """
         bed = self.geometry.bed
-        most = bed.poured_depth if self.geometry.pouring else self.geometry.line.h / 2
+        most = self.geometry.line.h / 2
+        if self.geometry.pouring:
+            most = bed.poured_depth
         return min(self.scene.method.grains.mobile_layers, most)
 
     @property
     def _length(self) -> float:
         """Length of the bed whose grains may move, d."""
-        bed = self.geometry
-        return bed.line.crest_s if bed.bed.is_wedge else bed.length
+        geometry = self.geometry
+        if geometry.bed.is_wedge:
+            return geometry.line.crest_s
+        return geometry.length
 
     def write(self, directory: Path, cases: Path) -> None:
         """Write the grains with their forces, and the load steps of the protocol."""
@@ -595,7 +603,8 @@ class PileCase(GrainCase):
     def collect(self, directory: Path) -> None:
         """Check the run and write what each counted grain did to ``motion.csv``."""
         liggghts.check_log(directory)
-        scene, (loads, worn) = self.scene, self._state(directory.parent)
+        scene = self.scene
+        loads, worn = self._state(directory.parent)
         grains = table(loads, worn)
         motion.check_rest(
             directory,
@@ -855,24 +864,25 @@ class Peeling(Method):
     @property
     def cases(self) -> tuple[WornFlow, ...]:
         """The flows over a bed that changes."""
-        runs: tuple[WornFlow, ...] = ()
+        flow: FlowCase | WornFlow = self.geometry.flow
+        runs = []
         for _ in range(1, rounds(self.geometry.scene)):
-            before = runs[-1] if runs else self.geometry.flow
-            runs += (WornFlow(self.geometry.scene, before, None),)
-        return runs
+            flow = WornFlow(self.geometry.scene, flow, None)
+            runs.append(flow)
+        return tuple(runs)
 
     def motion(self, cases: Path) -> Motion:
         """Motion at the flows that `orchestrator.grains.peeling` finds."""
         if self.geometry.scene.threshold.update:
-            return Motion.of_flows(
-                self.last(cases).left[self.geometry.packing.windward]
-            )
+            left = self.last(cases).left
+            return Motion.of_flows(left[self.geometry.packing.windward])
         loads = self.geometry.loads(cases)
-        return Motion.of_flows(rolling := loads.leaving(), loads.lifting(rolling))
+        rolling = loads.leaving()
+        return Motion.of_flows(rolling, loads.lifting(rolling))
 
     def last(self, cases: Path) -> Worn:
         """The grains of a bed that changes, when the last round has ended."""
-        flow = self.cases[-1] if self.cases else self.geometry.flow
+        *_, flow = (self.geometry.flow, *self.cases)
         return peeled(self.geometry, flow, cases)
 
 
@@ -898,11 +908,12 @@ class Dem(Method):
     @cached_property
     def runs(self) -> tuple[PileCase, ...]:
         """The runs of LIGGGHTS."""
-        scene, run = self.geometry.scene, PileCase(self.geometry.scene)
-        runs = [run]
+        scene = self.geometry.scene
+        runs = [PileCase(scene)]
         for _ in range(1, rounds(scene)):
-            flow = WornFlow(scene, run.flow or self.geometry.flow, run)
-            runs.append(run := PileCase(scene, flow, run))
+            before = runs[-1]
+            flow = WornFlow(scene, before.flow or self.geometry.flow, before)
+            runs.append(PileCase(scene, flow, before))
         return tuple(runs)
 
     def motion(self, cases: Path) -> Motion:
@@ -910,10 +921,12 @@ class Dem(Method):
         motions = [Motion.from_csv(cases / run.name) for run in self.runs]
         if len(motions) == 1:
             return motions[0]
-        windward, whole = self.geometry.packing.windward, self.geometry.flow
-        begun = (grains(self.geometry, run.flow or whole, cases) for run in self.runs)
-        present = (worn.present[windward] for worn in begun)
-        return Motion.chained(list(zip(present, motions, strict=True)))
+        windward = self.geometry.packing.windward
+        parts = []
+        for run, part in zip(self.runs, motions, strict=True):
+            begun = grains(self.geometry, run.flow or self.geometry.flow, cases)
+            parts.append((begun.present[windward], part))
+        return Motion.chained(parts)
 
     def last(self, cases: Path) -> Worn:
         """The grains of a bed that changes, when the last round has ended."""
@@ -979,6 +992,13 @@ class Pile(Geometry):
     def runs(self) -> tuple[Case, ...]:
         """The cases that its answer is read from, those of the flow first."""
         return (*self.model.cases, *self.pouring, *self.method.cases)
+
+    @property
+    def last_run(self) -> str | None:
+        """Name of the last of these cases; None without a run."""
+        for case in reversed(self.runs):
+            return case.name
+        return None
 
     def is_run(self, done: Container[str]) -> bool:
         """Whether all of its runs are among those that are done, by name.

@@ -270,7 +270,9 @@ def _interval(
     below = first_level(motion, least)
     level = first_level(motion, fraction)
     above = first_level(motion, most)
-    upper = last if above is None else above
+    upper = last
+    if above is not None:
+        upper = above
     # under a higher flow grains move where its stress is lower: their mean may fall
     held = [_stress(motion, speed, fluid_density, upper, motion.flow[upper])]
     if below is not None:
@@ -278,10 +280,13 @@ def _interval(
     if level is not None:
         ustar0 = math.sqrt(motion.low[level] * motion.flow[level])
         held.append(_stress(motion, speed, fluid_density, level, ustar0))
+    high = math.nan
+    if above is not None:
+        high = max(held)
     is_open_below = least <= 0 or last == 0
-    low = math.nan if is_open_below else min(held)
-    high = math.nan if above is None else max(held)
-    return low, high
+    if is_open_below:
+        return math.nan, high
+    return min(held), high
 
 
 def _stress(
@@ -312,13 +317,17 @@ def first_level(motion: Motion, fraction: float) -> int | None:
     """
     needed = max(math.ceil(fraction * motion.count - COUNT_SLACK), 1)
     reached = np.flatnonzero(motion.fraction * motion.count >= needed - COUNT_SLACK)
-    return int(reached[0]) if len(reached) else None
+    if not len(reached):
+        return None
+    return int(reached[0])
 
 
 def _mean(motion: Motion, values: NDArray[Any], level: int) -> float:
     """Mean over the grains that have moved; NaN before any has."""
     moved = values[motion.moved_by(level)]
-    return float(moved.mean()) if len(moved) else math.nan
+    if not len(moved):
+        return math.nan
+    return float(moved.mean())
 
 
 class SizeClass(NamedTuple):

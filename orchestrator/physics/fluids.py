@@ -6,11 +6,10 @@ Sharqawy et al., Desalin. Water Treat. 16, 354 (2010), Eq. 22; U.S. Standard Atm
 (1976).
 """
 
-import difflib
 from collections.abc import Mapping
 from typing import Any
 
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, suggestion
 
 PAPER = (1.0, 1e-5)
 """The paper's fluid, the default: density, kg/m3, and viscosity, m2/s.
@@ -175,8 +174,7 @@ def _check_kind(kind: object) -> None:
     what = f"no formulas of {kind!r} are here"
     if kind is None:
         what = "a temperature needs it"
-    near = difflib.get_close_matches(str(kind), FLUIDS, 1)
-    names = f"did you mean {near[0]}?" if near else f"choose {', '.join(FLUIDS)}"
+    names = suggestion(str(kind), FLUIDS) or f"choose {', '.join(FLUIDS)}"
     remedy = f"{names}; of others give density and viscosity"
     raise InputError(what, "fluid.kind", remedy)
 

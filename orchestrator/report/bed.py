@@ -392,7 +392,7 @@ def _svg(steps: Steps, shown: int, cases: Path) -> str:
         flow=_flow(pile, cases, frame) if pile.model.cases else "",
         size=f"{(right - left) / 75:.3g}",
         d=labels.value("d_m", pile.scene.grain.diameter),
-        case=pile.runs[-1].name if pile.runs else "",
+        case=pile.last_run or "",
         title=labels.plain("alpha_deg", pile.bed.slope_deg),
         **_grains(steps, shown),
     )

@@ -88,20 +88,25 @@ def _of_laws(results: Results) -> Iterator[Remark]:
 
 def _correction(results: Results, table: pd.DataFrame) -> Iterator[Remark]:
     """By how much the computed threshold of one grain is off the measured one."""
-    rows = results.exemplars if len(results.exemplars) else table
+    rows = table
+    if len(results.exemplars):
+        rows = results.exemplars
     row = rows.iloc[0]
     computed = float(row["level_ustar_m_s"])
     measured = float(row["measured_level_ustar_m_s"])
     if np.isnan(computed / measured) or single.is_measured(row):
         return
     ratio = computed / measured
-    flow = "wind" if is_gas(float(row["rho_f_kg_m3"])) else "flow"
+    flow = "flow"
+    who = "flumes"
+    if is_gas(float(row["rho_f_kg_m3"])):
+        flow = "wind"
+        who = "wind tunnels"
     size = length(float(row["d_m"]))
     law = labels.value("force_law", row["force_law"])
-    off = f"too strong by {ratio:.2g} times" if ratio > 1 else ""
-    off = off or f"too weak: {ratio:.2g} of the measured one"
-    head = f"The computed {flow} is {off}."
-    who = "wind tunnels" if flow == "wind" else "flumes"
+    head = f"The computed {flow} is too weak: {ratio:.2g} of the measured one."
+    if ratio > 1:
+        head = f"The computed {flow} is too strong by {ratio:.2g} times."
     text = (
         f"On a level bed of grains of {size} the force law {law} asks for a friction "
         f"velocity of {computed:#.3g} m/s; {who} found {measured:#.3g} m/s. The table "
@@ -113,8 +118,9 @@ def _correction(results: Results, table: pd.DataFrame) -> Iterator[Remark]:
 def _questions(results: Results) -> Iterator[Remark]:
     """What is asked about numbers of the study file that seem to be wrong."""
     for question in results.study.questions:
-        ending = "" if question.endswith("?") else "."
-        yield Remark("Is the study file right?", f"{question}{ending}")
+        if not question.endswith("?"):
+            question += "."
+        yield Remark("Is the study file right?", question)
 
 
 def _usable(table: pd.DataFrame) -> Iterator[Remark]:

@@ -53,7 +53,9 @@ def card(row: Row, holding: Mapping[str, float]) -> Card:
     # go on alone
     goes_on = row.get("criterion", GOES_ON) == GOES_ON
     is_decided = isinstance(row.get("decides"), str)
-    ending = " and go on" if goes_on and is_decided else ""
+    ending = ""
+    if goes_on and is_decided:
+        ending = " and go on"
     return Card(
         f"At which {told.flow} does a grain of {size} start to move{ending}?",
         _scene_of_grain(row),
@@ -94,7 +96,9 @@ def quantity(row: Row) -> Quantity:
     """
     if is_gas(float(row["rho_f_kg_m3"])):
         return WIND
-    return MEAN if known(row.get(MEAN.column())) > 0 else STRESS
+    if known(row.get(MEAN.column())) > 0:
+        return MEAN
+    return STRESS
 
 
 def in_unit(row: Row, ustar: float, told: Quantity) -> float:
@@ -224,8 +228,9 @@ def _scene_of_grain(row: Row) -> str:
         bed = f"a bed of its like that rises by {alpha:g}°"
     within = fluid(float(row["rho_f_kg_m3"]), float(row["nu_m2_s"]))
     grain = solid(float(row["rho_sol_kg_m3"]))
-    dry = "dry " if is_gas(float(row["rho_f_kg_m3"])) else ""
-    return f"One {dry}grain of {grain} on {bed}, in {within}."
+    if is_gas(float(row["rho_f_kg_m3"])):
+        return f"One dry grain of {grain} on {bed}, in {within}."
+    return f"One grain of {grain} on {bed}, in {within}."
 
 
 def numbers_of_grain(
@@ -366,9 +371,10 @@ def source(row: Row, told: Quantity, ustar: float | None = None) -> str:
     """
     if math.isnan(known(row["measured_level_ustar_m_s"])):
         return "No measurement is near."
-    ustar = float(row["ustar0_m_s"]) if ustar is None else ustar
+    if ustar is None:
+        ustar = float(row["ustar0_m_s"])
     size = length(float(row["d_m"]))
-    alike = "" if row["bed"] == "grain" else "this bed with "
+    alike = "this bed with "
     if is_level(row) or row["bed"] == "grain":
         alike = ""
     if is_gas(float(row["rho_f_kg_m3"])):
@@ -401,7 +407,9 @@ def _field(row: Row, told: Quantity, ustar: float) -> str:
     ends = []
     for theta in (row["measured_low"], row["measured_high"]):
         of_grain = math.sqrt(float(theta) * excess * float(row["d_m"]) / density)
-        there = of_grain if is_level(row) else ustar * of_grain / computed
+        there = of_grain
+        if not is_level(row):
+            there = ustar * of_grain / computed
         ends.append(in_unit(row, there, told))
     places = decimals(ends[0])
     low, high = (f"{end:.{places}f}" for end in ends)
@@ -443,9 +451,10 @@ def worth(row: Row, few: bool = False) -> Worth:
     if is_measured(row):
         return Worth("good", "usable", "It is within what was measured on level beds.")
     what = "wind" if is_gas(float(row["rho_f_kg_m3"])) else "flow"
-    hold = "" if is_level(row) or row["bed"] == "grain" else "The place holds; "
-    take = f"for a {what} take the measured value; to compare beds, this one."
-    return Worth("care", "usable, with a correction", _sentence(f"{hold}{take}"))
+    advice = f"for a {what} take the measured value; to compare beds, this one."
+    if not is_level(row) and row["bed"] != "grain":
+        advice = f"The place holds; {advice}"
+    return Worth("care", "usable, with a correction", _sentence(advice))
 
 
 def is_measured(row: Row) -> bool:

@@ -302,9 +302,11 @@ def pages(panels: Sequence[Panel]) -> Iterator[tuple[str, str, Sequence[Panel]]]
         Its panels.
     """
     for number, start in enumerate(range(0, len(panels), PANELS)):
-        name = f"-{number + 1}" if number else ""
-        title = f", more panels ({number})" if number else ""
-        yield name, title, panels[start : start + PANELS]
+        shown = panels[start : start + PANELS]
+        if number == 0:
+            yield "", "", shown
+        else:
+            yield f"-{number + 1}", f", more panels ({number})", shown
 
 
 def legends(figure: Canvas, colours: Sequence[Artist], looks: Sequence[Artist]) -> None:

@@ -14,9 +14,14 @@ from typing import Any, ClassVar
 
 from orchestrator.errors import SolverError
 from orchestrator.runs import files
-from orchestrator.runs.files import Folder, canonical_json, digest_text, read_json
+from orchestrator.runs.files import (
+    PACKAGE,
+    Folder,
+    canonical_json,
+    digest_text,
+    read_json,
+)
 
-PACKAGE = Path(__file__).absolute().parents[1]
 MAKERS = ("bed", "flow", "grains", "physics", "runs", "solvers", "study")
 """Parts of the package that make cases; the others only read them."""
 NAME = re.compile(r"[a-z]+-[0-9a-f]{12}")
@@ -56,8 +61,7 @@ def templates() -> Path:
     Path
         It lies beside the package, or inside it in a wheel.
     """
-    inside = PACKAGE / "templates"
-    return inside if inside.is_dir() else PACKAGE.parent / "templates"
+    return files.beside("templates")
 
 
 @cache

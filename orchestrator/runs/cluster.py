@@ -17,8 +17,9 @@ from filelock import FileLock
 
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.runs import engine, process, reuse
-from orchestrator.runs.case import PACKAGE, Case, done_state, names_in
+from orchestrator.runs.case import Case, done_state, names_in
 from orchestrator.runs.engine import Pool
+from orchestrator.runs.files import PACKAGE
 
 SYSTEMS = {
     "htcondor": "HTCondorCluster",

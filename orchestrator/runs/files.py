@@ -28,6 +28,27 @@ Former versions listed the markers, too, which are JSON.
 """
 
 
+PACKAGE = Path(__file__).absolute().parents[1]
+"""The folder of the package."""
+
+
+def beside(name: str) -> Path:
+    """Find a folder that lies beside the package, or inside it in a wheel.
+
+    Parameters
+    ----------
+    name
+        Name of the folder.
+
+    Returns
+    -------
+    Path
+        The folder.
+    """
+    inside = PACKAGE / name
+    return inside if inside.is_dir() else PACKAGE.parent / name
+
+
 def canonical_json(value: Any) -> str:
     """Write a JSON value as its one text.
 

@@ -218,6 +218,29 @@ class Workspace(Folder):
         if read_marker(self.root, kind) != value:
             self.note(kind.marker, files.text_of(value))
 
+    def file_of_another(self, kind: Kind, file: object) -> str:
+        """Find the study file that the directory is of, if it is another one.
+
+        Parameters
+        ----------
+        kind
+            Kind of the contents.
+        file
+            The study file that is asked for, relative to the directory, or None.
+
+        Returns
+        -------
+        str
+            Its path relative to the directory; empty if it is the same file, or is not
+            there any more.
+        """
+        source = read_marker(self.root, kind).get("source")
+        if not isinstance(source, dict):
+            return ""
+        other = str(source.get("file", ""))
+        is_there = other != "" and (self.root / other).is_file()
+        return other if is_there and other != file else ""
+
     def description(self) -> dict[str, Any]:
         """Read what `describe` wrote.
 
@@ -329,7 +352,7 @@ class Workspace(Folder):
 def _code_digest() -> str:
     """Digest of all files of the package and of the templates, with their names."""
     digests = {}
-    for root in (case_states.PACKAGE, case_states.templates()):
+    for root in (files.PACKAGE, case_states.templates()):
         for folder, _, names in os.walk(root):
             for name in names:
                 path = Path(folder, name)

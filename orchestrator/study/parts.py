@@ -266,12 +266,11 @@ class Obstacle(Part):
     @property
     def reach(self) -> float:
         """From its middle to the foot of its sides on level bed, at most, m."""
-        sides = {"fence": 0.4, "block": 0.3, "half-cylinder": 1.1}[
-            self.kind
-        ] * self.height
-        return sides + (
-            (self.length or self.height) / 2 if self.kind == "block" else 0.0
-        )
+        sides = {"fence": 0.4, "block": 0.3, "half-cylinder": 1.1}
+        reach = sides[self.kind] * self.height
+        if self.kind == "block":
+            reach += (self.length or self.height) / 2
+        return reach
 
     def __str__(self) -> str:
         length = f", {self.length:g} m long" if self.length else ""
@@ -476,6 +475,11 @@ class PileBed(Bed):
     def is_level(self) -> bool:
         """Whether the flow finds nothing on it that it has to go over or round."""
         return self.shape == "flat" and not self.profile and not self.obstacles
+
+    @property
+    def shape_name(self) -> str:
+        """Name of its shape; of a bed that is read from a file ``profile``."""
+        return "profile" if self.profile else self.shape
 
     @property
     def is_triangle(self) -> bool:

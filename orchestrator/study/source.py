@@ -6,13 +6,12 @@ Nothing here imports a library: a finished study is told from its bytes in a ten
 second.
 """
 
-import difflib
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, suggestion
 from orchestrator.runs.files import digest_file
 
 
@@ -94,9 +93,8 @@ def find(source: str | Path) -> Path:
     path = brought.get(str(source), Path(source))
     if os.path.isfile(path):
         return path
-    near = difflib.get_close_matches(str(source), brought, n=1)
     names = f"presets: {', '.join(brought)}; or give the path of a TOML file"
-    remedy = f"did you mean {near[0]}? {names}" if near else names
+    remedy = f"{suggestion(str(source), brought)} {names}".lstrip()
     what = "there is no such study file, nor a preset of this name"
     raise InputError(what, str(source), remedy)
 

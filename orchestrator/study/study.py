@@ -183,8 +183,10 @@ class Study:
     """Relative error that tau_c may have; None: not given."""
     cluster: dict[str, Any]  # settings of the queue that runs the cases
     erosion: Erosion  # winds and threshold of `orchestrator erosion`
-    text: str  # the file itself, and the texts of the files that it names
-    source: Source | None = None  # None: the text came from elsewhere
+    text: str
+    """The file itself, and the texts of the files that it names."""
+    source: Source | None = None
+    """None if the text came from elsewhere."""
     units_confirmed: bool = False
     """Whether numbers that are usual in another unit are meant as they are."""
 
@@ -196,11 +198,10 @@ class Study:
     @cached_property
     def scenes(self) -> tuple[Scene, ...]:
         """Every scene once, in the file's order."""
-        return tuple(
-            {
-                scene.id: scene for group in self.groups for scene in group.scenes
-            }.values()
-        )
+        found = {}
+        for group in self.groups:
+            found.update({scene.id: scene for scene in group.scenes})
+        return tuple(found.values())
 
     @cached_property
     def questions(self) -> tuple[str, ...]:
@@ -213,8 +214,10 @@ class Study:
             asked = [one for one in asked if "?" not in one]  # remarks are left
         if not asked:
             return ()
-        texts = [path.read_text(encoding="utf-8") for path in presets().values()]
-        return () if self.text in texts else tuple(asked)
+        for preset in presets().values():
+            if self.text == preset.read_text(encoding="utf-8"):
+                return ()
+        return tuple(asked)
 
 
 ASKED = (
@@ -258,12 +261,14 @@ def _values_in(tables: Mapping[str, Table]) -> dict[str, list[float]]:
     given = {name: dict(tables.get(name, {})) for name in PARTS}
     with suppress(InputError):
         given["fluid"] = fluids.numbers_of(given["fluid"])
-    values = {}
+    values: dict[str, list[float]] = {}
     for name in ASKED:
         table, _, field = name.partition(".")
         value = given[table].get(field, default_of(name))
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        values[name] = [value] if is_number and abs(value) < LARGEST_NUMBER else []
+        values[name] = []
+        if is_number and abs(value) < LARGEST_NUMBER:
+            values[name].append(value)
     return values
 
 
@@ -273,8 +278,9 @@ def _sieve_in(parts: Mapping[str, Table], files: Files, where: str) -> list[floa
     with suppress(InputError):
         if isinstance(sizes, str):
             sizes = files.sieve(sizes, where)
-    rows = sizes if isinstance(sizes, list) else []
-    firsts = [row[0] for row in rows if isinstance(row, list) and row]
+    if not isinstance(sizes, list):
+        return []
+    firsts = [row[0] for row in sizes if isinstance(row, list) and row]
     return [value for value in firsts if isinstance(value, int | float)]
 
 
@@ -461,7 +467,9 @@ def _check_keys(data: Mapping[str, Any], where: str) -> None:
 def _axes(file: "_File", table: "_Group", where: str) -> dict[str, list[Any]]:
     """The axes of a group, with the seeds that it asks for."""
     axes = {**file.axes, **table.axes}
-    seeds = file.seeds if table.seeds is None else table.seeds
+    seeds = table.seeds
+    if seeds is None:
+        seeds = file.seeds
     if not seeds:
         return axes
     if SEED in axes or "seed" in file.bed or "seed" in table.bed:
@@ -667,9 +675,10 @@ def _write_lengths(grain: Table, bed: Table, is_level: bool) -> None:
             # it has no height of its own; digits as those that a file has
             bed["height"] = float(f"{LEVEL_HEIGHT * grain['diameter']:.12g}")
         if isinstance(bed["roughness"], str):
+            d = grain["diameter"]
             relative = bed.get("relative_size", 1.0)
-            is_size = isinstance(relative, int | float) and 1e-3 < relative < 1e3
-            d = grain["diameter"] / (relative if is_size else 1.0)
+            if isinstance(relative, int | float) and 1e-3 < relative < 1e3:
+                d /= relative
             bed["roughness"] = roughness_length(bed["roughness"], d, mixture)
 
 
@@ -841,8 +850,9 @@ def meant(
             written[field] = f"{table}.{field}"
     if "method" in tables:
         written["fidelity"] = FIDELITY
-    own = tables[here].model_fields if here in tables else keys
-    for key in own:
+    if here in tables:
+        keys = [*tables[here].model_fields]
+    for key in keys:
         written[key] = key
     close = difflib.get_close_matches(names[-1], written, n=1)
     if not close:

@@ -104,8 +104,9 @@ def scenes(study: Study, plan: Plan) -> Iterator[Row]:
             flow_case = None
             pile = plan.piles.get(asked.id)
             if pile:
-                case = pile.runs[-1].name if pile.runs else None
-                flow_case = pile.flow.name if pile.model.cases else None
+                case = pile.last_run
+                if pile.model.cases:
+                    flow_case = pile.flow.name
             yield {
                 "scene_id": asked.id,
                 "group": group.name,
@@ -218,7 +219,7 @@ def _criteria(both: GoingOn) -> Row:
         "shields_goes_on": float(both.goes_on[0]),
         "shields_goes_on_high": float(both.at_most[0]),
         "shields_cessation": float(both.cessation[0]),
-        "decides": GOES_ON if both.hops_decide[0] else LEAVES,
+        "decides": _decisive(both.hops_decide[0]),
     }
 
 
@@ -320,7 +321,7 @@ def flow(pile: Pile, cases: Path) -> Row:
         mean = float(np.average(ustar[windward], weights=length))
     row = {
         "flow_case": case.name,
-        "bed_shape": "profile" if pile.bed.profile else pile.bed.shape,
+        "bed_shape": pile.bed.shape_name,
         "alpha_deg": pile.bed.slope_deg,
         "h_m": case.height_m,
         "z0_m": case.roughness_m,
@@ -577,7 +578,7 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
             "row_hold": answer.row_hold,
             **_decided(answer),
             **_smoothing(answer),
-            "case": pile.runs[-1].name if pile.runs else None,
+            "case": pile.last_run,
         }
 
 
@@ -620,8 +621,12 @@ def _decided(answer: Answer) -> Row:
     if not answer.pile.goes_on:
         return {"criterion": LEAVES, "decides": LEAVES}
     by_hops = answer.pile.hops_decide(answer.cases)
-    decides = GOES_ON if by_hops.mean() > 0.5 else LEAVES
-    return {"criterion": GOES_ON, "decides": decides}
+    return {"criterion": GOES_ON, "decides": _decisive(by_hops.mean() > 0.5)}
+
+
+def _decisive(by_hops: bool) -> str:
+    """The criterion that holds a grain longer: hopping on, or leaving its pocket."""
+    return GOES_ON if by_hops else LEAVES
 
 
 def _needed(fraction: float, count: int) -> int:
