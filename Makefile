@@ -7,7 +7,7 @@ ARGS =
 PARALLEL = -n auto --maxprocesses 4 --dist worksteal
 
 .DEFAULT_GOAL = help
-.PHONY: help study test test-faults calibration docs lint setup lock release clean
+.PHONY: help study test test-long test-faults calibration docs lint setup lock release clean
 
 help:  ## list the targets
 	@echo 'Targets (each first installs what it needs; ARGS="..." goes to the program or to pytest):'
@@ -16,8 +16,11 @@ help:  ## list the targets
 study: setup  ## run the study
 	$(PYTHON) -m orchestrator study $(ARGS)
 
-test: lint  ## lint, then run the tests
-	SKIP_NOTHING=1 $(PYTHON) -m pytest $(PARALLEL) --ignore=tests/faults $(ARGS)
+test: lint  ## lint, then run the tests, but for those that take long
+	SKIP_NOTHING=1 $(PYTHON) -m pytest $(PARALLEL) -m "not long" --ignore=tests/faults $(ARGS)
+
+test-long: lint  ## run the tests that install, queue, or run whole studies: minutes
+	SKIP_NOTHING=1 $(PYTHON) -m pytest $(PARALLEL) -m long --ignore=tests/faults $(ARGS)
 
 test-faults: lint  ## kill, harm and starve a small study, and count what it survives: minutes
 	$(PYTHON) -m pytest $(PARALLEL) tests/faults $(ARGS)

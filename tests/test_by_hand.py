@@ -9,6 +9,8 @@ import pytest
 
 from orchestrator.report.results import Results
 
+pytestmark = pytest.mark.long
+
 CHANGES = {
     "pile": ("parameters.liggghts", "rest_energy equal 1e-06", "rest_energy equal 0.0"),
     "flow": ("parameters", "freeStream       10.0;", "freeStream       11.0;"),

@@ -70,6 +70,7 @@ def test_the_help_of_each_command_has_two_examples_and_its_page(
         assert re.search(rf"orchestrator {name}|`{name}[ `]", page_text), command
 
 
+@pytest.mark.long
 def test_a_study_of_single_grains_and_the_same_again(
     orchestrator: Command, tmp_path: Path, grains: str
 ) -> None:
@@ -104,6 +105,7 @@ def test_a_study_of_single_grains_and_the_same_again(
         assert (tmp_path / odd / "tables" / path.name).read_bytes() == path.read_bytes()
 
 
+@pytest.mark.long
 def test_what_cannot_be_run_or_written_is_refused(
     orchestrator: Command, tmp_path: Path, grains: str
 ) -> None:

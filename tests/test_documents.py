@@ -165,6 +165,7 @@ def test_the_first_picture_is_of_the_preset_that_make_study_runs() -> None:
     assert f"α = {shown.scene.bed.slope_deg:g}°, d = 1 mm" in drawn
 
 
+@pytest.mark.long
 def test_the_notebook_says_what_a_run_of_it_says(tmp_path: Path) -> None:
     written = nbformat.read(ROOT / "docs" / "example.ipynb", 4)  # type: ignore[no-untyped-call]
     again = copy.deepcopy(written)
@@ -195,6 +196,7 @@ def test_every_how_to_names_studies_that_are_accepted(tmp_path: Path) -> None:
             assert plan.make(study.load(str(file))).decisions
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("page", ["beach", "water", "dune", "stockpile"])
 def test_a_question_is_answered_as_its_page_says(
     page: str, tmp_path: Path, orchestrator: Command

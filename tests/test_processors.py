@@ -118,9 +118,12 @@ def _has_units() -> bool:
     return {"avx2", "fma"} <= set(about.split())
 
 
-pytestmark = pytest.mark.skipif(
-    not _has_units(), reason="this processor has neither AVX2 nor FMA to leave out"
-)
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(
+        not _has_units(), reason="this processor has neither AVX2 nor FMA to leave out"
+    ),
+]
 
 
 def _run(setting: str, *arguments: str) -> "subprocess.CompletedProcess[str]":

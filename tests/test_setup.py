@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).parents[1]
 PACKAGES = Path(np.__file__).parents[1]
 """Where the packages of `requirements.lock` are that these tests run with."""

@@ -19,8 +19,9 @@ import pandas as pd
 from scipy.optimize import brentq
 
 from orchestrator.bed import deck, poured
+from orchestrator.bed.deck import DENSITY, DIAMETER, GRAVITY
 from orchestrator.bed.line import BedLine
-from orchestrator.bed.poured import DENSITY, DIAMETER, GRAVITY, PouredBed
+from orchestrator.bed.poured import PouredBed
 from orchestrator.runs import engine
 from orchestrator.runs.case import templates
 

@@ -17,6 +17,17 @@ from orchestrator.study.method import GrainMethod
 from orchestrator.study.parts import Grain, Gusts, extremes
 from orchestrator.types import FloatArray, IntArray
 
+DIAMETER = 1e-3
+"""Diameter of the reference grain of a deck, m.
+
+In units of d, of its weight and of sqrt(d/g') a bed has no scale.
+"""
+DENSITY = 2500.0
+"""Its density, kg/m3."""
+GRAVITY = 9.81
+"""Its reduced gravity g', m/s2."""
+WEIGHT = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY
+"""Its weight, N."""
 MEANING = {
     "diameter": "d of the units below; of every grain, or the median of a mixture, m",
     "smallest": "diameter of the smallest grain that may move, d",

@@ -14,6 +14,7 @@ import pandas as pd
 
 from orchestrator import digits
 from orchestrator.bed import deck
+from orchestrator.bed.deck import DENSITY, DIAMETER, GRAVITY, WEIGHT
 from orchestrator.bed.line import BedLine
 from orchestrator.bed.packing import APRON, Packing, Places, unshadowed, within
 from orchestrator.errors import InputError, Noisy, SolverError
@@ -33,15 +34,6 @@ LOOSE = 0.3
 leaves no order among equal grains, so that they fall no further than need be."""
 COLUMNS = 20
 """Columns in a diameter by which free room is looked for."""
-DIAMETER = 1e-3
-"""Diameter of the reference grain of the deck, m: in units of d, W and sqrt(d/g) a bed
-has no scale."""
-DENSITY = 2500.0
-"""Its density, kg/m3."""
-GRAVITY = 9.81
-"""Acceleration of gravity in the deck, m/s2."""
-WEIGHT = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY
-"""Weight of the reference grain, N."""
 CONTACT = {"damping": 0.1, "time_step": 0.2}
 """With more damping, or a longer step, equal spheres jitter and form crystals."""
 STIFFNESS = (1e3, 1e4, 1e4)

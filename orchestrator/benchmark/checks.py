@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from orchestrator.bed.deck import DENSITY, DIAMETER, GRAVITY
 from orchestrator.benchmark.mechanics import mechanics, three_grains
 from orchestrator.benchmark.pack import Problem, expectation
-from orchestrator.grains.cells import DENSITY, DIAMETER, GRAVITY
 from orchestrator.study.parts import Grain
 from orchestrator.types import Row
 

@@ -213,8 +213,6 @@ def going_on(
     gust: float,
     *,
     leaves: bool,
-    law: str = "bridged-gravel",
-    beta_deg: float = 60,
     ratio: float = 30,
 ) -> FloatArray:
     """Find the mean stress from which grains go on after a gust, on measured beds.
@@ -229,9 +227,8 @@ def going_on(
     gust
         Largest over mean stress.
     leaves
-        Whether a grain must also leave its pocket in the gust: that of `single`.
-    law, beta_deg
-        Force law and entrainment angle (degrees) of that.
+        Whether a grain must also leave its pocket in the gust: that of `single` by the
+        law for gravel, between neighbours at 60 degrees.
     ratio
         Diameter over roughness length, d/z0.
 
@@ -244,7 +241,7 @@ def going_on(
     goes_on = saltation.tabulated(grains).initiation(gust)
     if not leaves:
         return goes_on
-    steady = single(beds, law, beta_deg, ratio).shields
+    steady = single(beds, "bridged-gravel", 60, ratio).shields
     return saltation.motion(steady, goes_on, saltation.hops(grains), gust).shields
 
 

@@ -14,6 +14,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from orchestrator.bed import deck
+from orchestrator.bed.deck import DENSITY, DIAMETER, GRAVITY, WEIGHT
 from orchestrator.grains import motion
 from orchestrator.grains.loads import forces
 from orchestrator.runs import process
@@ -25,14 +26,6 @@ from orchestrator.study.parts import Grain
 from orchestrator.study.scene import Scene
 from orchestrator.types import FloatArray
 
-DIAMETER = 1e-3
-"""Diameter of the reference grain of a deck, m."""
-DENSITY = 2500.0
-"""Its density, kg/m3."""
-GRAVITY = 9.81
-"""Its reduced gravity g', m/s2."""
-WEIGHT = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY
-"""Its weight, N."""
 LAST = 1.2
 """Flow of the last load step: a grain that still lies then is 20 % off the closed
 form."""

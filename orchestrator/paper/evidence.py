@@ -10,7 +10,7 @@ import pandas as pd
 
 from orchestrator.study import fields
 from orchestrator.study.method import HELD_FROM
-from orchestrator.tables import COLUMNS, Tables, with_methods
+from orchestrator.tables import COLUMNS, Tables, with_methods, with_scenes
 from orchestrator.types import BoolArray, FloatArray
 
 Verdict = Literal["reproduced", "partly", "not", "no data"]
@@ -180,8 +180,7 @@ class Evidence:
             Its rows; it has all columns even without rows.
         """
         if name not in self._joined:
-            # one block: columns are added to more than a hundred others
-            self._joined[name] = self._with_scenes(name).copy()
+            self._joined[name] = self._with_scenes(name)
         return self._joined[name]
 
     def _with_scenes(self, name: str) -> pd.DataFrame:
@@ -189,9 +188,7 @@ class Evidence:
         table = self._tables.get(name, pd.DataFrame())
         if table.empty:
             return pd.DataFrame(columns=list(COLUMNS), dtype=float)
-        columns = self.scenes.columns.difference(table.columns, sort=False)
-        scenes = self.scenes[["scene_id", *columns]]
-        table = table.merge(scenes, on="scene_id", validate="many_to_one")
+        table = with_scenes(table, self.scenes)
         if name in ANSWERS:
             return table
         return table[table["method"] == "dem"]
@@ -205,10 +202,7 @@ class Evidence:
         table = self._tables.get("single_grain", pd.DataFrame())
         if table.empty:
             return self.joined("single_grain")
-        columns = self.scenes.columns.difference(table.columns, sort=False)
-        scenes = self.scenes[["scene_id", *columns]]
-        table = table.merge(scenes, on="scene_id", validate="many_to_one")
-        return table.assign(
+        return with_scenes(table, self.scenes).assign(
             shields_dem=table["shields_closed_form"],
             reynolds=table["reynolds_closed_form"],
         )

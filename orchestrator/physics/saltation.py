@@ -897,8 +897,6 @@ def under_gust(
     grains: Grains,
     peak: float,
     duration: float,
-    *,
-    rebound: Rebound = BEADS,
 ) -> FloatArray:
     """Find the thresholds at which a grain goes on after a gust of a given duration.
 
@@ -910,8 +908,6 @@ def under_gust(
         Stress of the gust over that of the mean flow.
     duration
         How long the gust lasts, sqrt(d/g').
-    rebound
-        What happens where a grain meets the bed.
 
     Returns
     -------
@@ -925,7 +921,7 @@ def under_gust(
     [0.015]
     """
     gust = Gust(peak, duration)
-    return least(grains, lambda g, theta: fate(g, theta, gust=gust, rebound=rebound))
+    return least(grains, lambda g, theta: fate(g, theta, gust=gust))
 
 
 def _fast(grains: Grains, shields: FloatArray) -> FloatArray:

@@ -14,7 +14,7 @@ from orchestrator.runs.case import is_whole
 from orchestrator.study import fields
 from orchestrator.study.method import HELD_FROM
 from orchestrator.study.study import Study
-from orchestrator.tables import Tables, with_methods
+from orchestrator.tables import Tables, with_methods, with_scenes
 from orchestrator.tables.rows import measured_hill
 
 FRACTION = 0.3  # n/N at which one threshold stands for all of its pile
@@ -89,16 +89,11 @@ class Results:
             table.
         """
         if name not in self._joins:
-            self._joins[name] = self._with_scenes(self.tables.get(name, pd.DataFrame()))
+            table = self.tables.get(name, pd.DataFrame())
+            if not table.empty:
+                table = with_scenes(table, self.scenes)
+            self._joins[name] = table
         return self._joins[name]
-
-    def _with_scenes(self, table: pd.DataFrame) -> pd.DataFrame:
-        if table.empty:
-            return pd.DataFrame()
-        others = self.scenes.columns.difference(table.columns, sort=False)
-        scenes = self.scenes[["scene_id", *others]]
-        # one block: columns may be added to more than a hundred others
-        return table.merge(scenes, on="scene_id", how="left").copy()
 
     def values(self, column: str) -> list[float]:
         """List the values that the study's scenes have in a column.

@@ -129,6 +129,27 @@ def with_methods(scenes: pd.DataFrame, methods: pd.DataFrame) -> pd.DataFrame:
     return once.merge(methods, on="scene_id", how="left").copy()
 
 
+def with_scenes(table: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame:
+    """Join a table with the columns of its rows' scenes.
+
+    Parameters
+    ----------
+    table
+        The table.
+    scenes
+        Every scene once, as `with_methods` lists them.
+
+    Returns
+    -------
+    DataFrame
+        Its rows whose scenes are there, with the columns of theirs that it lacks.
+    """
+    columns = scenes.columns.difference(table.columns, sort=False)
+    of_scenes = scenes[["scene_id", *columns]]
+    # one block: columns may be added to more than a hundred others
+    return table.merge(of_scenes, on="scene_id", validate="many_to_one").copy()
+
+
 def _smoothed(plan: Plan, scene_id: str, done: Container[str]) -> dict[float, Pile]:
     """The beds of a scene with other smoothing that are done, by its factor."""
     piles = plan.smoothings.get(scene_id, {})

@@ -87,6 +87,7 @@ def test_the_native_starts_know_the_pivots_of_a_poured_bed(
         assert count == (alone <= flows[step]).sum()
 
 
+@pytest.mark.long
 def test_an_engine_agrees(
     all_levels: Path, lift_off: Path, poured: Path, tmp_path: Path, engine: str
 ) -> None:
@@ -127,6 +128,7 @@ def test_the_bed_of_lammps_runs_by_hand(tmp_path: Path) -> None:
     assert min(moved) == 3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("z0", [3.3e-6, 1e-4])
 def test_the_flow_keeps_the_stress_on_a_flat_bed(
     z0: float, monkeypatch: pytest.MonkeyPatch
@@ -142,6 +144,7 @@ def test_the_flow_keeps_the_stress_on_a_flat_bed(
     assert flow.own == pytest.approx(1.0, abs=0.015)
 
 
+@pytest.mark.long
 def test_the_flow_on_a_pile_is_that_of_openfoam(
     all_levels: Path, tmp_path: Path
 ) -> None:

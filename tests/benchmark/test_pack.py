@@ -14,10 +14,10 @@ import pandas as pd
 import pytest
 
 from orchestrator import cli
+from orchestrator.bed.deck import DIAMETER, WEIGHT
 from orchestrator.benchmark import pack, scenes
 from orchestrator.benchmark.export import export
 from orchestrator.errors import InputError
-from orchestrator.grains import cells
 from orchestrator.runs.workspace import STUDY, Workspace, claimed
 from orchestrator.study import study
 from orchestrator.study.scene import Scene
@@ -122,13 +122,13 @@ def test_a_pivot_is_the_cell_of_its_case(all_levels: Path) -> None:
     for axis, place in (("x", 4), ("z", 6)):
         centres, of_deck = (
             grains[f"{axis}_m"] / given["d_m"],
-            deck[place] / cells.DIAMETER,
+            deck[place] / DIAMETER,
         )
         assert (centres - centres[2]).to_numpy() == pytest.approx(of_deck - of_deck[2])
         rows = (case / f"force.{axis}.txt").read_text().split("\n")[1::2]
         force = np.array([row.split()[1] for row in rows if row], float)
         ratio = load_steps[f"f{axis}_n"] / given["weight_n"]
-        assert ratio.to_numpy() == pytest.approx(force / cells.WEIGHT, rel=1e-7)
+        assert ratio.to_numpy() == pytest.approx(force / WEIGHT, rel=1e-7)
     flows = np.array((case / "load_steps.txt").read_text().split(), float)
     ratio = load_steps["ustar_m_s"] / load_steps["ustar_m_s"].iloc[0]
     assert ratio.to_numpy() == pytest.approx(flows / flows[0])

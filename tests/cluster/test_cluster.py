@@ -21,6 +21,8 @@ from tests.faults.bench import (
     wait_for,
 )
 
+pytestmark = pytest.mark.long
+
 STUDY = """
 time_limit = 100
 [grain]

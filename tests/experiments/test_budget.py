@@ -112,6 +112,7 @@ def test_the_share_of_a_choice_is_the_range_of_its_alternatives() -> None:
     ]
 
 
+@pytest.mark.long
 def test_every_choice_has_its_share_on_a_poured_pile(tmp_path: Path) -> None:
     asked = study.parse(SMALL, name="small", where="small")
     experiment = budget.experiment(asked, tmp_path / "out")

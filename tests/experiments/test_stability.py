@@ -39,6 +39,7 @@ def test_a_maps_file_spans_its_axes(path: Path) -> None:
         assert all(len(place.scenes) == len(place.references) for place in read.places)
 
 
+@pytest.mark.long
 def test_verdicts_are_those_of_real_runs(tmp_path: Path) -> None:
     (tmp_path / "small.toml").write_text(SMALL)
     stability.experiment(tmp_path / "out", tmp_path).run(tmp_path / "out", workers=2)

@@ -15,6 +15,8 @@ from orchestrator.cli import main
 from orchestrator.experiments import erosion, surfaces
 from orchestrator.grains import onset
 
+pytestmark = pytest.mark.long
+
 FILE = """
 title = "A cone in wind from the west"
 [fluid]

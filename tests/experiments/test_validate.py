@@ -173,7 +173,7 @@ def test_an_interval_is_of_strips_that_differ_in_nothing_else_than_the_tested() 
 def test_a_stress_that_is_the_measured_one_over_a_hump_is_met_at_every_row() -> None:
     x, cf, ones = pd.read_csv(validate.FOLDER / "hump_stress.csv").to_numpy().T
     # in other units, at the same places
-    stress = WallStress(x * 0.42, x * 0.42, ones, ones, ones, 300 * cf, ones, ones)
+    stress = WallStress(x * 0.42, x * 0.42, ones, ones, ones, 300 * cf, ones)
     measured, value, *_ = validate.over_hump(stress).to_numpy().T
     assert value.astype(float) == pytest.approx(measured.astype(float), rel=1e-9)
 

@@ -53,7 +53,7 @@ def _bent(slope_deg: float, tau: Callable[[FloatArray], FloatArray]) -> WallStre
     s = np.arange(-19.5, 20) * 1e-3
     up = np.where(s > 0, np.radians(slope_deg), 0.0)
     lengths, tau_ = (np.full(40, 1e-3), np.full(40, 5e-4)), tau(s)
-    return WallStress(s, s * np.cos(up), s * np.sin(up), *lengths, tau_, tau_, tau_)
+    return WallStress(s, s * np.cos(up), s * np.sin(up), *lengths, tau_, tau_)
 
 
 @pytest.mark.parametrize("slope_deg", [0.0, 10.0, 35.0])
