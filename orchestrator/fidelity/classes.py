@@ -17,19 +17,26 @@ from orchestrator.study.study import value_of
 
 FLOW, GRAINS = "flow", "grains"
 """The two parts of a known error."""
-LEVEL_BED = "level bed"  # class for the flow of beds over which u* is u*_0 everywhere
-LIMITING = ", limiting slope"  # end of the name of a class
-SMALL = ", small"  # likewise
-LEAST_COUNTED = 38.0  # grains of a bed that is not small
-LIMITING_DEG = 5.0  # below the limiting slope, from which a slope belongs to it
-LEAST_DISORDER, MOST_DISORDER = (
-    0.02,
-    0.2,
-)  # largest gaps of the two classes of random gaps, d
+LEVEL_BED = "level bed"
+"""Class for the flow of beds over which u* is u*_0 everywhere."""
+LIMITING = ", limiting slope"
+"""End of the name of a class of beds near the limiting slope."""
+SMALL = ", small"
+"""End of the name of a class of beds with few grains."""
+LEAST_COUNTED = 38.0
+"""Counted grains of a bed that is not small."""
+LIMITING_DEG = 5.0
+"""How far below the limiting slope a slope belongs to it, degrees."""
+LEAST_DISORDER = 0.02
+"""Largest gaps of the class of slight random gaps, d."""
+MOST_DISORDER = 0.2
+"""Largest gaps of the class of other random gaps, d."""
 NEAR_ROWS = ("aligned", f"disordered up to {LEAST_DISORDER:g} d")
 CURVED_SHAPES = ("cosine", "gaussian", "rushil")
-LIFTED_TO = 1.235  # largest lift over the weight normal to the bed that was measured
-SAME_CELL = 0.02  # relative difference of the first cell that changes no known error
+LIFTED_TO = 1.235
+"""Largest lift over the weight normal to the bed that was measured."""
+SAME_CELL = 0.02
+"""Relative difference of the first cell that changes no known error."""
 AT_LEAST = (
     "method.flow.lid",
     "method.flow.upstream",

@@ -178,18 +178,18 @@ def _leaving(scene: Scene, tolerance: float | None) -> Decision:
     why_as_written = _why_as_written(scene, tolerance)
     if why_as_written is not None:
         return as_written(scene, why_as_written)
-    if tolerance is None:
+    most = tolerance
+    if most is None:
         most = min(spread.floors().values())
-        start, limit = (
-            "chosen by default: ",
-            f"within the model's own spread of {most:.0%}",
-        )
-    else:
-        most, start, limit = tolerance, "", "within the tolerance"
     fidelity, why = _looked_up(scene, most)
     if fidelity is None:
         return as_written(scene, why)
-    return on_fidelity(scene, fidelity, f"{start}{why} {limit}", is_chosen=True)
+    if tolerance is None:
+        spread_ = f"within the model's own spread of {most:.0%}"
+        why = f"chosen by default: {why} {spread_}"
+    else:
+        why = f"{why} within the tolerance"
+    return on_fidelity(scene, fidelity, why, is_chosen=True)
 
 
 def as_written(scene: Scene, why: str = "") -> Decision:
@@ -256,11 +256,11 @@ def method_of(scene: Scene) -> tuple[str, str]:
     """The method that answers a scene as it is written, and why.
 
     For ``auto`` that is DEM where it can: not on a lattice of more than
-    `LONGEST_PACKED` grains,
-    nor with what DEM does not know. There it is the closed form along the bed, else
-    peeling, else pivots.
+    `LONGEST_PACKED` grains, nor with what DEM does not know. There it is the closed
+    form along the bed, else peeling, else pivots.
     """
-    method, bed = scene.method.kind, scene.bed
+    method = scene.method.kind
+    bed = scene.bed
     if method != "auto":
         return method, f"the study asks for the method {method}"
     unknown = scene.unknown_to_dem

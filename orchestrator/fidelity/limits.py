@@ -145,34 +145,38 @@ def exceeded(scene: Scene, *, grains: bool = True) -> Iterator[Limit]:
         Each limit.
     """
     bed = scene.bed
-    slope, limit, angle = (
-        bed.slope_deg,
-        scene.limiting_slope_deg,
-        bed.entrainment_angle_deg,
-    )
     if isinstance(bed, PileBed):
-        yield from _pile(scene, bed) if grains else ()
-        yield from (
-            _solve(scene, bed)
-            if scene.method.flow.model == "solve"
-            else _theory(scene, bed)
-        )
+        if grains:
+            yield from _pile(scene, bed)
+        if scene.method.flow.model == "solve":
+            yield from _solve(scene, bed)
+        else:
+            yield from _theory(scene, bed)
     if not grains:
         return
-    if (not isinstance(bed, PileBed) or bed.is_wedge) and slope > limit + 1e-9:
-        what = f"{slope:g} deg is beyond {ANGLES} = {limit:g} deg"
-        what += ": the bed rolls back without flow"
-        yield Limit(
-            "slope", "bed.slope_deg", what, "lower the slope or the entrainment angle"
-        )
-    if not isinstance(bed, PileBed) and slope > angle:
-        what = f"beyond the entrainment angle, {angle:g} deg, a grain may rest half-way"
-        remedy = (
-            "read it by DEM, which differs from the closed form, or lower the slope"
-        )
-        yield Limit("slope", "bed.slope_deg", what, remedy, refused=False)
+    yield from _slope(scene)
     if scene.method.kind == "dem":
         yield from _dem(scene)
+
+
+def _slope(scene: Scene) -> Iterator[Limit]:
+    """Limits of the slope of a single grain and of a wedge."""
+    bed = scene.bed
+    slope = bed.slope_deg
+    limit = scene.limiting_slope_deg
+    if isinstance(bed, PileBed) and not bed.is_wedge:
+        return
+    if slope > limit + 1e-9:
+        what = f"{slope:g} deg is beyond {ANGLES} = {limit:g} deg"
+        what += ": the bed rolls back without flow"
+        remedy = "lower the slope or the entrainment angle"
+        yield Limit("slope", "bed.slope_deg", what, remedy)
+    angle = bed.entrainment_angle_deg
+    if not isinstance(bed, PileBed) and slope > angle:
+        what = f"beyond the entrainment angle, {angle:g} deg, a grain may rest half-way"
+        remedy = "read it by DEM, which differs from the closed form, "
+        remedy += "or lower the slope"
+        yield Limit("slope", "bed.slope_deg", what, remedy, refused=False)
 
 
 def largest_timestep(damping: float) -> float:
@@ -192,13 +196,13 @@ def largest_timestep(damping: float) -> float:
 
 
 def _pile(scene: Scene, bed: PileBed) -> Iterator[Limit]:
-    (low, high), angle = PILE_SLOPES_DEG, bed.entrainment_angle_deg
+    """Limits of the grains of a pile."""
     try:
-        if (count := Geometry(scene).length) > MOST_GRAINS:
+        count = Geometry(scene).length
+        if count > MOST_GRAINS:
             what = f"{count * scene.grain.diameter:g} m of bed are {count:.0f} grains"
-            yield Limit(
-                "", "bed", f"{what}, more than {MOST_GRAINS:g}", _for_long(scene)
-            )
+            what += f", more than {MOST_GRAINS:g}"
+            yield Limit("", "bed", what, _for_long(scene))
             return
         what = _unfit(scene, bed, of_bed(bed))
     except UnfitError as error:
@@ -206,16 +210,18 @@ def _pile(scene: Scene, bed: PileBed) -> Iterator[Limit]:
     if what:
         remedy = "smooth a profile, give forms room, or count another part of the bed"
         yield Limit("slope", "bed", what, remedy)
+    low, high = PILE_SLOPES_DEG
     if bed.is_wedge and not low <= bed.slope_deg <= high:
+        what = f"a pile of {bed.slope_deg:g} deg"
         remedy = f"choose {low:g} ... {high:g} deg, and no more than {ANGLES}"
-        yield Limit(
-            "slope", "bed.slope_deg", f"a pile of {bed.slope_deg:g} deg", remedy
-        )
+        yield Limit("slope", "bed.slope_deg", what, remedy)
+    angle = bed.entrainment_angle_deg
     if angle < CLOSE_PACKED_DEG:
         what = f"a pile of {angle:g} deg: a mobile row is wedged apart by the row on it"
         remedy = "60 deg; single grains may have less"
         yield Limit("entrainment-layers", "bed.entrainment_angle_deg", what, remedy)
-    if (loaded := scene.forces.loaded_grains) != "exposed":
+    loaded = scene.forces.loaded_grains
+    if loaded != "exposed":
         what = f"{loaded}: a grain without its force blocks those behind it"
         yield Limit("forced", "forces.loaded_grains", what, "exposed", refused=False)
 
@@ -231,7 +237,9 @@ def _for_long(scene: Scene) -> str:
 
 def _unfit(scene: Scene, bed: PileBed, line: BedLine) -> str:
     """Why grains cannot lie on a bed line, which is too steep; empty if they can."""
-    slopes, limit, why = abs(line.slopes_deg), scene.limiting_slope_deg, ANGLES
+    slopes = abs(line.slopes_deg)
+    limit = scene.limiting_slope_deg
+    why = ANGLES
     if bed.packing == "poured":
         if bed.obstacles:
             return "no grains can be poured around obstacles"
@@ -254,6 +262,7 @@ def _unfit(scene: Scene, bed: PileBed, line: BedLine) -> str:
 
 
 def _theory(scene: Scene, bed: PileBed) -> Iterator[Limit]:
+    """Limits of linear theory, which is of low beds."""
     if scene.method.flow.model == "flat":
         return
     line = of_bed(bed)
@@ -267,7 +276,9 @@ def _theory(scene: Scene, bed: PileBed) -> Iterator[Limit]:
 
 
 def _solve(scene: Scene, bed: PileBed) -> Iterator[Limit]:
-    z0, cell = scene.solve_roughness, scene.first_cell_height
+    """Limits of a solved flow over a pile."""
+    z0 = scene.solve_roughness
+    cell = scene.first_cell_height
     if bed.is_level:
         what = "over a flat bed there is nothing to solve: u* is u*_0 everywhere"
         yield Limit("slope", "method.flow.model", what, 'choose "flat"')
@@ -277,35 +288,32 @@ def _solve(scene: Scene, bed: PileBed) -> Iterator[Limit]:
         remedy = "lower it, or raise method.flow.first_cell_height or bed.height"
         remedy += "; z_e of z0 is sound"
         yield Limit("first-cell", "bed.roughness", what, remedy)
-    ustar0 = float(
-        log_law_ustar(scene.method.flow.speed, SPEED_HEIGHT * bed.relief, z0)
-    )
+    height = SPEED_HEIGHT * bed.relief
+    ustar0 = float(log_law_ustar(scene.method.flow.speed, height, z0))
     ratio = KARMAN * ustar0 * cell / 2 / scene.solve_viscosity
     if ratio < 1:
         what = "not turbulent: the first cell's eddy viscosity"
         what += f" is {ratio:.2g} of the molecular one"
-        remedy = (
-            "take the field of a lower viscosity or a higher speed: u*/U_e is the same"
-        )
+        remedy = "take the field of a lower viscosity or a higher speed: "
+        remedy += "u*/U_e is the same"
         yield Limit("similarity", "method.flow.viscosity", what, remedy)
-    if (scheme := scene.method.flow.convection_scheme) != "linearUpwind":
+    scheme = scene.method.flow.convection_scheme
+    if scheme != "linearUpwind":
         what = f"{scheme} does not converge to the same answer, or not at all"
         field = "method.flow.convection_scheme"
         yield Limit("mesh-scheme-15", field, what, "linearUpwind", refused=False)
 
 
 def _dem(scene: Scene) -> Iterator[Limit]:
+    """Limits of the contact and of the load steps of DEM."""
     rules = scene.method.grains
     damping = rules.damping
-    if rules.time_step > (most := largest_timestep(damping)):
+    most = largest_timestep(damping)
+    if rules.time_step > most:
         what = f"{rules.time_step:g} sqrt(m/K) is above {most:g}"
         what += f" at a damping of {damping:g}"
-        yield Limit(
-            "timestep-damping",
-            "method.grains.time_step",
-            what,
-            "lower it, or the damping",
-        )
+        remedy = "lower it, or the damping"
+        yield Limit("timestep-damping", "method.grains.time_step", what, remedy)
     if damping < LEAST_DAMPING:
         what = f"at a damping of {damping:g} a bed does not come to rest"
         yield Limit("timestep-damping", "method.grains.damping", what, "0.1 is sound")
@@ -314,16 +322,11 @@ def _dem(scene: Scene) -> Iterator[Limit]:
     if rules.waiting_time < HELD_FROM:
         what = f"load steps that wait {rules.waiting_time:g} sqrt(d/g')"
         what += " are a ramp of the flow"
+        field = "method.grains.waiting_time"
         remedy = "raise it, unless a ramp is what you want"
-        yield Limit(
-            "quiet-step", "method.grains.waiting_time", what, remedy, refused=False
-        )
-    if (step := rules.load_increment) > COARSE_STEP:
+        yield Limit("quiet-step", field, what, remedy, refused=False)
+    step = rules.load_increment
+    if step > COARSE_STEP:
+        field = "method.grains.load_increment"
         what = f"load steps {step:.0%} apart leave the threshold that wide an interval"
-        yield Limit(
-            "quiet-step",
-            "method.grains.load_increment",
-            what,
-            "lower it",
-            refused=False,
-        )
+        yield Limit("quiet-step", field, what, "lower it", refused=False)

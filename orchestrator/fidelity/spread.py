@@ -15,10 +15,10 @@ from orchestrator.study.closed_form import closed_form
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 
-VISCOUS, ROUGH = (
-    3.0,
-    30.0,
-)  # Re* below which a bed is smooth, and from which it is rough
+VISCOUS = 3.0
+"""Re* below which a bed is smooth."""
+ROUGH = 30.0
+"""Re* from which a bed is rough."""
 FROZEN = "frozen bed"
 """The choice that the flow of the whole pile acts until the last grain has left."""
 STATED = (

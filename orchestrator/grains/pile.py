@@ -256,7 +256,8 @@ def goal_part(scene: Scene, flow: Flow | None) -> float:
     """
     number = 1
     while isinstance(flow, WornFlow):
-        flow, number = flow.before, number + 1
+        flow = flow.before
+        number += 1
     part = number * scene.threshold.update
     if number == rounds(scene):
         part = max(part, min(max(scene.threshold.fractions) + BEYOND_ASKED, 1.0))
@@ -351,7 +352,8 @@ def peeled(geometry: Geometry, flow: Flow, cases: Path) -> Worn:
     Worn
         The grains.
     """
-    worn, loads = grains(geometry, flow, cases), _loads(geometry, flow, cases)
+    worn = grains(geometry, flow, cases)
+    loads = _loads(geometry, flow, cases)
     windward = geometry.packing.windward
     reached = worn.left[np.isfinite(worn.left)].max(initial=0.0)
     flows = np.full(len(windward), np.inf)
@@ -360,7 +362,9 @@ def peeled(geometry: Geometry, flow: Flow, cases: Path) -> Worn:
     flows[~worn.present] = np.inf
     least = goal(geometry, flow) - worn.moved
     # those that one grain frees at its flow leave with it
-    last = np.sort(flows)[least - 1] if least > 0 else 0.0
+    last = 0.0
+    if least > 0:
+        last = np.sort(flows)[least - 1]
     leave = np.isfinite(flows) & (flows <= last)
     speed = np.where(worn.present, loads.ratio, worn.speed)
     places = np.where(leave[:, None], np.nan, worn.places)
@@ -666,16 +670,16 @@ def flows(loads: Loads) -> FloatArray:
         # no peeling in space says which grain frees which
         thresholds = pivots[(pivots > 0) & np.isfinite(pivots)]
         first = _first(thresholds, geometry)
-        place = min(
-            int(geometry.scene.last_fraction * len(pivots)), len(thresholds) - 1
-        )
+        asked = int(geometry.scene.last_fraction * len(pivots))
+        place = min(asked, len(thresholds) - 1)
     else:
         thresholds = np.sort(loads.leaving())
         first = _first(thresholds, geometry)
         if not 0 < first < np.inf or geometry.scene.forces.loaded_grains != "exposed":
             # a bed that rolls by itself, or is blocked until its grains push: DEM
             # decides
-            thresholds, first = pivots, _first(pivots, geometry)
+            thresholds = pivots
+            first = _first(pivots, geometry)
         elif not geometry.bed.is_wedge:
             # on a bed without a free end no grain can be peeled first
             first = min(first, _first(pivots, geometry))
@@ -764,14 +768,15 @@ def table(loads: Loads, worn: Worn) -> GrainTable:
     GrainTable
         The grains.
     """
-    geometry, packed = loads.geometry, loads.geometry.packing
-    grain = geometry.scene.grain
+    packed = loads.geometry.packing
+    grain = loads.geometry.scene.grain
+    d = grain.diameter
+    x, z = worn.places.T
     kind = np.select(
         [~worn.present, ~packed.mobile, packed.windward, loads.exposed],
         [deck.GONE, deck.FIXED, deck.COUNTED, deck.PUSHED],
         deck.MOBILE,
     )
-    d, (x, z) = grain.diameter, worn.places.T
     return GrainTable(
         position=np.column_stack([x * d, packed.places.xyz[:, 1] * d, z * d]),
         kind=kind,

@@ -38,7 +38,9 @@ def single_grain(scene: Scene) -> SingleGrain:
     SingleGrain
         The grain; its entrainment angle is that of the pocket that it lies in.
     """
-    grain, bed, fluid = scene.grain, scene.bed, scene.fluid
+    grain = scene.grain
+    bed = scene.bed
+    fluid = scene.fluid
     # at a contact of two sizes the pull is that of their harmonic mean
     cohesion = grain.cohesion * 2 / (1 + bed.relative_size)
     return SingleGrain(
@@ -101,12 +103,13 @@ def outer_roughness(scene: Scene) -> float | None:
     float, or None
         The length, m; None if it is the bed's own.
     """
-    z0, ustar = scene.bed.roughness, closed_form(scene).friction_velocity
+    if scene.forces.law in LAWS_OF["transition"]:
+        return None
+    z0 = scene.bed.roughness
+    ustar = closed_form(scene).friction_velocity
     outer = float(velocity.outer_roughness(z0, ustar, scene.fluid.viscosity))
     outer = min(float(f"{outer:.3g}"), scene.first_cell_height / CELLS_OVER_Z0)
-    return (
-        outer if outer > z0 and scene.forces.law not in LAWS_OF["transition"] else None
-    )
+    return outer if outer > z0 else None
 
 
 def regime_of(scene: Scene) -> Regime:

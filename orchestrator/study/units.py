@@ -328,16 +328,20 @@ def first(
 
     Returns
     -------
-    The refusal as it is where there is no such question.
+    InputError
+        The refusal as it is where there is no such question.
     """
     field = refusal.where.removeprefix(where).removeprefix(": ")
-    kept = [one for one in asked if "?" in one]  # the others are remarks
-    place, else_ = where, f"{field}: {refusal.what}"
+    # the others are remarks
+    kept = [one for one in asked if "?" in one]
+    place = where
+    reason = f"{field}: {refusal.what}".removeprefix(": ")
     if field in names:
         kept = [one for one in kept if field in one]
-        place, else_ = refusal.where, refusal.what
+        place = refusal.where
+        reason = refusal.what
     if not kept:
         return refusal
     if refusal.remedy:
-        else_ = f"{else_}; {refusal.remedy}"
-    return InputError("; ".join(kept), place, f"else: {else_.removeprefix(': ')}")
+        reason = f"{reason}; {refusal.remedy}"
+    return InputError("; ".join(kept), place, f"else: {reason}")
