@@ -5,7 +5,7 @@ import os
 import sys
 import warnings
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -153,8 +153,7 @@ def parser() -> argparse.ArgumentParser:
     commands = made.add_subparsers(required=True, metavar="command")
     for name, text in COMMANDS.items():
         command = commands.add_parser(name, help=text)
-        run = _study if name in RUNNING else _other
-        command.set_defaults(run=run, command=name, tolerance=None)
+        command.set_defaults(run=_function(name), command=name, tolerance=None)
         if name in RUNNING:
             _add_run_options(command, RUNNING[name])
         elif name != "doctor":
@@ -174,6 +173,13 @@ def parser() -> argparse.ArgumentParser:
             calculator.add(commands)
     benchmark.add(commands)
     return made
+
+
+def _function(name: str) -> Callable[[Namespace], int]:
+    """The function that runs a command."""
+    if name == "study":
+        return _study
+    return _on_study if name in RUNNING else _other
 
 
 def _add_run_options(command: argparse.ArgumentParser, preset: str) -> None:
@@ -204,45 +210,56 @@ def _add_study_options(command: argparse.ArgumentParser) -> None:
 
 
 def _study(options: Namespace) -> int:
-    """Run a study, or an experiment on a study or, for stability, on its own scenes."""
-    is_study = options.command == "study"
-    if is_study and not options.plan:
+    """Run a study; of one that was finished before its answer is printed."""
+    if not options.plan:
         answered = finished(options)
         if answered:
             print("every case was done already; no solver was started", file=sys.stderr)
             print(*answered, sep="\n")
             return 0
+    of_surface = _surface_study(options)
+    if of_surface:
+        return _surface(options, of_surface)
+    from orchestrator import pipeline, plan
+    from orchestrator.study.study import load
+
+    study = load(options.source, options.tolerance)
+    out = options.out or Path("results") / study.name
+    if options.plan:
+        cases = out.absolute() / "cases"
+        print(*plan.forecast(study, cases, options.workers), sep="\n")
+        return 0
+    queue = Queue(options.cluster, study.cluster) if options.cluster else None
+    return _end(pipeline.run(study, out, workers=options.workers, queue=queue))
+
+
+def _on_study(options: Namespace) -> int:
+    """Run an experiment on a study or, for stability, on its own scenes."""
     if getattr(options, "surfaces", None):
         truth = import_module("orchestrator.experiments.surface_truth")
         names = TRUTH if options.surfaces == "all" else (options.surfaces,)
         out = options.out or Path("results") / "surfaces"
         return _experiment(options, truth.experiment(names), out)
-    from orchestrator import pipeline, plan
+    of_surface = _surface_study(options)
+    if of_surface:
+        return _surface(options, of_surface)
     from orchestrator.study.study import load
 
-    if options.command in OF_SURFACES:
-        surfaces = import_module("orchestrator.experiments.surfaces")
-        asked = surfaces.load(options.source)
-        if asked is not None:
-            return _surface(options, asked)
-    workers = options.workers
     studies = []
     if "source" in options:
-        studies = [load(options.source, options.tolerance)]
-    name = options.command
-    if is_study:
-        name = studies[0].name
-    out = options.out or Path("results") / name
-    cases = out.absolute() / "cases"
-    if is_study:
-        (study,) = studies
-        if options.plan:
-            print(*plan.forecast(study, cases, workers), sep="\n")
-            return 0
-        queue = Queue(options.cluster, study.cluster) if options.cluster else None
-        return _end(pipeline.run(study, out, workers=workers, queue=queue))
+        studies.append(load(options.source, options.tolerance))
+    out = options.out or Path("results") / options.command
     module = import_module(f"orchestrator.experiments.{options.command}")
     return _experiment(options, module.experiment(*studies, out), out)
+
+
+def _surface_study(options: Namespace) -> "SurfaceStudy | None":
+    """The study of a command, if it is of beds in three dimensions."""
+    if options.command not in OF_SURFACES:
+        return None
+    surfaces = import_module("orchestrator.experiments.surfaces")
+    asked: SurfaceStudy | None = surfaces.load(options.source)
+    return asked
 
 
 def _experiment(options: Namespace, experiment: "Experiment", out: Path) -> int:

@@ -869,11 +869,11 @@ class Peeling(Method):
     @property
     def cases(self) -> tuple[WornFlow, ...]:
         """The flows over a bed that changes."""
-        flow: FlowCase | WornFlow = self.geometry.flow
-        runs = []
-        for _ in range(1, rounds(self.geometry.scene)):
-            flow = WornFlow(self.geometry.scene, flow, None)
-            runs.append(flow)
+        scene = self.geometry.scene
+        runs: list[WornFlow] = []
+        for _ in range(1, rounds(scene)):
+            before = runs[-1] if runs else self.geometry.flow
+            runs.append(WornFlow(scene, before, None))
         return tuple(runs)
 
     def motion(self, cases: Path) -> Motion:
