@@ -71,6 +71,8 @@ OF_KIND = (
     "length",
     "h_m",
     "criterion",
+    "decides",
+    "row_hold",
 )
 """Columns that the kind of a threshold follows from."""
 LENGTHS = ("d_m", "length", "h_m")
@@ -81,6 +83,9 @@ LEVEL_DEG = 1.0
 """Steepest slope of a bed that is like those of the flumes, degrees."""
 TABLE = Path(__file__).with_name("tested.csv")
 """The tested intervals."""
+ROW_HOLD = 1.05
+"""u*_0 of the first grain in its row, over that of the grain alone, from which the row
+holds it."""
 MOST_SLOPE_DEG = 30.0
 """Slope to which an interval of grains that go on is given, degrees."""
 FRICTION_DEG = (32.0, 50.0)
@@ -201,7 +206,7 @@ def kind_of(row: Mapping[str, Any]) -> str:
     if not _is_as_tested(row):
         return ""
     words = [row["force_law"], f"z0 d/{row['d_m'] / row['z0_m']:.3g}"]
-    if row.get("bed", "grain") == "grain" or _is_along(row):
+    if row.get("bed", "grain") == "grain" or _is_alone(row):
         words += ["grain", f"beta {row['beta_deg']:g}"]
         if row.get("criterion") == GOES_ON:
             words.append(GOES_ON)
@@ -227,9 +232,21 @@ def kind_of(row: Mapping[str, Any]) -> str:
     return ", ".join(words)
 
 
-def _is_along(row: Mapping[str, Any]) -> bool:
-    """Whether grains that go on are single exposed ones along a bed line."""
-    return row.get("method") == "local" and row.get("criterion") == GOES_ON
+def _is_alone(row: Mapping[str, Any]) -> bool:
+    """Whether the grains of a pile go on as single exposed ones would.
+
+    They do along a bed line, in the closed form. Equal grains in rows do where going on
+    holds them longest, or where the row does not hold its first grain.
+    """
+    if row.get("criterion") != GOES_ON:
+        return False
+    if row.get("method") == "local":
+        return True
+    if row["sizes"] or row["width"] or row["sheltering"] != "none":
+        return False
+    held = row.get("row_hold")
+    is_free = held is not None and held < ROW_HOLD
+    return is_free or row.get("decides") == GOES_ON
 
 
 def _is_as_tested(row: Mapping[str, Any]) -> bool:

@@ -404,6 +404,11 @@ def _end_of_range(
         moves = f"moves {row['fraction']:.0%}".replace("%", " %")
     low = single.known(row.get(told.column("_low")))
     high = single.known(row.get(told.column("_high")))
+    of_what = ""
+    if row["tested_rows"] > 0:
+        ends = single.tested(row, ustar)
+        low, high = (single.in_unit(row, end, told) for end in ends)
+        of_what = single.tested_on(row)
     return Number(
         single.in_unit(row, ustar, told),
         told.unit,
@@ -411,6 +416,7 @@ def _end_of_range(
         single.place_of(told, row),
         low=low,
         high=high,
+        interval_of=of_what,
         measured=single.in_unit(row, single.measured_ustar(row, ustar), told),
     )
 

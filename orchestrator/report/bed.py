@@ -110,8 +110,8 @@ def read(pile: Pile, cases: Path) -> Steps:
     packing = pile.packing
     moved = pile.motion(cases)
     grains = _grains_shown(pile)
-    if isinstance(pile.method, piles.Dem):
-        places = _places_by_dem(pile, pile.method, cases)[:, grains]
+    if _follows_dem(pile):
+        places = _places_by_dem(pile, cases)[:, grains]
         stops = np.arange(len(places))
     else:
         stops = _stops(moved)
@@ -134,6 +134,16 @@ def read(pile: Pile, cases: Path) -> Steps:
     return Steps(pile, grains, places, level, flow, totals, tuple(lines))
 
 
+def _follows_dem(pile: Pile) -> bool:
+    """Whether the picture follows the grains of the deck.
+
+    It does not where they must go on, too: each grain then has moved at the larger of
+    two flows, and at that flow no load step was run. Such grains are shown where they
+    were packed.
+    """
+    return isinstance(pile.method, piles.Dem) and not pile.goes_on
+
+
 def _grains_shown(pile: Pile) -> IntArray:
     """Numbers of the grains in the picture.
 
@@ -142,13 +152,15 @@ def _grains_shown(pile: Pile) -> IntArray:
     (left, right, bottom, _), _ = window(pile)
     x, z = pile.packing.centres.T
     is_shown = (x > left - 1) & (x < right + 1) & (z > bottom - 1)
-    if isinstance(pile.method, piles.Dem):
+    if _follows_dem(pile):
         is_shown |= pile.packing.mobile
     return np.flatnonzero(is_shown)
 
 
-def _places_by_dem(pile: Pile, method: piles.Dem, cases: Path) -> FloatArray:
+def _places_by_dem(pile: Pile, cases: Path) -> FloatArray:
     """Places of all grains as packed and after each load step, d: (K + 1, N, 2)."""
+    method = pile.method
+    assert isinstance(method, piles.Dem)
     packing = pile.packing
     d = pile.scene.grain.diameter
     fixed = np.where(packing.mobile[:, None], np.nan, packing.centres)
@@ -261,7 +273,7 @@ def words(results: Results, pile: Pile) -> str:
     return caption(
         "bed",
         width=pile.bed.width,
-        by_dem=pile.by_dem,
+        by_dem=_follows_dem(pile),
         flow=bool(pile.model.cases),
         method=pile.scene.method.kind,
         update=pile.scene.threshold.update,
@@ -312,7 +324,7 @@ def data(steps: Steps, shown: int, told: FloatArray, unit: str) -> dict[str, Any
     moved = int(steps.totals[shown])
     count = steps.pile.packing.count
     found = {
-        "step": "load step" if steps.pile.by_dem else "flow",
+        "step": "load step" if _follows_dem(steps.pile) else "flow",
         "shown": shown,
         "said": f"at {flow[shown]:g} {unit} {moved} of {count} grains have moved "
         f"({percent(moved / count)})",

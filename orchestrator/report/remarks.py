@@ -9,6 +9,7 @@ import pandas as pd
 from orchestrator.digits import percent
 from orchestrator.fidelity import spread
 from orchestrator.fidelity.limits import FROZEN_BED
+from orchestrator.physics.beside import ROW_HOLD
 from orchestrator.physics.fluids import PAPER
 from orchestrator.report import labels, sheets, single, theory
 from orchestrator.report.card import Remark
@@ -17,7 +18,6 @@ from orchestrator.report.results import Results
 from orchestrator.report.subjects import is_gas, length, place_of_file
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
-from orchestrator.tables.usable import ROW_HOLD
 
 MOST = 6
 """Remarks up to which those are added that are true of every study of a kind."""

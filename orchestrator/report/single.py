@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from orchestrator.digits import percent
-from orchestrator.physics.beside import FIELD, GOES_ON
+from orchestrator.physics.beside import FIELD, GOES_ON, LEVEL_DEG
 from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.report.card import Card, Number, Worth, decimals
 from orchestrator.report.subjects import (
@@ -341,15 +341,19 @@ def tested_on(row: Row) -> str:
     Parameters
     ----------
     row
-        A threshold with a tested interval.
+        A threshold with a tested interval and the columns of its scene.
 
     Returns
     -------
     str
-        The part of them that it held, and how many they are.
+        The part of them that it held, how many they are, and whether the interval
+        is widened for a slope.
     """
     part = percent(row["tested_held"])
-    return f"it held {part} of {row['tested_rows']:.0f} measured thresholds"
+    held = f"it held {part} of {row['tested_rows']:.0f} measured thresholds"
+    if row["alpha_deg"] > LEVEL_DEG:
+        return f"on level beds {held}; it is widened for the slope"
+    return held
 
 
 def source(row: Row, told: Quantity, ustar: float | None = None) -> str:

@@ -2,7 +2,7 @@
 
 A grain of the paper leaves its pocket. One of a natural sediment leaves it in a gust,
 and goes on after that (`orchestrator.physics.saltation`). Where a scene leaves the
-criterion and the method open, its fluid and its forces decide.
+criterion open, its fluid and its forces decide, whatever its method is.
 """
 
 from functools import lru_cache
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from orchestrator.physics import saltation
 from orchestrator.physics.fluids import PAPER
 from orchestrator.study.closed_form import closed_form
+from orchestrator.study.parts import GrainBed
 from orchestrator.study.question import why_not_going_on
 from orchestrator.study.scene import Scene
 from orchestrator.types import BoolArray, FloatArray
@@ -33,19 +34,30 @@ def goes_on(scene: Scene) -> bool:
     Returns
     -------
     bool
-        Whether it asks for that, or leaves criterion and method open in a fluid that is
-        not the paper's, with equal grains and forces of which going on is known.
+        Whether it asks for that, or leaves the criterion open in a fluid that is not
+        the paper's, with equal grains and forces of which going on is known.
     """
     criterion = scene.threshold.criterion
     if criterion != AUTO:
         return criterion == GOES_ON
-    if scene.method.kind != "auto" or scene.flow.gusts is not None:
+    if scene.flow.gusts is not None or _is_followed(scene):
         return False
     if (scene.fluid.density, scene.fluid.viscosity) == PAPER:
         return False
     is_of_its_like = scene.grain.sizes is None and scene.bed.relative_size == 1
     is_alone = scene.forces.sheltering != "balanced"
     return is_of_its_like and is_alone and not why_not_going_on(scene)
+
+
+def _is_followed(scene: Scene) -> bool:
+    """Whether LIGGGHTS itself follows what is asked for.
+
+    It follows a single grain as it leaves, and knows none of its hops; with the drag of
+    the relative velocity it follows the hops of all grains.
+    """
+    is_single = isinstance(scene.bed, GrainBed)
+    is_relative = scene.forces.drag == "relative"
+    return scene.method.kind == "dem" and (is_single or is_relative)
 
 
 class GoingOn(NamedTuple):

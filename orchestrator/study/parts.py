@@ -528,9 +528,8 @@ class Threshold(Part):
     )
     """displacement along the bed from which a grain counts as moved"""
     criterion: Literal["auto", "leaves", "goes on"] = field("auto", since=True)
-    """what a grain must do; left open, with the method left open, too, and in another
-    fluid than the paper's, it must go on
-    - auto: by fluid, forces and method
+    """what a grain must do; left open, in another fluid than the paper's, it must go on
+    - auto: by fluid and forces
     - leaves: leave its pocket in the flow, as in the paper
     - goes on: leave it in a gust of 2.28 times the mean stress, and hop on after it"""
     fractions: Annotated[tuple[Fraction, ...], List] = _pile(

@@ -8,7 +8,7 @@ import pandas as pd
 
 from orchestrator.flow.case import SPEED_HEIGHT
 from orchestrator.grains.threshold import within
-from orchestrator.physics.beside import GOES_ON, beside
+from orchestrator.physics.beside import GOES_ON, ROW_HOLD, beside
 from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import standing_out, why_not
 from orchestrator.physics.velocity import (
@@ -24,8 +24,6 @@ EXPOSED_FROM = 0.25
 """Part of a grain over the tops of its neighbours from which it is exposed."""
 CARRIED_OFF = 0.1
 """Share of the moved grains from which a threshold is one of lift-off."""
-ROW_HOLD = 1.05
-"""u*_0 of the first grain in its row, over that of the grain alone, that is told."""
 KEPT_TO = 0.1
 """n/N to which a balance of the whole bed holds; at 0.3 theta is 2 to 3.5 times
 that."""

@@ -61,6 +61,13 @@ bed = { kind = "pile", shape = "rushil", slope_deg = 26.175, height = 0.117, rou
 [axes]
 "method.flow.turbulence_model" = ["kEpsilon", "RNGkEpsilon"]
 """
+LEVEL_BY_DEM = """
+title = "Level sand in water"
+fluid.kind = "water"
+grain = { diameter = 1e-3, density = 2650.0 }
+method.kind = "dem"
+bed = { kind = "flat", length = 0.01, roughness = "d/30" }
+"""
 Studies = pytest.TempPathFactory
 
 
@@ -173,6 +180,21 @@ def test_the_slider_has_every_place_of_every_load_step(
         assert np.isnan(now[:, 0]).tolist() == np.isnan(places[:, 0]).tolist()
         known = ~np.isnan(now[:, 0])
         assert np.abs(now[known] * [1, -1] - places[known]).max() <= bed.SHIFT + 0.011
+
+
+def test_grains_that_go_on_by_dem_are_drawn_at_the_flows_at_which_they_have_gone(
+    tmp_path: Path,
+) -> None:
+    """The flows of the deck are those at which grains leave, which are other ones."""
+    results = small_study.run(tmp_path, LEVEL_BY_DEM)
+    pile = next(iter(results.plan.piles.values()))
+    assert pile.goes_on
+    steps = bed.read(pile, results.cases)
+    assert len(steps.places) == len(steps.flow) == len(steps.totals)
+    assert steps.flow.tolist() == pile.motion(results.cases).flow.tolist()
+    assert steps.totals[-1] == pile.packing.count
+    (figure,) = bed.draw(results)
+    assert figure.data["step"] == "flow"
 
 
 def test_a_bed_without_dem_has_a_picture_of_few_stops(

@@ -44,8 +44,10 @@ def _scene(text: str) -> Scene:
         (SAND + WATER, True),
         (SAND + '[fluid]\nkind = "air"\n', True),
         (SAND + "[fluid]\ndensity = 1.2\nviscosity = 1.5e-5\n", True),
-        (SAND + WATER + '[method]\nkind = "pivot"\n', False),
+        (SAND + WATER + '[method]\nkind = "pivot"\n', True),
         (SAND + WATER + '[threshold]\ncriterion = "leaves"\n', False),
+        # a single grain is followed by LIGGGHTS as it leaves
+        (SAND + WATER + '[method]\nkind = "dem"\n', False),
         (SAND + '[threshold]\ncriterion = "goes on"\n', True),
         (SAND + WATER + '[forces]\nlaw = "paper"\n', False),
         # as `threshold` does: cohesion holds a grain in its pocket, not in its hops
@@ -61,9 +63,7 @@ def _scene(text: str) -> Scene:
         (SAND + WATER + "[flow]\ngusts = { intensity = 0.4, events = 9 }\n", False),
     ],
 )
-def test_fluid_forces_and_method_decide_where_nothing_is_asked(
-    text: str, does: bool
-) -> None:
+def test_fluid_and_forces_decide_where_nothing_is_asked(text: str, does: bool) -> None:
     assert goes_on(_scene(text)) is does
 
 
@@ -128,6 +128,15 @@ def test_what_answers_a_bed_whose_grains_go_on() -> None:
     # grains where they are asked for
     asked = SAND + WATER + CURVED + "[method.grains]\nmobile_layers = 3\n"
     assert decide(_scene(asked), None).scene.method.kind == "dem"
+
+
+@pytest.mark.parametrize("kind", ["auto", "local", "pivot", "peeling", "dem"])
+def test_every_method_answers_the_same_question(kind: str) -> None:
+    text = SAND + WATER + PILE + f'[method]\nkind = "{kind}"\n'
+    answer = decide(_scene(text), None).scene
+    assert answer.threshold.criterion == "goes on"
+    if kind != "auto":
+        assert answer.method.kind == kind
 
 
 def test_a_run_of_dem_does_not_depend_on_the_criterion() -> None:

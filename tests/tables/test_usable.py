@@ -8,9 +8,11 @@ import pandas as pd
 import pytest
 
 from orchestrator import plan, tables
+from orchestrator.physics.beside import interval
 from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.study import study
 from orchestrator.tables.usable import with_scatter, with_usable
+from tests import small_study
 
 NAN = float("nan")
 SOUND = {
@@ -274,3 +276,42 @@ def test_the_scatter_of_poured_beds_is_of_beds_that_are_poured_alike() -> None:
     assert scatter.tolist() == pytest.approx(
         [0.1, 0.1, 0.5, 0.5, NAN, NAN, NAN], nan_ok=True
     )
+
+
+RIPPLE = """
+fluid.kind = "air"
+grain = { diameter = 5e-4, density = 2650.0 }
+bed = { kind = "pile", slope_deg = 12.0, height = 0.01, roughness = "d/30" }
+method = { kind = "peeling", flow = { model = "flat" } }
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "is_tested"),
+    [
+        (RIPPLE, True),
+        (f'{RIPPLE}threshold.criterion = "leaves"', False),
+        # grains that touch one another along a level row hold one another
+        (RIPPLE.replace('"pile", slope_deg = 12.0, height', '"flat", length'), False),
+    ],
+)
+def test_grains_of_a_pile_that_go_on_have_the_interval_of_one_grain(
+    tmp_path: Path, text: str, is_tested: bool
+) -> None:
+    results = small_study.run(tmp_path, text)
+    rows = results.tables["pile_threshold"]
+    if not is_tested:
+        assert not rows["tested_rows"].any()
+        return
+    alone = interval("bridged, z0 d/30, grain, beta 60, goes on, air", 9.0)
+    # slope laws of friction angles of 32 and 50 degrees
+    most, least = (
+        np.cos(np.radians(12.0)) + np.sin(np.radians(12.0)) / np.tan(np.radians(phi))
+        for phi in (32.0, 50.0)
+    )
+    width = most / least
+    assert (rows["row_hold"] < 1.05).all()
+    low = (rows["tested_low"] / rows["shields"]).to_numpy()
+    high = (rows["tested_high"] / rows["shields"]).to_numpy()
+    assert low == pytest.approx(alone[0] / width)
+    assert high == pytest.approx(alone[1] * width)
