@@ -3,6 +3,7 @@
 ``python docs/study_file.py > docs/study-file.md`` writes it.
 """
 
+from collections.abc import Mapping
 from typing import get_args
 
 from annotated_types import Ge, Gt, Le, Lt
@@ -10,10 +11,11 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from orchestrator.fidelity import limits
-from orchestrator.study import fields, profile, question, scene
+from orchestrator.study import fields, profile, question, scene, surface_study
 from orchestrator.study.fidelities import AUTO, WRITTEN
 from orchestrator.study.fields import Quantity
-from orchestrator.study.study import BED, TIME_LIMIT_S
+from orchestrator.study.reading import TIME_LIMIT_S
+from orchestrator.study.study import BED
 
 HEAD = f"""# Study files
 
@@ -40,7 +42,7 @@ its `axes` are added to those at the top. The [glossary](glossary.md) explains t
 |---|---|---|
 | `title` | the file's name | a line for the page |
 | `time_limit` | {TIME_LIMIT_S:g} | wall time after which a run of a solver counts as hung, s |
-| `units_confirmed` | false | true: unusual numbers are meant as they stand. Nothing is asked about them, and a profile that is longer than 10 km or higher than 500 m is accepted |
+| `units_confirmed` | false | true: unusual numbers are meant as they stand. Nothing is asked about them, and a profile or surface that is longer than 10 km or higher than 500 m is accepted |
 | `seeds` | none | number of beds that differ in their seed alone; a group may have its own |
 | `tolerance` | none | accepted relative error of τ_c: [ladder.md](ladder.md) |
 | `cluster` | none | settings of a queue: [cluster.md](cluster.md) |
@@ -115,7 +117,15 @@ SIGNS = {
     Lt: ("lt", "{:g})"),
     Le: ("le", "{:g}]"),
 }
-COLUMNS = "| field | symbol, unit, range | default | meaning | scope | column |"
+SHORT = "| field | symbol, unit, range | default | meaning |"
+COLUMNS = f"{SHORT} scope | column |"
+SURFACES = f"""## Beds in three dimensions
+
+With `bed.kind = "{surface_study.KIND}"` the tables are those below, and `study` and `erosion` answer
+([surface.md](surface.md)). At the top such a file may have `title`, `time_limit`,
+`units_confirmed` and `[axes]` of up to {surface_study.MOST_FLOWS} combinations. The law `paper`, two answers in the transition, is
+refused.
+"""
 
 
 FIDELITIES = f"""## Fidelities
@@ -156,18 +166,38 @@ def text() -> str:
             about = "One grain on two others, or a pile of grains."
         lines.append(f"## `[{part}]`\n\n{about}\n\n{COLUMNS}\n{'|---' * 6}|")
         rows = (
-            _row(each) for each in fields.FIELDS if fields.table_of(each.name) == part
+            _row(
+                each,
+                model.model_fields[each.name.rpartition(".")[2]],
+                BED if part == "bed" else {},
+            )
+            for each in fields.FIELDS
+            if fields.table_of(each.name) == part
         )
         lines += [*(f"| {' | '.join(row)} |" for row in rows), ""]
+    lines.append(SURFACES)
+    defaults = {"roughness": BED["roughness"]}
+    for table, model in surface_study.TABLES.items():
+        about = " ".join((model.__doc__ or "").split())
+        lines.append(f"### `[{table}]`\n\n{about}\n\n{SHORT}\n{'|---' * 4}|")
+        for name, field in model.model_fields.items():
+            quantity = fields.quantity(table, name, field)
+            cells = _row(quantity, field, defaults if table == "bed" else {})[
+                : SHORT.count("|") - 1
+            ]
+            lines.append(f"| {' | '.join(cells)} |")
+        lines.append("")
     lines.append(fidelities())
     lines.append("## Limits\n\n| field | refused | remedy |\n|---|---|---|")
     lines += [f"| `{name}` | {' | '.join(words)} |" for name, words in LIMITS.items()]
     return "\n".join(lines) + "\n"
 
 
-def _row(quantity: Quantity) -> list[str]:
-    part, _, name = quantity.name.rpartition(".")
-    field, info = fields.PARTS[part].model_fields[name], quantity.info
+def _row(
+    quantity: Quantity, field: FieldInfo, defaults: Mapping[str, str]
+) -> list[str]:
+    name = quantity.name.rpartition(".")[2]
+    info = quantity.info
     words = info.choices or {
         w: w for w in get_args(field.annotation) if isinstance(w, str)
     }
@@ -175,7 +205,7 @@ def _row(quantity: Quantity) -> list[str]:
         f'`"{w}"`' + (f": {m}" if m.lower() != w.lower() else "")
         for w, m in words.items()
     ]
-    value = BED.get(name, field.default) if part == "bed" else field.default
+    value = defaults.get(name, field.default)
     default = f"`{list(value) if isinstance(value, tuple) else value!r}`".replace(
         "'", '"'
     )

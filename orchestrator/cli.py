@@ -20,8 +20,8 @@ from orchestrator.study.units import number, whole_number
 
 if TYPE_CHECKING:
     from orchestrator.experiments.experiment import Experiment
-    from orchestrator.experiments.surfaces import SurfaceStudy
     from orchestrator.pipeline import Finished
+    from orchestrator.study.surface_study import SurfaceStudy
 
 OF_SURFACES = {
     "study": "orchestrator.experiments.surface",
@@ -257,7 +257,7 @@ def _surface_study(options: Namespace) -> "SurfaceStudy | None":
     """The study of a command, if it is of beds in three dimensions."""
     if options.command not in OF_SURFACES:
         return None
-    surfaces = import_module("orchestrator.experiments.surfaces")
+    surfaces = import_module("orchestrator.study.surface_study")
     asked: SurfaceStudy | None = surfaces.load(options.source)
     return asked
 

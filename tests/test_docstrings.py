@@ -28,7 +28,7 @@ PHYSICS = (
 )
 """Modules whose public functions have an example each."""
 UNDESCRIBED = (
-    "orchestrator.bed.surface",
+    "orchestrator.study.surface",
     "orchestrator.experiments.surface",
     "orchestrator.experiments.surface_erosion",
     "orchestrator.experiments.surface_truth",

@@ -20,9 +20,10 @@ from orchestrator.runs import case
 from orchestrator.runs.files import Folder
 from orchestrator.runs.workspace import EXPERIMENT, Workspace, claimed
 from orchestrator.study.parts import PileBed
+from orchestrator.study.reading import TIME_LIMIT_S
 from orchestrator.study.scene import Scene
 from orchestrator.study.source import Source
-from orchestrator.study.study import TIME_LIMIT_S, Study
+from orchestrator.study.study import Study
 from orchestrator.tables import csv
 
 Results = tuple[Mapping[str, pd.DataFrame], Sequence[Section]]

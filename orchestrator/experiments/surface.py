@@ -17,7 +17,6 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure as Canvas
 
 from orchestrator import plan
-from orchestrator.bed.raster import geotiff
 from orchestrator.experiments import surface_card
 from orchestrator.experiments.erosion import given_threshold
 from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs
@@ -31,7 +30,6 @@ from orchestrator.experiments.surface_answer import (
     Direction,
     Ground,
 )
-from orchestrator.experiments.surfaces import SurfaceScene, SurfaceStudy
 from orchestrator.flow.case import SPEED_HEIGHT
 from orchestrator.flow.mesh3 import LEVELS
 from orchestrator.flow.surface_case import SURFACE_STRESS, SurfaceFlowCase
@@ -41,11 +39,14 @@ from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.report import maps
 from orchestrator.report.page import Section
 from orchestrator.report.style import Figure
+from orchestrator.study.raster import geotiff
 from orchestrator.study.scene import (
     SOLVE_VISCOSITY,
     VISCOUS_CELLS,
     default_first_cell_height,
 )
+from orchestrator.study.surface_parts import SurfaceScene
+from orchestrator.study.surface_study import SurfaceStudy
 from orchestrator.types import FloatArray
 
 WIND = "wind at 10 m, m/s,"
@@ -116,7 +117,7 @@ def flow_of(scene: SurfaceScene) -> SurfaceFlowCase:
     """The run of a scene."""
     roughness = scene.solve_roughness
     relief = scene.heights.relief
-    asked = scene.method
+    asked = scene.method.flow
     eddy = KARMAN * float(log_law_ustar(asked.speed, SPEED_HEIGHT * relief, roughness))
     viscous = (asked.viscosity or 0.0) / eddy
     cell = asked.first_cell_height

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from orchestrator.bed.surface import OF_GROUND, Surface
 from orchestrator.flow.mesh3 import wind_axes
 from orchestrator.flow.surface_stress import SurfaceStress
 from orchestrator.grains import onset
 from orchestrator.grains.onset import Shares
 from orchestrator.physics.threshold import SingleGrain
 from orchestrator.report.maps import Grid
+from orchestrator.study.surface import OF_GROUND, Surface
 from orchestrator.types import FloatArray
 
 MOVES = "wind_m_s"

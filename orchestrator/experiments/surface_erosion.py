@@ -9,13 +9,14 @@ import pandas as pd
 from orchestrator import plan
 from orchestrator.experiments import erosion, surface, surface_answer
 from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs
-from orchestrator.experiments.surfaces import SurfaceScene, SurfaceStudy
 from orchestrator.flow.surface_case import SURFACE_STRESS, SurfaceFlowCase
 from orchestrator.flow.surface_stress import SurfaceStress
 from orchestrator.grains.onset import WIND_HEIGHT
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.report.page import Section
 from orchestrator.report.style import Figure
+from orchestrator.study.surface_parts import SurfaceScene
+from orchestrator.study.surface_study import SurfaceStudy
 
 ROW = 1.5
 """Distance from the middle up to which faces are of its row, over the least."""

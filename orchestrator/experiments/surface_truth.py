@@ -21,7 +21,6 @@ import numpy as np
 import pandas as pd
 
 from orchestrator import plan
-from orchestrator.bed.surface import SPREAD_OF_SHAPE, Surface, cone, oval, surface_of
 from orchestrator.errors import Stalled
 from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs
 from orchestrator.flow import mesh3
@@ -35,6 +34,7 @@ from orchestrator.physics.velocity import log_law_speed
 from orchestrator.report.page import Section
 from orchestrator.runs.case import Case
 from orchestrator.study.method import FlowMethod
+from orchestrator.study.surface import SPREAD_OF_SHAPE, Surface, cone, oval, surface_of
 from orchestrator.types import BoolArray, FloatArray
 
 MEASURED = Path(__file__).with_name("measured")

@@ -24,8 +24,9 @@ from orchestrator.study import units
 from orchestrator.study.declare import UnfitError
 from orchestrator.study.method import HELD_FROM
 from orchestrator.study.parts import PileBed
+from orchestrator.study.reading import ASKED
 from orchestrator.study.scene import Scene
-from orchestrator.study.study import ASKED, Study
+from orchestrator.study.study import Study
 
 MOST_GRAINS = 1e5  # largest length of a bed with grains, diameters
 FROZEN_BED = 0.05

@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from orchestrator.bed.deck import read_texts
-from orchestrator.bed.surface import Surface
 from orchestrator.digits import rounded
 from orchestrator.errors import Exploded, SolverError, Stalled
 from orchestrator.flow import mesh3
@@ -21,6 +20,7 @@ from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.velocity import log_law_speed, log_law_ustar
 from orchestrator.runs.case import Case
 from orchestrator.solvers import openfoam
+from orchestrator.study.surface import Surface
 from orchestrator.types import FloatArray
 
 SURFACE_STRESS = "surface_stress.csv"

@@ -161,7 +161,22 @@ def law_of(scene: Scene) -> str:
     """
     if scene.forces.law != AUTO:
         return scene.forces.law
-    grain = single_grain(scene)
+    return usual_law(single_grain(scene))
+
+
+def usual_law(grain: SingleGrain) -> str:
+    """Choose the force law that answers a grain for which none is asked.
+
+    Parameters
+    ----------
+    grain
+        The grain.
+
+    Returns
+    -------
+    str
+        Its name.
+    """
     (at,) = thresholds_of("bridged", [grain])
     return str(default_laws(at.friction_velocity, grain.exposure))
 

@@ -229,8 +229,25 @@ APPLIES: Mapping[str, Callable[[Scene], bool]] = {
 """The scenes on which a field has an effect, by the `scope` of its `Info`."""
 
 
-def _quantity(table: str, name: str, declared: FieldInfo) -> Quantity:
-    info = next(each for each in declared.metadata if isinstance(each, Info))
+def quantity(table: str, name: str, declared: FieldInfo) -> Quantity:
+    """Read the words of a field off its declaration.
+
+    Parameters
+    ----------
+    table
+        The table of the field.
+    name
+        Its name in there.
+    declared
+        Its declaration.
+
+    Returns
+    -------
+    Quantity
+        The field.
+    """
+    given = [each for each in declared.metadata if isinstance(each, Info)]
+    info = given[0] if given else Info()
     meaning, *words = (declared.description or "").split("\n- ")
     choices = {}
     for word in words:
@@ -252,7 +269,7 @@ def _declared() -> tuple[Quantity, ...]:
         for name, declared in part.model_fields.items():
             # the tables within the method have fields of their own
             if f"{table}.{name}" not in PARTS:
-                quantities.append(_quantity(table, name, declared))
+                quantities.append(quantity(table, name, declared))
     return tuple(quantities)
 
 

@@ -44,6 +44,8 @@ if TYPE_CHECKING:
 else:
     ShapeName, LawName = Literal[tuple(SHAPES)], Literal[tuple(LAW_LABELS)]
 Range = Annotated[tuple[float, float], List]
+Wind = Annotated[float, Field(gt=0, le=150)]
+"""Up to the fastest tornadoes, m/s."""
 File = Annotated[
     InstanceOf[Profile], PlainSerializer(lambda profile: profile and profile.digest)
 ]
@@ -131,8 +133,8 @@ class Fluid(Part):
     """acceleration of gravity"""
 
 
-class Grain(Part):
-    """Spheres: their size, their weight, their friction and cohesion."""
+class Sphere(Part):
+    """A grain of any bed: its size and its weight."""
 
     # smaller ones are carried by Brownian motion, larger ones no flood has moved
     diameter: float = field(..., symbol="d", unit="m", column="d_m", ge=1e-7, le=10)
@@ -148,6 +150,11 @@ class Grain(Part):
         le=25_000,
     )
     """density of the grains"""
+
+
+class Grain(Sphere):
+    """Spheres: their size, their weight, their friction and cohesion."""
+
     friction_angle_deg: float = field(
         35.0, symbol="φ", unit="°", column="phi_deg", ge=1, le=89
     )
@@ -165,8 +172,8 @@ class Grain(Part):
     geometric standard deviations"""
 
 
-class Forces(Part):
-    """How the grains feel the flow."""
+class Drag(Part):
+    """The forces of the flow on an exposed grain of any bed."""
 
     law: LawName = field(
         "auto", label="force law", column="force_law", choices=LAW_LABELS
@@ -176,6 +183,11 @@ class Forces(Part):
         LIFT_COEFFICIENT, symbol="α_s", column="alpha_s", ge=0, le=100
     )
     """lift coefficient"""
+
+
+class Forces(Drag):
+    """How the grains feel the flow."""
+
     stress: Literal["wall", "eq10"] = _pile("wall")
     """stress on the bed: at the wall, or at the first cell
     - wall: wall stress
@@ -595,3 +607,17 @@ def extremes(sizes: Sizes | None, diameter: float) -> tuple[float, float]:
     if isinstance(sizes, LogNormal):
         return sizes.ends
     return (sizes[0][0] / diameter, sizes[-1][0] / diameter) if sizes else (1.0, 1.0)
+
+
+class Erosion(Part):
+    """What `orchestrator erosion` asks of a stockpile.
+
+    It is the winds and the threshold of its surface.
+    """
+
+    fastest_mile: Annotated[tuple[Wind, ...], List, Field(min_length=1)] = (20.0,)
+    """fastest mile of each time between two disturbances, wind at 10 m, m/s; by default
+    a gale"""
+    threshold: float | str | None = None
+    """friction velocity, m/s, or a material in the table of AP-42; by default the
+    closed form"""

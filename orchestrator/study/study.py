@@ -4,12 +4,9 @@ The tables at the top hold for every scene. Each ``[[group]]`` overrides some of
 and its ``axes`` span a grid: every combination of the listed values is a scene.
 """
 
-import difflib
 import itertools
 import math
 import os
-import re
-import tomllib
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -23,34 +20,34 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
 
 from orchestrator.errors import InputError
-from orchestrator.physics import fluids
 from orchestrator.study import units
 from orchestrator.study.closed_form import resolved
 from orchestrator.study.declare import List, Part, UnfitError
 from orchestrator.study.fidelities import AUTO, fields_of
-from orchestrator.study.fields import FIDELITY, PARTS, SEED, default_of, table_of
-from orchestrator.study.keys import (
-    GONE_KEYS,
-    GONE_VALUES,
-    Table,
-    Tables,
-    by_name,
-    check_moved,
-    nested,
-)
-from orchestrator.study.parts import PileBed, Sizes, percentile
-from orchestrator.study.profile import (
-    LARGEST_NUMBER,
-    WITH_X,
-    Files,
-    decoded,
-    read_bytes,
+from orchestrator.study.fields import PARTS, SEED
+from orchestrator.study.keys import Table, Tables, by_name, check_moved, nested
+from orchestrator.study.parts import Erosion, PileBed, Sizes, percentile
+from orchestrator.study.profile import WITH_X, Files, decoded, read_bytes
+from orchestrator.study.reading import (
+    CONFIRMED,
+    MISSING,
+    MOST_BYTES,
+    TIME_LIMIT_S,
+    UNKNOWN,
+    Given,
+    at_points,
+    check_once,
+    explained,
+    fluid_of,
+    place_of,
+    tables_of,
+    values_of,
+    with_questions,
 )
 from orchestrator.study.scene import Scene, roughness_length
 from orchestrator.study.shapes import SHAPES
 from orchestrator.study.source import Source, find, presets
 
-TIME_LIMIT_S = 3600.0
 BED = {"kind": "grain", "roughness": "d/30"}
 """Fields of a bed that a file may leave out."""
 POURED_LAYERS = 4
@@ -61,11 +58,6 @@ LEVEL_HEIGHT = 20.0
 default: level beds of all grains are alike."""
 NO_TOLERANCE = 'leave it out; method.kind = "dem" answers by DEM'
 MOST_SCENES = 100_000
-MOST_BYTES = 2**24
-"""Largest study file: one that lists so many scenes is smaller."""
-UNKNOWN = "unknown key"
-MISSING = "is missing"
-Wind = Annotated[float, Field(gt=0, le=150)]
 MIXTURE: TypeAdapter[Sizes | None] = TypeAdapter(Sizes | None)
 
 
@@ -79,32 +71,11 @@ def _not_zero(tolerance: float | None) -> float | None:
     return tolerance
 
 
-class _Tables(Part):
-    """The tables of a file or of a group, which are validated scene by scene."""
+class _Tables(Given):
+    """The tables of a file or of a group."""
 
-    fluid: Table = Field(default={})
-    grain: Table = Field(default={})
-    bed: Table = Field(default={})
-    flow: Table = Field(default={})
-    forces: Table = Field(default={})
     threshold: Table = Field(default={})
-    method: Table = Field(default={})
-    axes: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(default={})
     seeds: int | None = Field(default=None, ge=0, le=1000)
-
-
-class Erosion(Part):
-    """What `orchestrator erosion` asks of a stockpile.
-
-    It is the winds and the threshold of its surface.
-    """
-
-    fastest_mile: Annotated[tuple[Wind, ...], List, Field(min_length=1)] = (20.0,)
-    """fastest mile of each time between two disturbances, wind at 10 m, m/s; by default
-    a gale"""
-    threshold: float | str | None = None
-    """friction velocity, m/s, or a material in the table of AP-42; by default the
-    closed form"""
 
 
 TABLES: Mapping[str, type[Part]] = {**PARTS, "erosion": Erosion}
@@ -220,30 +191,9 @@ class Study:
         return tuple(asked)
 
 
-ASKED = (
-    "grain.diameter",
-    "grain.density",
-    "grain.cohesion",
-    "fluid.density",
-    "fluid.viscosity",
-    "fluid.gravity",
-    "bed.slope_deg",
-    "bed.entrainment_angle_deg",
-    "bed.lee_slope_deg",
-    "flow.depth",
-    "forces.lift_coefficient",
-)
-"""The fields that are asked about where their numbers are usual in another unit."""
-
-
 def _values_of(scenes: Sequence[Scene]) -> dict[str, list[float]]:
-    """The values of the fields `ASKED` in some scenes."""
-    values: dict[str, list[float]] = {}
-    for name in ASKED:
-        part, _, field = name.partition(".")
-        each = [getattr(getattr(scene, part), field, None) for scene in scenes]
-        # what is left open is no number, and a bed of one grain has no lee side
-        values[name] = [value for value in each if value is not None]
+    """The values that are asked about in some scenes."""
+    values = values_of(scenes)
     # the diameter of a sieve table follows from its rows, the slope of a profile from
     # its points
     single = [
@@ -253,22 +203,6 @@ def _values_of(scenes: Sequence[Scene]) -> dict[str, list[float]]:
     beds = [scene.bed for scene in scenes]
     given = [bed for bed in beds if not (isinstance(bed, PileBed) and bed.profile)]
     values["bed.slope_deg"] = [bed.slope_deg for bed in given]
-    return values
-
-
-def _values_in(tables: Mapping[str, Table]) -> dict[str, list[float]]:
-    """The values of the fields `ASKED` in tables of one scene, maybe wrong ones."""
-    given = {name: dict(tables.get(name, {})) for name in PARTS}
-    with suppress(InputError):
-        given["fluid"] = fluids.numbers_of(given["fluid"])
-    values: dict[str, list[float]] = {}
-    for name in ASKED:
-        table, _, field = name.partition(".")
-        value = given[table].get(field, default_of(name))
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        values[name] = []
-        if is_number and abs(value) < LARGEST_NUMBER:
-            values[name].append(value)
     return values
 
 
@@ -385,37 +319,10 @@ def _check_profiles(groups: Sequence[Group]) -> None:
             bed = scene.bed
             if not isinstance(bed, PileBed) or not bed.profile:
                 continue
-            asked = units.of_profile(bed.profile.name, bed.profile.x[-1], bed.height)
+            asked = units.of_bed(bed.profile.name, bed.profile.x[-1], bed.height)
             if asked:
-                confirmed = "write units_confirmed = true at the top of the study file"
-                remedy = f"divide x_m and z_m by 1000, or {confirmed} if it is so large"
+                remedy = f"divide x_m and z_m by 1000, or {CONFIRMED} if it is so large"
                 raise InputError(asked, f"{group.where}: bed.profile", remedy)
-
-
-def tables_of(text: str, where: str) -> dict[str, Any]:
-    """Read the tables of a TOML file.
-
-    Parameters
-    ----------
-    text
-        The file.
-    where
-        Its path, for messages.
-
-    Returns
-    -------
-    dict of str to object
-        The tables, as TOML's parser gives them.
-
-    Raises
-    ------
-    InputError
-        With the line, and how to write the number in it.
-    """
-    try:
-        return tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise _not_toml(str(error), text, where) from None
 
 
 def _groups(file: _File, where: str, files: Files) -> tuple[Group, ...]:
@@ -423,7 +330,7 @@ def _groups(file: _File, where: str, files: Files) -> tuple[Group, ...]:
     tables_of = file.group or (_Group(),)
     places = [where]
     if file.group:
-        places = [_place(where, number) for number in range(len(file.group))]
+        places = [place_of(where, number) for number in range(len(file.group))]
     listed: list[list[Scene]] = []
     count = 0
     for group, place in zip(tables_of, places, strict=True):
@@ -448,11 +355,6 @@ def _groups(file: _File, where: str, files: Files) -> tuple[Group, ...]:
     return tuple(groups)
 
 
-def _place(where: str, group: int) -> str:
-    """The place of a group in messages; `group` counts from 0."""
-    return f"{where}: group {group + 1}"
-
-
 def _check_keys(data: Mapping[str, Any], where: str) -> None:
     """Refuse keys that study files had before, at the top and in the groups."""
     check_moved(data, where)
@@ -461,7 +363,7 @@ def _check_keys(data: Mapping[str, Any], where: str) -> None:
         return
     for number, group in enumerate(groups):
         if isinstance(group, dict):
-            check_moved(group, _place(where, number))
+            check_moved(group, place_of(where, number))
 
 
 def _axes(file: "_File", table: "_Group", where: str) -> dict[str, list[Any]]:
@@ -486,73 +388,11 @@ def _scenes(
 
     Each must be a scene of its own.
     """
-    for name in axes:
-        if table_of(name) not in PARTS:
-            first = name.partition(".")[0]
-            remedy = 'write "grain.diameter" = [1e-4, 1e-3]'
-            what = "not a table and a field of it"
-            raise InputError(what, f"{where}: axes.{first}", remedy)
     points: dict[str, tuple[Any, ...]] = {}
-    for point, made in at_points(tables, axes):
+    for point, made in at_points(tables, axes, where):
         scene = _scene_at(made, where, files)
         check_once(points, scene.id, point, where)
         yield scene
-
-
-def at_points(
-    tables: Mapping[str, Table], axes: Mapping[str, list[Any]]
-) -> Iterator[tuple[tuple[Any, ...], Tables]]:
-    """Write each combination of the axes' values into the tables of a file.
-
-    Parameters
-    ----------
-    tables
-        The tables by their names.
-    axes
-        The values by the names of their fields, such as ``grain.diameter``.
-
-    Yields
-    ------
-    point
-        The values.
-    tables
-        The tables with them.
-    """
-    for point in itertools.product(*axes.values()):
-        made = {name: dict(table) for name, table in tables.items()}
-        for name, value in zip(axes, point, strict=True):
-            table, _, field = name.rpartition(".")
-            made[table][field] = value
-        yield point, made
-
-
-def check_once(
-    points: dict[Any, tuple[Any, ...]], scene: Any, point: tuple[Any, ...], where: str
-) -> None:
-    """Refuse a scene that the axes have a second time.
-
-    Parameters
-    ----------
-    points
-        The values of the axes by the scenes before, to which this one is added.
-    scene
-        The scene, or its id.
-    point
-        Its values.
-    where
-        The file, for messages.
-
-    Raises
-    ------
-    InputError
-        With both values.
-    """
-    same = points.setdefault(scene, point)
-    if same is not point:
-        one = ", ".join(map(str, same))
-        other = ", ".join(map(str, point))
-        what = f"{one} and {other} are one scene"
-        raise InputError(what, f"{where}: axes", "list each value once")
 
 
 def _scene_at(tables: Tables, where: str, files: Files) -> Scene:
@@ -560,13 +400,11 @@ def _scene_at(tables: Tables, where: str, files: Files) -> Scene:
     try:
         return make_scene(tables, where, files)
     except InputError as error:
-        if error.what in (UNKNOWN, MISSING):
-            raise
         asked = units.of_sieve(_sieve_in(tables, files, where))
-        if asked:  # the diameter and all that depends on it follow from the table
+        if asked and error.what not in (UNKNOWN, MISSING):
+            # the diameter and all that depends on it follow from the table
             raise units.first(asked, error, where, ()) from None
-        asked = units.questions(_values_in(tables), {})
-        raise units.first(asked, error, where, ASKED) from None
+        raise with_questions(error, tables, where) from None
 
 
 def make_scene(
@@ -604,10 +442,7 @@ def make_scene(
     is_flat = bed.get("shape") == "flat"
     is_level = is_flat and not (bed.get("profile") or bed.get("obstacles"))
     _write_method(made, is_level, where)
-    try:
-        made["fluid"] = fluids.numbers_of(made["fluid"])
-    except InputError as error:
-        raise InputError(error.what, f"{where}: {error.where}", error.remedy) from None
+    made["fluid"] = fluid_of(made["fluid"], where)
     if files:
         _read_files(made, files, where)
     try:
@@ -733,128 +568,14 @@ def changed(scene: Scene, fields: Mapping[str, Any]) -> Scene:
     return make_scene(tables, "fields that are changed")
 
 
-def _not_toml(error: str, text: str, where: str) -> InputError:
-    """The refusal of a file that is no TOML.
-
-    It says how to write the number in its line.
-    """
-    remedy = ""
-    place = re.search(r"\(at line (\d+), column \d+\)", error)
-    if place:
-        line = text.splitlines()[int(place[1]) - 1]
-        value = line.partition("=")[2].partition("#")[0]
-        remedy = units.meant(value)
-    return InputError(f"not TOML: {error}", where, remedy)
-
-
 def _explained(error: ValidationError, where: str) -> InputError:
     """The refusal of a file's tables, for the first thing that is wrong in them."""
-    # a misspelt key says more than the field that is missing because of it
-    first = min(
-        error.errors(),
-        key=lambda e: e["type"] != "extra_forbidden" and "sizes" not in e["loc"],
-    )
-    cause = first.get("ctx", {}).get("error")
-    if isinstance(cause, UnfitError):
-        return InputError(cause.what, f"{where}: {cause.field}", cause.remedy)
-    path = [*first["loc"]]
-    keys = [*_File.model_fields]
-    if path[0] == "group" and len(path) > 2:
-        where = _place(where, int(path[1]))
-        path = path[2:]
-        keys = [*_Group.model_fields]
-    branch = ""
-    if path[0] == "bed" and len(path) > 1:
-        branch = str(path.pop(1))
-    # tags of unions are no keys
-    names = [str(step) for step in path if step not in ("", "rows")]
-    name = ".".join(names)
-    value = first.get("input")
-    gone = _gone(name, value, where)
-    if gone is not None:
-        return gone
-    place = f"{where}: {name}"
-    if first["type"] == "missing":
-        return InputError(MISSING, place, "add it to the file")
-    if first["type"] != "extra_forbidden":
-        return not_accepted(value, first["msg"], place)
+    keys = {"": [*_File.model_fields], "group": [*_Group.model_fields]}
+    return explained(error, where, TABLES, keys, _hint)
+
+
+def _hint(names: Sequence[str], branch: str) -> tuple[str, str] | None:
+    """Say that a pile has a field, where it is of no bed of one grain."""
     if branch == "grain" and names[-1] in PileBed.model_fields:
-        remedy = 'a pile has it: kind = "pile"'
-        return InputError("a bed of one grain has none", place, remedy)
-    return InputError(UNKNOWN, place, meant(names, keys, TABLES))
-
-
-def _gone(name: str, value: Any, where: str) -> InputError | None:
-    """The refusal of a key or a value that study files had before.
-
-    It is None for any other.
-    """
-    if name in GONE_KEYS:
-        what, remedy = GONE_KEYS[name]
-        return InputError(what, f"{where}: {name}", remedy)
-    if isinstance(value, str) and (name, value) in GONE_VALUES:
-        what, remedy = GONE_VALUES[name, value]
-        return InputError(f"{value!r}: {what}", f"{where}: {name}", remedy)
+        return "a bed of one grain has none", 'a pile has it: kind = "pile"'
     return None
-
-
-def not_accepted(value: Any, message: str, place: str) -> InputError:
-    """Refuse a value, in the words of a study file.
-
-    Parameters
-    ----------
-    value
-        The value.
-    message
-        What pydantic says of it.
-    place
-        The file and the field.
-
-    Returns
-    -------
-    InputError
-        The refusal.
-    """
-    remedy = message.lower().replace("dictionary", "table").replace("tuple", "list")
-    if isinstance(value, str):
-        remedy = units.meant(value) or remedy
-    return InputError(f"{value!r} is not accepted", place, remedy)
-
-
-def meant(
-    names: Sequence[str], keys: Sequence[str], tables: Mapping[str, type[Part]]
-) -> str:
-    """Find the key that an unknown one is nearest to.
-
-    Parameters
-    ----------
-    names
-        The path of the unknown key.
-    keys
-        The keys of the file or of the group.
-    tables
-        The tables that they may be in.
-
-    Returns
-    -------
-    str
-        A question; where no key is near, the page that lists all.
-    """
-    here = ".".join(names[:-1])
-    written = {}
-    for key in keys:
-        if key not in tables:
-            written[key] = f"{key}, above the first table"
-    for table in reversed([*tables]):
-        for field in tables[table].model_fields:
-            written[field] = f"{table}.{field}"
-    if "method" in tables:
-        written["fidelity"] = FIDELITY
-    if here in tables:
-        keys = [*tables[here].model_fields]
-    for key in keys:
-        written[key] = key
-    close = difflib.get_close_matches(names[-1], written, n=1)
-    if not close:
-        return "known keys: docs/study-file.md"
-    return f"did you mean {written[close[0]]}?"

@@ -98,7 +98,7 @@ in gases, m."""
 USUAL_PA_S = ((1e-4, 0.1), (3e-6, 1e-4))
 """Usual dynamic viscosities of liquids and of gases, Pa s."""
 HIGHEST, LONGEST = 500.0, 1e4
-"""Height and length of a profile above which it is likelier in millimetres, m: the
+"""Height and length of a bed above which it is likelier in millimetres, m: the
 largest dunes are 500 m high."""
 
 WIDEST = 0.5  # diameter in a sieve table from which it is likelier in millimetres, m
@@ -266,8 +266,8 @@ def _of_fluid(
     return []
 
 
-def of_profile(name: str, length: float, height: float) -> str:
-    """Ask about a bed line of a length and a height that no bed has.
+def of_bed(name: str, length: float, height: float) -> str:
+    """Ask about a bed line or a surface of a length and a height that no bed has.
 
     Parameters
     ----------
@@ -281,7 +281,7 @@ def of_profile(name: str, length: float, height: float) -> str:
     Returns
     -------
     str
-        The question; empty for any other bed line.
+        The question; empty for any other.
     """
     if length <= LONGEST and height <= HIGHEST:
         return ""

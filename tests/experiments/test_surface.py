@@ -9,11 +9,11 @@ import pandas as pd
 import pytest
 from PIL import Image
 
-from orchestrator.bed import raster
-from orchestrator.bed.surface import cone
 from orchestrator.cli import main
-from orchestrator.experiments import erosion, surfaces
+from orchestrator.experiments import erosion
 from orchestrator.grains import onset
+from orchestrator.study import raster, surface_study
+from orchestrator.study.surface import cone
 
 pytestmark = pytest.mark.long
 
@@ -76,7 +76,7 @@ def test_the_stress_of_a_cone_is_that_of_flow_around_a_hill(
 
 
 def test_each_face_moves_by_the_closed_form(folder: Path, faces: pd.DataFrame) -> None:
-    study = surfaces.load(folder.parent / "cone.toml")
+    study = surface_study.load(folder.parent / "cone.toml")
     assert study is not None
     (scene,) = study.scenes
     row = faces.iloc[len(faces) // 3]

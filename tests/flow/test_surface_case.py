@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.bed.surface import Surface, cone, surface_of
 from orchestrator.errors import SolverError, Stalled
 from orchestrator.flow.case import DIAGNOSTICS
 from orchestrator.flow.foam import BED_FLOW, SolvedFlow
@@ -22,6 +21,7 @@ from orchestrator.flow.surface_case import (
 from orchestrator.flow.surface_stress import SurfaceStress
 from orchestrator.runs import case
 from orchestrator.runs.case import templates
+from orchestrator.study.surface import Surface, cone, surface_of
 from orchestrator.types import FloatArray
 from tests.conftest import Shared
 from tests.flow.conftest import allrun, edit

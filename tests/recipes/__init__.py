@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from orchestrator.bed import surface
 from orchestrator.bed.poured import BED, PouredBed
 from orchestrator.flow import theory
 from orchestrator.flow.case import WALL_STRESS, FlowCase
@@ -28,7 +27,7 @@ from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile, PileCase, Worn, WornFlow
 from orchestrator.runs.case import Case, template_files
 from orchestrator.runs.files import canonical_json, digest_files, digest_text
-from orchestrator.study import study
+from orchestrator.study import study, surface
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.types import FloatArray

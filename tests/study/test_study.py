@@ -317,10 +317,10 @@ def test_a_level_bed_has_no_height(bed: str) -> None:
 
 SOLVERS = """
 import sys
-from orchestrator.experiments import surfaces
+from orchestrator.study import surface_study
 from orchestrator.study import study
 for name in study.presets():
-    assert (surfaces.load(name) or study.load(name)).scenes
+    assert (surface_study.load(name) or study.load(name)).scenes
 print(*set(sys.modules) & {"orchestrator.flow", "orchestrator.solvers", "gmsh", "pyvista"})
 """
 

@@ -10,8 +10,7 @@ from orchestrator.calculator import PARAMETERS
 from orchestrator.calculator.asked import thresholds_and_questions
 from orchestrator.calculator.cli import OPTIONS
 from orchestrator.errors import InputError
-from orchestrator.experiments import surfaces
-from orchestrator.study import study, units
+from orchestrator.study import study, surface_study, units
 from orchestrator.study.parts import PileBed
 from orchestrator.study.source import presets
 
@@ -95,7 +94,7 @@ def test_a_study_asks_about_numbers_that_are_usual_in_another_unit(
 
 @pytest.mark.parametrize("name", presets())
 def test_presets_are_asked_nothing(name: str) -> None:
-    assert (surfaces.load(name) or study.load(name)).questions == ()
+    assert (surface_study.load(name) or study.load(name)).questions == ()
 
 
 def test_a_study_and_the_command_ask_alike() -> None:

@@ -43,8 +43,6 @@ STEEPEST_DEG = 60.0
 """Slope beyond which no mesh of upright columns follows the bed."""
 FORM_NODES = 12
 """Fewest nodes of a raster above half the height of the form."""
-LONGEST, HIGHEST = 2e4, 500.0
-"""Extent and height of a surface above which it is likelier in millimetres, m."""
 OF_GROUND = 0.01
 """Height over that of the form from which a place is a part of it, not of the
 ground."""
@@ -106,6 +104,11 @@ class Surface:
         along_x = float(np.ptp(self.x)) / (len(self.x) - 1)
         along_y = float(np.ptp(self.y)) / (len(self.y) - 1)
         return along_x, along_y
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Lengths of the raster along x and along y, m."""
+        return float(np.ptp(self.x)), float(np.ptp(self.y))
 
     @property
     def relief(self) -> float:
@@ -371,7 +374,7 @@ def _place(raster: Raster, row: int, column: int) -> str:
 
 
 def _check_size(raster: Raster, where: str) -> None:
-    """Refuse a raster of too few or too many cells, or of an extent that no bed has."""
+    """Refuse a raster of too few or too many cells."""
     rows, columns = raster.z.shape
     size = f"{columns} x {rows} cells"
     if min(rows, columns) < FEWEST:
@@ -380,11 +383,6 @@ def _check_size(raster: Raster, where: str) -> None:
     if raster.z.size > MOST_NODES:
         what = f"{size} are more than {MOST_NODES}"
         remedy = "resample it to larger cells, with gdalwarp -tr"
-        raise InputError(what, where, remedy)
-    extent = max(float(np.ptp(raster.x)), float(np.ptp(raster.y)))
-    if extent > LONGEST:
-        what = f"it is {extent:.4g} m wide, more than {LONGEST:g}"
-        remedy = "in millimetres or feet? Write x, y and z in m, or cut it"
         raise InputError(what, where, remedy)
 
 
@@ -420,14 +418,10 @@ def _rim(is_outside: BoolArray) -> BoolArray:
 
 
 def _check_relief(relief: float, depth: float, where: str) -> None:
-    """Refuse a surface that is no form on the ground, or one that is too high."""
+    """Refuse a surface that is no form on the ground."""
     if relief <= max(depth, 0.0):
         what = f"it is {relief:.3g} m higher than its rim, and {depth:.3g} m deeper"
         raise InputError(what, where, "a form must rise from the ground around it")
-    if relief > HIGHEST:
-        what = f"it is {relief:.4g} m high, more than {HIGHEST:g}"
-        remedy = "in millimetres or feet? Write x, y and z in m"
-        raise InputError(what, where, remedy)
 
 
 def _check_cells(raster: Raster, above: FloatArray, where: str) -> None:

@@ -12,9 +12,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orchestrator.bed.surface import FEWEST, MOST_NODES, Raster, Surface, Tags, checked
 from orchestrator.errors import InputError
 from orchestrator.study.profile import decoded, read_bytes
+from orchestrator.study.surface import (
+    FEWEST,
+    MOST_NODES,
+    Raster,
+    Surface,
+    Tags,
+    checked,
+)
 from orchestrator.types import FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -243,21 +250,30 @@ def _check_stl(content: bytes, where: str) -> None:
 
 def _seen_from_above(path: Path, where: str) -> FloatArray:
     """The vertices of the triangles of an STL file that are seen from above, (n, 3)."""
-    import pyvista
+    import meshio
 
     remedy = "is it an STL file of a surface, seen from above?"
     try:
-        mesh: Any = pyvista.read(path)
+        with warnings.catch_warnings():
+            # the count of triangles that it reads in a text overflows
+            warnings.simplefilter("ignore")
+            mesh = meshio.stl.read(path)
+        triangles = mesh.cells_dict["triangle"]
     except Exception as error:  # a reader of another library raises what it likes
-        raise InputError(f"not readable: {error}", where, remedy) from None
-    if not mesh.n_cells:
-        raise InputError("it has no triangle", where, remedy)
-    corners = np.asarray(mesh.points, float)[mesh.regular_faces]
+        what = str(error) or "its lines are not whole triangles"
+        raise InputError(f"not readable: {what}", where, remedy) from None
+    if not np.isfinite(mesh.points).all():
+        raise InputError("a vertex is not a number", where, remedy)
+    corners = mesh.points.astype(float)[triangles]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    up = normal[:, 2]
-    if mesh.n_open_edges:
-        up = np.abs(up)
-    # the sides and the bottom of a closed body are no bed
+    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    _, counts = np.unique(edges, axis=0, return_counts=True)
+    up = np.abs(normal[:, 2])
+    if (counts > 1).all():
+        # the sides and the bottom of a closed body are no bed; the normals of a body
+        # with a volume below 0 are inwards
+        volume = (corners[:, 0] * normal).sum()
+        up = np.sign(volume) * normal[:, 2]
     is_upper = up > 1e-6 * np.linalg.norm(normal, axis=1)
     points = np.unique(corners[is_upper].reshape(-1, 3), axis=0)
     if len(points) < FEWEST**2:

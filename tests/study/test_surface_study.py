@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.bed.raster import geotiff
-from orchestrator.bed.surface import cone
 from orchestrator.errors import InputError
-from orchestrator.experiments import surfaces
+from orchestrator.study import surface_study
+from orchestrator.study.raster import geotiff
+from orchestrator.study.surface import cone
 
 FILE = """
 [fluid]
@@ -25,10 +25,10 @@ slope_deg = 30
 """
 
 
-def load(folder: Path, text: str) -> surfaces.SurfaceStudy:
+def load(folder: Path, text: str) -> surface_study.SurfaceStudy:
     path = folder / "pile.toml"
     path.write_text(text)
-    found = surfaces.load(path)
+    found = surface_study.load(path)
     assert found is not None
     return found
 
@@ -67,7 +67,7 @@ def test_smoothing_of_more_cells_is_another_surface(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["cone", "oval", "barchan"])
 def test_the_presets_are_studies(name: str) -> None:
-    study = surfaces.load(name)
+    study = surface_study.load(name)
     assert study is not None
     assert study.scenes[0].bed.shape == name
     assert study.questions == ()
@@ -75,7 +75,7 @@ def test_the_presets_are_studies(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["stockpile", "first-look"])
 def test_other_studies_are_none_of_surfaces(name: str) -> None:
-    assert surfaces.load(name) is None
+    assert surface_study.load(name) is None
 
 
 @pytest.mark.parametrize(
@@ -85,8 +85,12 @@ def test_other_studies_are_none_of_surfaces(name: str) -> None:
         ('shape = "cone"', 'shape = "pyramid"', "bed.shape: 'pyramid' is not accepted"),
         ('shape = "cone"', "", "bed.surface: give either a file or a shape"),
         ("height = 10", "height = 10\nlength = 3", "bed.length: a cone has none"),
-        ('"flow.from_deg"', '"flow.to_deg"', "axes.flow.to_deg: no field of a surface"),
-        ("[0, 90.0]", "[0, 400]", "flow.from_deg: 400.0 is not accepted"),
+        (
+            '"flow.from_deg"',
+            '"flow.to_deg"',
+            r"flow.to_deg: unknown key \(did you mean from",
+        ),
+        ("[0, 90.0]", "[0, 400]", "flow.from_deg: 400 is not accepted"),
         ("diameter = 1e-3", "", "grain.diameter: is missing"),
         (
             "diameter = 1e-3",
@@ -96,7 +100,7 @@ def test_other_studies_are_none_of_surfaces(name: str) -> None:
         (
             "diameter = 1e-3",
             "diameter = 1e-3\ndensity = 1.0",
-            "grain.density: not above the fluid's",
+            "1 kg/m3: did you mean 1 g/cm3.*else: not above the fluid's",
         ),
         (
             "height = 10",
@@ -124,12 +128,32 @@ def test_other_studies_are_none_of_surfaces(name: str) -> None:
         (
             "[axes]",
             '[method]\nkind = "dem"\n[axes]',
-            "method: a surface has",
+            "method.kind: beds in a plane alone have it",
         ),
         (
             "[axes]",
             '[forces]\nlaw = "paper"\n[axes]',
             "forces.law: 'paper' is no law of a surface",
+        ),
+        (
+            "[axes]",
+            '[forces]\nlaw = "briged"\n[axes]',
+            "forces.law: 'briged' is not accepted",
+        ),
+        ("[axes]", "[threshold]\n[axes]", "threshold: beds in a plane alone have it"),
+        ('"flow.from_deg"', '"from_deg"', "axes.from_deg: not a table and a field"),
+        ("height = 10", 'height = 10\nroughness = "k/30"', "bed.roughness: 'k/30' is"),
+        ("height = 10", "height = 10\nsurface = 3", "bed.surface: 3 is not accepted"),
+        ("[axes]", "[method]\nflow = 3\n[axes]", "method.flow: 3 is not accepted"),
+        (
+            "diameter = 1e-3",
+            "diameter = 15.0",
+            "grain.diameter: 15 m: did you mean 15 mm.*else: 15.0 is not accepted",
+        ),
+        (
+            'shape = "cone"',
+            'shape = "oval"\nlength = 3.0\nwidth = 5.0',
+            "bed.length: it is less than the width",
         ),
         (
             "[axes]",
@@ -148,6 +172,13 @@ def test_wrong_fields_are_refused_with_their_names(
     assert caught.value.remedy
 
 
+def test_a_confirmed_unit_is_not_asked_about(tmp_path: Path) -> None:
+    text = FILE.replace("[fluid]", "[forces]\nlift_coefficient = 6.5\n[fluid]")
+    (asked,) = load(tmp_path, text).questions
+    assert asked.startswith("6.5: did you mean Saffman's")
+    assert load(tmp_path, f"units_confirmed = true\n{text}").questions == ()
+
+
 def test_a_hole_in_a_raster_names_file_and_field(tmp_path: Path) -> None:
     heap = cone(10.0, 30.0)
     heap.z[80, 80] = np.nan
@@ -155,3 +186,32 @@ def test_a_hole_in_a_raster_names_file_and_field(tmp_path: Path) -> None:
     shape = 'shape = "cone"\nheight = 10\nslope_deg = 30'
     with pytest.raises(InputError, match=r"bed.surface: .*heap.tif: a hole at x = "):
         load(tmp_path, FILE.replace(shape, 'surface = "heap.tif"'))
+
+
+def of_file(folder: Path, scale: float, slope_deg: float = 30.0) -> str:
+    """A study file on an XYZ file of a cone, which says nothing of units."""
+    heap = cone(10.0, slope_deg)
+    x, y = np.meshgrid(heap.x, heap.y)
+    points = scale * np.column_stack([x.ravel(), y.ravel(), heap.z.ravel()])
+    np.savetxt(folder / "heap.xyz", points, fmt="%.9g")
+    shape = 'shape = "cone"\nheight = 10\nslope_deg = 30'
+    return FILE.replace(shape, 'surface = "heap.xyz"')
+
+
+def test_a_surface_that_is_likelier_in_millimetres_is_to_be_confirmed(
+    tmp_path: Path,
+) -> None:
+    text = of_file(tmp_path, 1000.0)
+    asked = r"bed.surface: heap.xyz is .* 1e\+04 m high: did you mean mm, .* 10 m high?"
+    with pytest.raises(InputError, match=asked) as caught:
+        load(tmp_path, text)
+    assert "units_confirmed = true" in str(caught.value.remedy)
+    confirmed = load(tmp_path, f"units_confirmed = true\n{text}")
+    assert confirmed.scenes[0].heights.relief == pytest.approx(1e4)
+
+
+def test_the_name_of_a_file_says_which_lengths_were_understood(tmp_path: Path) -> None:
+    # heights of 33 ft over lengths in feet have the slopes of 10 m: nothing tells them
+    scene = load(tmp_path, of_file(tmp_path, 1 / 0.3048)).scenes[0]
+    width = f"{np.ptp(cone(10.0, 30.0).x) / 0.3048:.4g}"
+    assert scene.name.startswith(f"heap.xyz, {width} m by {width} m, 32.81 m high")

@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.bed import raster
-from orchestrator.bed.raster import geotiff, read_surface
-from orchestrator.bed.surface import (
+from orchestrator.errors import InputError
+from orchestrator.study import raster
+from orchestrator.study.raster import geotiff, read_surface
+from orchestrator.study.surface import (
     Raster,
     Surface,
     Tags,
@@ -17,7 +18,6 @@ from orchestrator.bed.surface import (
     cone,
     oval,
 )
-from orchestrator.errors import InputError
 from orchestrator.types import FloatArray
 
 EAST, NORTH = 512_000.0, 5_640_000.0
@@ -216,7 +216,7 @@ def test_a_rim_that_is_nearly_level_is_tapered_and_said() -> None:
     ("change", "message"),
     [
         (lambda z: z + np.linspace(-3, 3, 80), "its rim is not level: at x = 5120"),
-        (lambda z: 1000 * z, "in millimetres or feet?"),
+        (lambda z: 1000 * z, "a slope of 90 deg .*x, y and z all in m?"),
         (lambda z: 20 * (z - 100), "a slope of"),
         (lambda z: np.full_like(z, 100.0), "it is 0 m higher than its rim"),
         (lambda z: 200.0 - z, "m higher than its rim, and 5.95 m deeper"),
@@ -264,6 +264,56 @@ def test_files_that_are_no_raster_are_refused(
         read_surface(path, WHERE)
     assert str(caught.value).startswith(WHERE)
     assert caught.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("vertex", "message"),
+    [
+        ("1 0 zz", "could not convert string to float: 'zz'"),
+        ("1 0 nan", "a vertex is not a number"),
+        ("1 0", "not readable"),
+        ("1 0 0", "3 vertices are no surface"),
+    ],
+)
+def test_a_damaged_text_of_stl_is_refused_in_one_line(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], vertex: str, message: str
+) -> None:
+    triangle = f"""solid hill
+facet normal 0 0 1
+outer loop
+vertex 0 0 0
+vertex {vertex}
+vertex 0 1 0
+endloop
+endfacet
+endsolid hill
+"""
+    path = tmp_path / "hill.stl"
+    path.write_text(triangle)
+    with pytest.raises(InputError, match=message):
+        read_surface(path, WHERE)
+    # no reader of another library says anything of its own
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("is_inward", [False, True])
+def test_the_sides_and_the_bottom_of_a_closed_body_are_no_bed(
+    tmp_path: Path, is_inward: bool
+) -> None:
+    import pyvista
+
+    of = hill()
+    x, y = np.meshgrid(of.x - EAST, of.y - NORTH)
+    east, north = (np.stack([part, part], axis=-1) for part in (x, y))
+    heights = np.stack([0 * of.z - 100, of.z], axis=-1)
+    # some programs write the normals of a body inwards
+    order = slice(None, None, -1 if is_inward else 1)
+    body = pyvista.StructuredGrid(east, north, heights[..., order])
+    path = tmp_path / "hill.stl"
+    body.extract_surface(algorithm="dataset_surface").triangulate().save(path)
+    found = read_surface(path, WHERE)
+    assert found.volume == pytest.approx(checked(of, WHERE).volume, rel=5e-3)
+    assert found.level == pytest.approx(100.0, abs=0.1)
 
 
 def test_points_off_the_grid_are_refused_with_their_line(tmp_path: Path) -> None:
