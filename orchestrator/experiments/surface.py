@@ -50,6 +50,13 @@ from orchestrator.study.surface_study import SurfaceStudy
 from orchestrator.types import FloatArray
 
 WIND = "wind at 10 m, m/s,"
+HEADINGS = {
+    "from_deg": "wind from, °",
+    "x_m": "first at x, m",
+    "y_m": "y, m",
+    "z_m": "z, m",
+}
+"""Columns of directions as the page calls them."""
 MOST_SHARE = 0.95
 """Share of the surface up to which it is drawn against the wind."""
 
@@ -240,7 +247,9 @@ def sections(found: Sequence[Answer], source: str) -> list[Section]:
     listed: list[Section] = []
     for number, answer in enumerate(found, 1):
         listed += _sections(answer, f"-{number}" if len(found) > 1 else "", source)
-    table = tables(found)["directions"]
+    table = tables(found)["directions"].rename(columns=HEADINGS)
+    if len(found) == 1:
+        table = table.drop(columns="surface")  # the card names it
     card = surface_card.card(found, source)
     listed[0] = replace(listed[0], tables=[table], card=card)
     return [*listed, Section("How sure it is", words["sure"])]

@@ -24,9 +24,12 @@ EXCEEDED = {
 LITTLE = 0.005
 """Share of the surface that is not worth a word."""
 NOT_MEASURED = (
-    "Wall stress over a bed in three dimensions has not been measured; the wind over "
-    "Askervein hill is met within 0.04 to 0.12 of the reference speed."
+    "Wall stress over a bed in three dimensions has not been measured; the wind at the "
+    "masts of Askervein hill is met within {:.2f} to {:.2f} of the reference speed, in "
+    "root mean square."
 )
+RMS = "rms of the differences"
+"""Its quantity in the table, of each line of masts."""
 INTERVAL_OF = "other first cells, meshes and models, on a cone"
 WORTH = Worth(
     "care",
@@ -62,7 +65,7 @@ def card(found: Sequence[Answer], source: str) -> Card:
         "In which wind does this surface start to move, and how much of it moves?",
         f"{first.name}; {_grain(first, source)}; {winds}{others}.",
         tuple(_numbers(first)),
-        NOT_MEASURED,
+        NOT_MEASURED.format(*_ends_at_masts()),
         WORTH,
     )
 
@@ -146,6 +149,13 @@ def factors_of_wind(share: float) -> tuple[float, float]:
     is_meant = (table["part"] == "interval") & (table["quantity"] == EXCEEDED[share])
     factors = table["compared_with"][is_meant] / table["value"][is_meant]
     return min(1.0, float(factors.min())), max(1.0, float(factors.max()))
+
+
+def _ends_at_masts() -> tuple[float, float]:
+    """The least and the largest difference of all lines of masts."""
+    table = pd.read_csv(SURFACES)
+    rms = table["value"][table["quantity"] == RMS]
+    return float(rms.min()), float(rms.max())
 
 
 def _place(answer: Answer) -> str:

@@ -18,8 +18,10 @@ COLUMNS = 3
 """Maps beside each other, at most."""
 MOST_MAPS = 9
 """Maps of a figure, at most."""
-PANEL = 2.5
-"""Height of a map, inches."""
+PANEL, LONE_PANEL = 2.2, 3.6
+"""Height of a map among others and of one alone, at most, inches."""
+BESIDE, BELOW, TITLE = 1.6, 0.5, 0.3
+"""Room beside all maps, below them and above each, inches."""
 MARGIN = 0.12
 """Room around the form on a map, over its extent."""
 NICE = (1.0, 2.0, 5.0)
@@ -135,8 +137,7 @@ def figure(
     drawn = maps[:MOST_MAPS]
     columns = min(len(drawn), COLUMNS)
     lines = -(-len(drawn) // columns)
-    height = PANEL if columns > 1 else 1.6 * PANEL
-    canvas = style.canvas(lines * height + 0.5)
+    canvas = _canvas(grid, columns, lines)
     panels = canvas.subplots(lines, columns, squeeze=False, sharex=True, sharey=True)
     norm = _norm([each.values for each in drawn], middle)
     every = panels.ravel().tolist()
@@ -164,6 +165,16 @@ def figure(
     _frame(axes, columns, grid)
     canvas.colorbar(image, ax=axes, label=label, shrink=0.8, pad=0.02)
     return canvas
+
+
+def _canvas(grid: Grid, columns: int, lines: int) -> Canvas:
+    """A canvas as wide and high as its maps are."""
+    (left, right), (bottom, top) = _limits(grid)
+    aspect = (right - left) / (top - bottom)
+    height = PANEL if columns > 1 else LONE_PANEL
+    height = min(height, (style.WIDTH - BESIDE) / (columns * aspect))
+    width = min(BESIDE + columns * height * aspect, style.WIDTH)
+    return style.canvas(lines * (height + TITLE) + BELOW, width)
 
 
 def _norm(values: Sequence[FloatArray], middle: float | None) -> Normalize:
@@ -221,14 +232,21 @@ def _arrow(ax: Axes, start: tuple[float, ...], end: tuple[float, ...]) -> None:
     )
 
 
-def _frame(axes: Sequence[Axes], columns: int, grid: Grid) -> None:
-    """Limits and labels of the maps; a scale and the north on the first of them."""
+def _limits(grid: Grid) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Ends of a map along x and along y, m: the form, and room for arrows above it."""
     rows, places = np.nonzero(grid.is_form)
     east, north = grid.x[places], grid.y[rows]
     room = MARGIN * max(float(np.ptp(east)), float(np.ptp(north)))
+    along_x = (float(east.min()) - room, float(east.max()) + room)
+    return along_x, (float(north.min()) - room, float(north.max()) + 2 * room)
+
+
+def _frame(axes: Sequence[Axes], columns: int, grid: Grid) -> None:
+    """Limits and labels of the maps; a scale and the north on the first of them."""
     first = axes[0]
-    first.set_xlim(float(east.min()) - room, float(east.max()) + room)
-    first.set_ylim(float(north.min()) - room, float(north.max()) + 2 * room)
+    along_x, along_y = _limits(grid)
+    first.set_xlim(along_x)
+    first.set_ylim(along_y)
     last = columns * ((len(axes) - 1) // columns)
     for number, ax in enumerate(axes):
         ax.set_aspect("equal")

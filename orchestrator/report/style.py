@@ -125,6 +125,8 @@ class Figure:
         Whether it has the whole width of the page.
     number
         A number that others gave it, such as that of the paper.
+    part
+        Its width over that of the page.
     """
 
     name: str
@@ -138,6 +140,7 @@ class Figure:
     leads: bool = False
     wide: bool = False
     number: str = ""
+    part: float = 1.0
 
     @cached_property
     def canvas(self) -> Canvas | None:
@@ -183,20 +186,22 @@ def palette(column: str, values: Sequence[float]) -> dict[float, str]:
     return colours
 
 
-def canvas(height: float) -> Canvas:
-    """Make an empty figure of full width.
+def canvas(height: float, width: float = WIDTH) -> Canvas:
+    """Make an empty figure.
 
     Parameters
     ----------
     height
         Its height, inches.
+    width
+        Its width, inches; by default that of the page.
 
     Returns
     -------
     matplotlib.figure.Figure
         The figure, laid out when it is drawn.
     """
-    return Canvas(figsize=(WIDTH, height), layout="compressed")
+    return Canvas(figsize=(width, height), layout="compressed")
 
 
 def grid(
@@ -442,7 +447,8 @@ def saved(figure: Figure, folder: Folder, *, png: bool = False) -> Figure:
         drawn.set_layout_engine("none")  # it is laid out now
     vector = svg(drawn)
     folder.put(f"{FIGURES}/{figure.name}.svg", vector)
-    return replace(figure, drawing=None, image=raster if png else vector)
+    part = round(float(drawn.get_figwidth()) / WIDTH, 3)
+    return replace(figure, drawing=None, image=raster if png else vector, part=part)
 
 
 def _png(drawn: Canvas) -> bytes:

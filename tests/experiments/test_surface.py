@@ -1,5 +1,6 @@
 """From a surface to its maps: a real flow over a coarse cone, and what is made of it."""
 
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -158,3 +159,17 @@ def test_erosion_of_a_cone_stands_beside_that_of_ap42(
     whole = own[own["part"] == "all"]
     assert len(classes) == len(erosion.CLASSES)
     assert whole[classes].to_numpy(float).sum() == pytest.approx(100.0)
+
+
+def test_the_page_of_one_surface_names_it_on_the_card_alone(folder: Path) -> None:
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    heads = re.findall(r'<th scope="col">(.*?)</th>', page)
+    assert heads[:3] == [
+        "wind from<small>°</small>",
+        "starts<small>m/s</small>",
+        "first at x<small>m</small>",
+    ]
+    # the map is as wide as it has something to show
+    (part,) = re.findall(r'figures/least.svg"><img[^>]*--part:([\d.]+)"', page)
+    assert 0.4 < float(part) < 0.8
+    assert "within 0.06 to 0.13 of the reference speed" in page

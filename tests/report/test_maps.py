@@ -74,3 +74,21 @@ def test_each_map_has_its_contours_the_wind_north_and_a_scale() -> None:
 )
 def test_round_numbers_are_not_above_a_length(length: float, round_one: float) -> None:
     assert maps.nice(length) == round_one
+
+
+@pytest.mark.parametrize(("stretched", "width"), [(1.0, 1.0), (4.0, 1.0), (0.25, 0.45)])
+def test_a_figure_is_no_wider_and_no_higher_than_its_map(
+    stretched: float, width: float
+) -> None:
+    of = grid()
+    x = EAST + stretched * (of.x - EAST)
+    wide = Grid(x, of.y, of.height, of.is_form)
+    with style.settings():
+        canvas = maps.figure(wide, [Map("", of.height)], "m")
+        canvas.draw_without_rendering()
+    assert canvas.get_figwidth() <= width * style.WIDTH
+    panel, _ = canvas.axes
+    box = panel.get_window_extent()
+    # what is left is for labels, the title and the scale of colours
+    room = canvas.bbox.width - box.width, canvas.bbox.height - box.height
+    assert max(room) < 1.9 * canvas.dpi
