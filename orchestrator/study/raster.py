@@ -104,23 +104,26 @@ def _of_grid(text: str, name: str, where: str) -> Raster:
         if key not in header:
             remedy = "its head has ncols, nrows, xllcorner, yllcorner, cellsize"
             raise InputError(f"{key} is missing", where, remedy)
-    columns = int(header["ncols"])
-    rows = int(header["nrows"])
+    columns, rows = header["ncols"], header["nrows"]
     values = _numbers(lines[first:], first, where)
-    if columns < FEWEST or rows < FEWEST or columns * rows != len(values):
-        what = f"{len(values)} heights, not {columns} x {rows}"
+    is_whole = columns % 1 == 0 and columns * rows == len(values)
+    if not (is_whole and min(columns, rows) >= FEWEST):
+        what = f"{len(values)} heights, not {columns:.9g} x {rows:.9g}"
         remedy = f"nrows lines of ncols numbers, {FEWEST} of each at least"
         raise InputError(what, where, remedy)
+    columns, rows = int(columns), int(rows)
     heights = np.array(values).reshape(rows, columns)[::-1]
     heights = np.where(heights == header.get("nodata_value", -9999.0), np.nan, heights)
     step = header["cellsize"]
-    if not step > 0:
+    if not 0 < step < np.inf:
         raise InputError(f"cellsize {step:g}", where, "it is in m, above 0")
     axes = []
     for axis, count in (("x", columns), ("y", rows)):
         start = header.get(f"{axis}llcenter")
         if start is None:
             start = header.get(f"{axis}llcorner", 0.0) + step / 2
+        if not np.isfinite(start):
+            raise InputError(f"{axis}llcorner {start:g}", where, "it is in m")
         axes.append(_steps(start, step, count))
     return Raster(name, axes[0], axes[1], heights)
 
@@ -164,11 +167,16 @@ def _of_points(text: str, name: str, where: str) -> Raster:
         words = line.replace(",", " ").replace(";", " ").split()
         if not words or words[0].startswith("#"):
             continue
+        place = f"{where}: line {number}"
         is_head = not rows and not all(map(_is_number, words))
         if is_head:
+            names = [word.strip("\"'").lower() for word in words]
+            if {*"xyz"} <= {*names} and names[:3] != [*"xyz"]:
+                what = f"the columns are {', '.join(names)}"
+                raise InputError(what, place, "the first three must be x, y and z")
             continue
-        if len(words) < 3 or not all(map(_is_number, words[:3])):
-            place = f"{where}: line {number}"
+        is_point = len(words) >= 3 and all(map(_is_number, words[:3]))
+        if not (is_point and all(np.isfinite([float(word) for word in words[:2]]))):
             remedy = "x, y and z in m, with a decimal point"
             raise InputError(f"{line.strip()!r} is no point", place, remedy)
         rows.append([float(word) for word in words[:3]])
@@ -283,7 +291,7 @@ def _seen_from_above(path: Path, where: str) -> FloatArray:
 
 def _of_geotiff(content: bytes, name: str, where: str) -> Raster:
     """The raster of a GeoTIFF of one band."""
-    from PIL import Image
+    from PIL import Image, UnidentifiedImageError
 
     try:
         with warnings.catch_warnings():
@@ -296,8 +304,11 @@ def _of_geotiff(content: bytes, name: str, where: str) -> Raster:
                 raise InputError(what, where, remedy)
             image.load()
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        what = f"no readable GeoTIFF: {error}"
+        if isinstance(error, UnidentifiedImageError):
+            what = "no readable GeoTIFF: it is cut off, or another kind of file"
         remedy = "heights are one band: gdal_translate -b 1 -ot Float32"
-        raise InputError(f"no readable GeoTIFF: {error}", where, remedy) from None
+        raise InputError(what, where, remedy) from None
     if len(image.getbands()) != 1 or image.mode in ("P", "1", "L"):
         what = f"its pixels are {image.mode}, a picture, not heights"
         raise InputError(what, where, "export the elevation model, not its picture")

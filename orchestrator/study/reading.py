@@ -43,6 +43,8 @@ ASKED = (
 """The fields that are asked about where their numbers are usual in another unit."""
 CONFIRMED = "write units_confirmed = true at the top of the study file"
 """What accepts a bed of an unusual size."""
+TAGS = ("", "rows", "float", "str")
+"""Names of the members of unions, which are no keys."""
 Hint = Callable[[Sequence[str], str], tuple[str, str] | None]
 """Says of the path of an unknown key, and of the kind of its bed, what is wrong and
 what to do; None where it is no more than unknown."""
@@ -316,8 +318,7 @@ def explained(
     branch = ""
     if path[0] == "bed" and path[1:] and path[1] in ("grain", "pile"):
         branch = str(path.pop(1))
-    # tags of unions are no keys
-    names = [str(step) for step in path if step not in ("", "rows")]
+    names = [str(step) for step in path if step not in TAGS]
     name = ".".join(names)
     value = first.get("input")
     gone = _gone(name, value, where)
@@ -352,6 +353,8 @@ def _gone(name: str, value: Any, where: str) -> InputError | None:
 def _not_accepted(value: Any, message: str, place: str) -> InputError:
     """The refusal of a value, in the words of a study file."""
     remedy = message.lower().replace("dictionary", "table").replace("tuple", "list")
+    if "an instance of" in remedy:
+        remedy = "write the name of a file, in quotes"
     if isinstance(value, str):
         remedy = units.meant(value) or remedy
     return InputError(f"{value!r} is not accepted", place, remedy)

@@ -17,6 +17,9 @@ OFF = 0.01
 """Largest difference of the sum of the shares from 1."""
 FASTEST = 150.0
 """Largest speed, m/s."""
+WINDIEST = 20.0
+"""Mean speed above which it is likelier in another unit, m/s: Cape Denison, of the
+windiest places, has 19."""
 FURTHEST_DEG = 30.0
 """Largest angle between a direction of a rose and the flow that answers it."""
 
@@ -42,6 +45,15 @@ class Rose:
 
     def __str__(self) -> str:
         return f"{self.name} ({self.digest[:12]})"
+
+    @property
+    def question(self) -> str:
+        """A question on speeds that are likelier in another unit; empty for none."""
+        mean = sum(speed * share for _, speed, share in self.rows)
+        if mean <= WINDIEST:
+            return ""
+        what = f"the wind of {self.name} is {mean:.3g} m/s in the mean"
+        return f"{what}: did you mean km/h, {mean / 3.6:.3g} m/s?"
 
     def table(self, solved: Sequence[float], where: str) -> pd.DataFrame:
         """List the rose with the direction of the flow that answers each row.

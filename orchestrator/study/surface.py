@@ -334,6 +334,7 @@ def checked(raster: Raster, where: str) -> Surface:
     above = np.where(is_outside, 0.0, raster.z - level)
     relief = float(above.max())
     _check_relief(relief, -float(above.min()), where)
+    _check_units(raster, above, where)
     _check_cells(raster, above, where)
     rim = np.where(is_rim, above, 0.0)
     said = _check_rim(raster, rim, relief, where)
@@ -394,6 +395,11 @@ def _outside(raster: Raster, where: str) -> BoolArray:
     from scipy.ndimage import label
 
     is_empty = ~np.isfinite(raster.z)
+    rows, columns = np.nonzero(np.isinf(raster.z))
+    if len(rows):
+        place = _place(raster, rows[0], columns[0])
+        remedy = "mark cells without a height as NODATA"
+        raise InputError(f"the height at {place} is infinite", where, remedy)
     if is_empty.all():
         raise InputError("no cell has a height", where, "is its NODATA value right?")
     numbered, _ = label(is_empty)
@@ -422,6 +428,17 @@ def _check_relief(relief: float, depth: float, where: str) -> None:
     if relief <= max(depth, 0.0):
         what = f"it is {relief:.3g} m higher than its rim, and {depth:.3g} m deeper"
         raise InputError(what, where, "a form must rise from the ground around it")
+
+
+def _check_units(raster: Raster, above: FloatArray, where: str) -> None:
+    """Refuse a form whose sides are too steep in the median: a matter of units."""
+    by_y, by_x = np.gradient(above, raster.y, raster.x)
+    steepness = np.hypot(by_x, by_y)[above > above.max() / 4]
+    slope = float(np.degrees(np.arctan(np.median(steepness))))
+    if slope > STEEPEST_DEG:
+        what = f"its slopes are {slope:.0f} deg in the median, above {STEEPEST_DEG:g}"
+        remedy = "are x, y and z all in m? None may be in degrees, feet or millimetres"
+        raise InputError(what, where, remedy)
 
 
 def _check_cells(raster: Raster, above: FloatArray, where: str) -> None:

@@ -112,6 +112,8 @@ class SurfaceStudy:
     def questions(self) -> tuple[str, ...]:
         """Questions on numbers that are usual in another unit."""
         asked = units.questions(values_of(self.scenes), {})
+        if self.rose and self.rose.question:
+            asked.append(self.rose.question)
         if self.units_confirmed:
             asked = [one for one in asked if "?" not in one]  # remarks are left
         return tuple(asked)

@@ -22,6 +22,8 @@ from orchestrator.types import FloatArray
 
 EAST, NORTH = 512_000.0, 5_640_000.0
 WHERE = "pile.toml: bed.surface"
+WHOLE = "ncols 9\nnrows 9\ncellsize {}\nxllcorner {}\n" + 9 * f"{9 * '0 '}\n"
+"""An ESRI grid of level ground."""
 
 
 def hill(rows: int = 60, columns: int = 80, step: float = 0.5) -> Raster:
@@ -212,12 +214,20 @@ def test_a_rim_that_is_nearly_level_is_tapered_and_said() -> None:
     assert np.concatenate(edges) == pytest.approx(found.level, abs=1e-9)
 
 
+def wall(z: FloatArray) -> FloatArray:
+    """Heights of a level form with sides of 80 degrees on a raster of a hill."""
+    of = hill()
+    from_middle = np.hypot(of.x - of.x.mean(), (of.y - of.y.mean())[:, None])
+    return np.asarray(z.min() + 12 / (1 + np.exp(2 * (from_middle - 8))))
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         (lambda z: z + np.linspace(-3, 3, 80), "its rim is not level: at x = 5120"),
-        (lambda z: 1000 * z, "a slope of 90 deg .*x, y and z all in m?"),
-        (lambda z: 20 * (z - 100), "a slope of"),
+        (lambda z: 1000 * z, "its slopes are 90 deg in the median, above 60"),
+        (lambda z: 20 * (z - 100), "its slopes are 87 deg .*x, y and z all in m?"),
+        (wall, "a slope of 7. deg at x = 5120.* A wall or an overhang is no bed"),
         (lambda z: np.full_like(z, 100.0), "it is 0 m higher than its rim"),
         (lambda z: 200.0 - z, "m higher than its rim, and 5.95 m deeper"),
     ],
@@ -228,6 +238,13 @@ def test_heights_that_are_no_bed_are_refused(change: object, message: str) -> No
         checked(with_heights(hill(), change(hill().z)), WHERE)
     assert str(caught.value).startswith(WHERE)
     assert caught.value.remedy
+
+
+def test_a_height_that_is_infinite_is_no_missing_one() -> None:
+    of = hill()
+    of.z[0, 0] = np.inf
+    with pytest.raises(InputError, match="the height at x = 512000 m, y = 5640000 m"):
+        checked(of, WHERE)
 
 
 def test_a_bad_cell_is_refused_with_its_place() -> None:
@@ -247,10 +264,15 @@ def test_a_form_of_few_cells_is_refused() -> None:
     [
         ("a.xyz", "x y z\n1 2 3\n1 2 q\n", "line 3"),
         ("a.xyz", "0 0 0\n", "1 points are no surface"),
+        ("a.xyz", "z x y\n1 2 3\n", "line 1: the columns are z, x, y"),
+        ("a.xyz", "1 2 3\ninf 2 3\n", "line 2: 'inf 2 3' is no point"),
+        ("a.asc", "ncols 9.5\nnrows 9\ncellsize 1\n1 2 3\n", "3 heights, not 9.5 x 9"),
+        ("a.asc", WHOLE.format("inf", 0), "cellsize inf"),
+        ("a.asc", WHOLE.format(1, "nan"), "xllcorner nan"),
         ("a.asc", "ncols 9\nnrows 9\n1 2\n", "cellsize is missing"),
         ("a.asc", "ncols 9\nnrows 9\ncellsize 1\n1 2 x\n", "line 4: 'x' is no number"),
         ("a.asc", "ncols 9\nnrows 9\ncellsize 1\n1 2 3\n", "3 heights, not 9 x 9"),
-        ("a.tif", "no picture", "no readable GeoTIFF"),
+        ("a.tif", "no picture", "GeoTIFF: it is cut off, or another kind of file"),
         ("a.stl", "no triangles", "it is no whole STL file"),
         ("a.las", "points", "'.las' is of no surface"),
     ],

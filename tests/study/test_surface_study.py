@@ -143,7 +143,16 @@ def test_other_studies_are_none_of_surfaces(name: str) -> None:
         ("[axes]", "[threshold]\n[axes]", "threshold: beds in a plane alone have it"),
         ('"flow.from_deg"', '"from_deg"', "axes.from_deg: not a table and a field"),
         ("height = 10", 'height = 10\nroughness = "k/30"', "bed.roughness: 'k/30' is"),
-        ("height = 10", "height = 10\nsurface = 3", "bed.surface: 3 is not accepted"),
+        (
+            "height = 10",
+            "height = 10\nsurface = 3",
+            r"bed.surface: 3 is not accepted \(write the name of a file",
+        ),
+        (
+            "[axes]",
+            "[erosion]\nthreshold = nan\n[axes]",
+            "erosion.threshold: nan is not accepted",
+        ),
         ("[axes]", "[method]\nflow = 3\n[axes]", "method.flow: 3 is not accepted"),
         (
             "diameter = 1e-3",
@@ -215,3 +224,12 @@ def test_the_name_of_a_file_says_which_lengths_were_understood(tmp_path: Path) -
     scene = load(tmp_path, of_file(tmp_path, 1 / 0.3048)).scenes[0]
     width = f"{np.ptp(cone(10.0, 30.0).x) / 0.3048:.4g}"
     assert scene.name.startswith(f"heap.xyz, {width} m by {width} m, 32.81 m high")
+
+
+def test_a_wind_that_is_likelier_in_another_unit_is_asked_about(tmp_path: Path) -> None:
+    (tmp_path / "year.csv").write_text("from_deg,speed_m_s,share\n0,36,0.9\n0,0,0.1\n")
+    study = load(tmp_path, FILE + '[erosion]\nwind = "year.csv"\n')
+    (asked,) = study.questions
+    assert asked == (
+        "the wind of year.csv is 32.4 m/s in the mean: did you mean km/h, 9 m/s?"
+    )
