@@ -84,8 +84,8 @@ AT_MAST = "U/U_RS at 10 m"
 """The wind at a mast over that at the reference site."""
 
 
-class Row(dict[str, object]):
-    """A row of the table."""
+Row = Mapping[str, object]
+"""A row of the table of what was compared."""
 
 
 def row(part: str, name: str, quantity: str, value: float, beside: float) -> Row:
@@ -109,9 +109,8 @@ def row(part: str, name: str, quantity: str, value: float, beside: float) -> Row
     Row
         The row.
     """
-    return Row(
-        part=part, case=name, quantity=quantity, value=value, compared_with=beside
-    )
+    columns = {"part": part, "case": name, "quantity": quantity}
+    return {**columns, "value": value, "compared_with": beside}
 
 
 @dataclass(frozen=True)
@@ -301,15 +300,27 @@ def beside_the_first(
             yield row(part, name, quantity, value, found[first][quantity])
 
 
+def speeds(
+    one: SurfaceFlowCase, directory: Path, above: float, upright: FloatArray
+) -> FloatArray:
+    """Speed so far over each face of the bed, m/s, of the shape of its faces.
+
+    `upright` is the vertical part of the unit vectors along which the distance counts,
+    of a shape that broadcasts to it.
+    """
+    velocity = np.linalg.norm(one.velocity(directory), axis=-1)[1:]
+    away = one.mesh.over_bed[1:] * upright[..., None]
+    columns = [part.reshape(-1, part.shape[-1]) for part in (np.log(away), velocity)]
+    pairs = zip(*columns, strict=True)
+    found = [np.interp(np.log(above), up, speed) for up, speed in pairs]
+    return np.reshape(found, velocity.shape[:2])
+
+
 def speed_over_bed(one: SurfaceFlowCase, directory: Path, above: float) -> FloatArray:
     """Speed so far over each face of the bed along its normal, m/s, in their order."""
-    velocity = np.linalg.norm(one.velocity(directory), axis=-1)[1:]
-    speeds = velocity.reshape(-1, velocity.shape[-1])
-    stress, _ = one.stress(directory)
-    heights = one.mesh.over_bed[1:].reshape(speeds.shape)
-    away = heights * stress.normal[:, 2, None]
-    pairs = zip(np.log(away), speeds, strict=True)
-    return np.array([np.interp(np.log(above), up, speed) for up, speed in pairs])
+    along, across, _ = one.mesh.shape
+    upright = one.stress(directory)[0].normal[:, 2].reshape(along - 1, across)
+    return speeds(one, directory, above, upright).ravel()
 
 
 def reference_speed(one: SurfaceFlowCase, directory: Path) -> float:
@@ -369,29 +380,12 @@ def at_places(
     one: SurfaceFlowCase, directory: Path, places: FloatArray, above: float
 ) -> FloatArray:
     """Speed over some places in the axes of the file, m/s, linear between columns."""
-    velocity = np.linalg.norm(one.velocity(directory), axis=-1)[1:]
-    mesh = one.mesh
-    logs = np.log(mesh.over_bed[1:])
-    x = (mesh.x[1:] + mesh.x[:-1]) / 2
-    y = (mesh.y[1:] + mesh.y[:-1]) / 2
-    found = []
-    for along, across in (places - one.surface.centre) @ one.axes.T:
-        i = int(np.searchsorted(x, along)) - 1
-        j = int(np.searchsorted(y, across)) - 1
-        of_x = (along - x[i]) / (x[i + 1] - x[i])
-        of_y = (across - y[j]) / (y[j + 1] - y[j])
-        corners = {
-            (i, j): (1 - of_x) * (1 - of_y),
-            (i + 1, j): of_x * (1 - of_y),
-            (i, j + 1): (1 - of_x) * of_y,
-            (i + 1, j + 1): of_x * of_y,
-        }
-        parts = (
-            weight * np.interp(np.log(above), logs[at], velocity[at])
-            for at, weight in corners.items()
-        )
-        found.append(sum(parts))
-    return np.array(found)
+    from scipy.interpolate import RegularGridInterpolator
+
+    of_faces = speeds(one, directory, above, np.ones((1, 1)))
+    middles = [(lines[1:] + lines[:-1]) / 2 for lines in (one.mesh.x, one.mesh.y)]
+    over = RegularGridInterpolator(middles, of_faces)
+    return np.asarray(over((places - one.surface.centre) @ one.axes.T))
 
 
 @cache
