@@ -1,7 +1,7 @@
 """The flow over a surface from one direction as an OpenFOAM case."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from importlib.metadata import version as installed
 from pathlib import Path
 from typing import Any, ClassVar
@@ -200,22 +200,24 @@ class SurfaceFlowCase(Case):
         """Length of the cells over the form, m."""
         return cell_length(self.surface, self.level)
 
-    @cached_property
+    @property
     def mesh(self) -> Columns:
         """The mesh over the smoothed surface, in the axes of the wind."""
-        form = sizes(form_places(self.surface), self.from_deg)
-        x, y = mesh3.grid_lines(form, self.height_m, self.cell_m, self.level)
-        return Columns.over(
-            self._heights,
-            x,
-            y,
-            height=self.height_m,
-            first_cell=self.first_cell,
-            count=mesh3.rows(self.height_m, self.first_cell, self.level),
-        )
+        return _mesh_of(self)
 
-    def _heights(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Heights of the smoothed surface at places in the axes of the wind, m."""
+    def heights(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Find heights of the smoothed surface.
+
+        Parameters
+        ----------
+        x, y
+            Places in the axes of the wind, m, of one shape.
+
+        Returns
+        -------
+        FloatArray
+            Heights above the flat ground, m.
+        """
         turned = np.stack([x, y], axis=-1) @ self.axes
         east, north = np.moveaxis(turned + np.array(self.surface.centre), -1, 0)
         return self.surface.smoothed(self.cell_m).at(east, north)
@@ -348,3 +350,19 @@ class SurfaceFlowCase(Case):
             raise Exploded("the stress on the bed is not a number", str(directory))
         centre = np.array(self.surface.centre)
         return SurfaceStress.of_faces(self.mesh, tau, self.axes, centre), ustar0
+
+
+# the meshes of many directions would take 50 MB each
+@lru_cache(maxsize=2)
+def _mesh_of(one: SurfaceFlowCase) -> Columns:
+    """The mesh of a case."""
+    form = sizes(form_places(one.surface), one.from_deg)
+    x, y = mesh3.grid_lines(form, one.height_m, one.cell_m, one.level)
+    return Columns.over(
+        one.heights,
+        x,
+        y,
+        height=one.height_m,
+        first_cell=one.first_cell,
+        count=mesh3.rows(one.height_m, one.first_cell, one.level),
+    )

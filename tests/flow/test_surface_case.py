@@ -3,6 +3,7 @@
 import re
 import shutil
 import subprocess
+import weakref
 from dataclasses import replace
 from pathlib import Path
 
@@ -236,3 +237,13 @@ def test_levels_have_the_cells_that_they_say() -> None:
     coarse = replace(flow(low, 30.0), level=COARSE)
     assert coarse.mesh.cells < 110_000
     assert coarse.cell_m > 2.0 / COARSE.per_height
+
+
+def test_the_meshes_of_many_directions_are_not_kept() -> None:
+    surface = hill()
+    cases = [flow(surface, angle) for angle in (0.0, 30.0, 60.0, 90.0)]
+    first = weakref.ref(cases[0].mesh)
+    assert first() is cases[0].mesh
+    for one in cases:
+        assert one.mesh.cells > 0
+    assert first() is None
