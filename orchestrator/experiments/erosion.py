@@ -435,7 +435,7 @@ def _results(found: Sequence[Pile], winds: Sequence[float], source: str) -> Resu
     figure = Figure("erosion", "Stress and loss", caption, (), drawing)
     told = "\n\n".join([*sentences(found, winds, source), words["sure"]])
     sections = [
-        Section("", told, [figure], card=_card(found, winds, source)),
+        Section("", told, [figure], card=card(found, winds, source)),
         Section("Parts", words["rows"], (), [table], words["limits"].split("\n\n")),
         Section("The tables of AP-42", words["sources"], (), [AREAS, MATERIALS]),
     ]
@@ -537,16 +537,33 @@ def sentences(
         yield told
 
 
-def _card(found: Sequence[Pile], winds: Sequence[float], source: str) -> Card:
-    """The answer card: what a wind takes from the first pile, and with a fence."""
+def card(found: Sequence[Pile], winds: Sequence[float], source: str) -> Card:
+    """Make the answer card: what a wind takes from the first pile.
+
+    Parameters
+    ----------
+    found
+        The piles.
+    winds
+        Winds at 10 m, m/s.
+    source
+        Where the threshold is from, in words.
+
+    Returns
+    -------
+    Card
+        The loss by the solved flow and by AP-42, and the least of all with a fence or
+        from another direction.
+    """
     pile = found[0]
     first, *others = pile.surfaces
     epa = [surface.total(winds) for surface in pile.by_epa]
+    with_what = "" if pile.has_bare else f", with {_named(first)}"
     numbers = [
         Number(
             first.total(winds),
             "g/m²",
-            "of dust by the solved flow",
+            f"of dust by the solved flow{with_what}",
             f"mean over the surface; the threshold friction velocity is "
             f"{first.threshold:.3g} m/s{source}",
         ),

@@ -101,7 +101,7 @@ def experiment(study: SurfaceStudy, out: Path) -> Experiment:
         limits = own["erosion_limits"].split("\n\n")
         tables = [erosion.AREAS, erosion.MATERIALS]
         return {"erosion": table}, [
-            Section("", told, [figure]),
+            Section("", told, [figure], card=erosion.card(found, winds, source)),
             Section("Parts", texts["rows"], (), [table], limits),
             Section("The tables of AP-42", texts["sources"], (), tables),
         ]
