@@ -5,7 +5,9 @@ Heights are read from XYZ, ESRI ASCII grid, GeoTIFF and STL.
 
 import io
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,6 +44,7 @@ DEGREES, POINT, METRE = 2, 2, 9001
 FEET = {9002: 0.3048, 9003: 1200 / 3937}
 """Units of a GeoTIFF in feet, m."""
 GRID_KEYS = ("ncols", "nrows", "cellsize")
+POINT_REMEDY = "x, y and z in m, with a decimal point"
 FORMATS = ".tif .tiff (GeoTIFF), .asc (ESRI), .xyz .csv .txt (x y z), .stl"
 BARE_TAGS: Tags = {
     KEYS: (1, 1, 0, 1, PIXEL, 0, 1, 1),
@@ -159,41 +162,82 @@ def _number(word: str, where: str) -> float:
     return float(word)
 
 
-def _of_points(text: str, name: str, where: str) -> Raster:
-    """The raster of lines x y z, whose points lie on a grid in any order."""
-    rows: list[list[float]] = []
-    numbers: list[int] = []
-    for number, line in enumerate(text.splitlines(), 1):
-        words = line.replace(",", " ").replace(";", " ").split()
-        if not words or words[0].startswith("#"):
-            continue
-        place = f"{where}: line {number}"
-        is_head = not rows and not all(map(_is_number, words))
-        if is_head:
-            names = [word.strip("\"'").lower() for word in words]
+@dataclass(frozen=True)
+class _Lines:
+    """The lines of a file of points."""
+
+    text: str
+    where: str
+
+    def points(self) -> Iterator[tuple[int, list[str]]]:
+        """Number and words of each line but empty ones, comments and the head."""
+        is_head = True
+        for number, line in enumerate(self.text.splitlines(), 1):
+            words = _spaced(line).split()
+            if not words or words[0].startswith("#"):
+                continue
+            is_head = is_head and not all(map(_is_number, words))
+            if not is_head:
+                yield number, words
+
+    def refusal(self, point: int, what: str, remedy: str) -> InputError:
+        """The refusal of a point; they are counted from 0."""
+        number, _ = next(islice(self.points(), point, None))
+        return InputError(what, f"{self.where}: line {number}", remedy)
+
+    def check_head(self) -> int:
+        """The number of the line of the first point; an `InputError` for its head."""
+        first, _ = next(self.points(), (1, []))
+        for number, line in enumerate(islice(self.text.splitlines(), first - 1), 1):
+            names = [word.strip("\"'#").lower() for word in _spaced(line).split()]
             if {*"xyz"} <= {*names} and names[:3] != [*"xyz"]:
                 what = f"the columns are {', '.join(names)}"
+                place = f"{self.where}: line {number}"
                 raise InputError(what, place, "the first three must be x, y and z")
-            continue
-        is_point = len(words) >= 3 and all(map(_is_number, words[:3]))
-        if not (is_point and all(np.isfinite([float(word) for word in words[:2]]))):
-            remedy = "x, y and z in m, with a decimal point"
-            raise InputError(f"{line.strip()!r} is no point", place, remedy)
-        rows.append([float(word) for word in words[:3]])
-        numbers.append(number)
-    if len(rows) < FEWEST**2:
-        what = f"{len(rows)} points are no surface"
+        return first
+
+    def wrong(self) -> InputError:
+        """The refusal of the first line that is no point."""
+        for number, words in self.points():
+            if len(words) < 3 or not all(map(_is_number, words[:3])):
+                what = f"{' '.join(words)!r} is no point"
+                return InputError(what, f"{self.where}: line {number}", POINT_REMEDY)
+        return InputError("its lines are no points", self.where, POINT_REMEDY)
+
+
+def _spaced(text: str) -> str:
+    """A text with spaces for commas and semicolons."""
+    return text.replace(",", " ").replace(";", " ")
+
+
+def _of_points(text: str, name: str, where: str) -> Raster:
+    """The raster of lines x y z, whose points lie on a grid in any order."""
+    lines = _Lines(text, where)
+    first = lines.check_head()
+    stream = io.BytesIO(_spaced(text).encode())
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # an empty file is refused below
+            points = np.loadtxt(stream, skiprows=first - 1, usecols=(0, 1, 2), ndmin=2)
+    except ValueError:
+        raise lines.wrong() from None
+    is_place = np.isfinite(points[:, :2]).all(axis=1)
+    if not is_place.all():
+        what = "x or y is not a number"
+        raise lines.refusal(int(is_place.argmin()), what, POINT_REMEDY)
+    if len(points) < FEWEST**2:
+        what = f"{len(points)} points are no surface"
         raise InputError(what, where, "x, y and z in m, a point in each line")
-    return _on_grid(np.array(rows), numbers, name, where)
+    return _on_grid(points, lines, name)
 
 
-def _on_grid(points: FloatArray, lines: list[int], name: str, where: str) -> Raster:
+def _on_grid(points: FloatArray, lines: _Lines, name: str) -> Raster:
     """The raster of points that lie on a grid, NaN where there is none."""
-    along_x, column = _grid_axis(points[:, 0], "x", lines, where)
-    along_y, row = _grid_axis(points[:, 1], "y", lines, where)
+    along_x, column = _grid_axis(points[:, 0], "x", lines)
+    along_y, row = _grid_axis(points[:, 1], "y", lines)
     if len(along_x) * len(along_y) > MOST_NODES:
         what = f"{len(along_x)} x {len(along_y)} cells are more than {MOST_NODES}"
-        raise InputError(what, where, "put them on a grid of larger cells")
+        raise InputError(what, lines.where, "put them on a grid of larger cells")
     _, first, counts = np.unique(
         row * len(along_x) + column, return_index=True, return_counts=True
     )
@@ -201,15 +245,14 @@ def _on_grid(points: FloatArray, lines: list[int], name: str, where: str) -> Ras
         twice = first[int(counts.argmax())]
         x, y = points[twice, :2]
         what = f"x = {x:.9g} m, y = {y:.9g} m has two heights"
-        place = f"{where}: line {lines[twice]}"
-        raise InputError(what, place, "leave one height for each place")
+        raise lines.refusal(twice, what, "leave one height for each place")
     heights = np.full((len(along_y), len(along_x)), np.nan)
     heights[row, column] = points[:, 2]
     return Raster(name, along_x, along_y, heights)
 
 
 def _grid_axis(
-    values: FloatArray, axis: str, lines: list[int], where: str
+    values: FloatArray, axis: str, lines: _Lines
 ) -> tuple[FloatArray, IntArray]:
     """An axis of equal steps through some values, and the place of each on it."""
     found = np.unique(values)
@@ -222,7 +265,7 @@ def _grid_axis(
     if off[worst] > UNEVEN * count or count > MOST_NODES:
         what = f"{axis} = {values[worst]:.9g} m is on no grid of {step:.4g} m"
         remedy = "put the points on a grid of equal steps, with gdal_grid"
-        raise InputError(what, f"{where}: line {lines[worst]}", remedy)
+        raise lines.refusal(worst, what, remedy)
     return np.linspace(found[0], found[-1], count), nearest
 
 
