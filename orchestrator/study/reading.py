@@ -247,12 +247,14 @@ def _values_in(tables: Mapping[str, Table]) -> dict[str, list[float]]:
     given = {name: dict(tables.get(name, {})) for name in PARTS}
     with suppress(InputError):
         given["fluid"] = fluids.numbers_of(given["fluid"])
-    values = {}
+    values: dict[str, list[float]] = {}
     for name in ASKED:
         table, _, field = name.partition(".")
         value = given[table].get(field, default_of(name))
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        values[name] = [value] if is_number and abs(value) < LARGEST_NUMBER else []
+        values[name] = []
+        if is_number and abs(value) < LARGEST_NUMBER:
+            values[name].append(value)
     return values
 
 
@@ -374,8 +376,9 @@ def _meant(
             written[field] = f"{table}.{field}"
     if "method" in tables:
         written["fidelity"] = FIDELITY
-    own = tables[here].model_fields if here in tables else keys
-    for key in own:
+    if here in tables:
+        keys = [*tables[here].model_fields]
+    for key in keys:
         written[key] = key
     close = difflib.get_close_matches(names[-1], written, n=1)
     if not close:
