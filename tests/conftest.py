@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from orchestrator.report.results import Results
 from orchestrator.runs import process
@@ -20,6 +21,9 @@ from tests import small_study
 from tests.faults import bench
 
 Deck = Callable[..., str]
+# no time decides a test, also on a machine that has much else to do
+settings.register_profile("any machine", suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("any machine")
 
 
 def pytest_configure() -> None:

@@ -60,6 +60,7 @@ FAULTS = {
 """Bodies of solvers, and what is said of each."""
 
 
+@pytest.mark.long
 def test_faults_are_caught_and_named(
     formulas: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -94,6 +95,7 @@ def test_faults_are_caught_and_named(
     assert not list(folder.iterdir())  # the private directories are removed
 
 
+@pytest.mark.long
 def test_counts_make_n(all_levels: Path, tmp_path: Path) -> None:
     body = AFTER + (
         "head, *rows = [line.split(',') for line in text.splitlines()]\n"
@@ -145,6 +147,7 @@ def test_a_command_that_cannot_work(command: str, words: str) -> None:
         split(command)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("packed", ["all_levels", "poured"])
 def test_ours_answers_as_exported(
     packed: str, request: pytest.FixtureRequest, tmp_path: Path
@@ -188,6 +191,7 @@ def wrong(right: Path, tmp_path: Path) -> Path:
     return out
 
 
+@pytest.mark.long
 def test_two_solvers_on_one_page(
     all_levels: Path, right: Path, wrong: Path, tmp_path: Path, orchestrator: Command
 ) -> None:

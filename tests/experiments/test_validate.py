@@ -203,6 +203,7 @@ def test_the_rows_of_the_wind_tunnel_are_on_their_curve() -> None:
     assert tunnel["shields"].to_numpy() == pytest.approx(curve, rel=1e-3)
 
 
+@pytest.mark.long
 def test_grains_that_go_on_are_as_near_as_the_documents_say() -> None:
     beds = pd.read_csv(validate.FOLDER / "beds.csv")
     shields = validate.going_on(beds, validate.GUST, leaves=True)

@@ -247,6 +247,7 @@ def test_a_fine_flow_starts_near_where_it_ends(solve: Solve) -> None:
     assert iterations[0] < 1.2 * iterations[1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("pruned", [True, False])
 def test_a_pruned_flow_runs_again_for_a_finer_one(tmp_path: Path, pruned: bool) -> None:
     """A finished flow runs once: again only where a finer one starts from what prune dropped."""

@@ -122,6 +122,7 @@ def test_a_symmetric_hill_has_symmetric_stress(shared: Shared) -> None:
     assert stress.tau_across[is_left].mean() > 0.02
 
 
+@pytest.mark.long
 def test_a_quarter_of_a_turn_changes_no_digit(shared: Shared) -> None:
     """A hill turned with the wind is the same mesh."""
     surface = hill(1.5)
@@ -150,6 +151,7 @@ def test_the_stress_is_that_of_the_function_object(
     assert_same(ours, by_function_object(copy))
 
 
+@pytest.mark.long
 def test_two_processes_give_the_flow_of_one(shared: Shared) -> None:
     one = flow(hill())
     two = replace(one, level=replace(SMALL, ranks=2))
@@ -177,6 +179,7 @@ def test_the_template_runs_as_it_lies(tmp_path: Path) -> None:
     }
 
 
+@pytest.mark.long
 def test_the_same_again_gives_the_same_bytes(shared: Shared, tmp_path: Path) -> None:
     one = flow(hill())
     copy = Path(shutil.copytree(solved(one, shared), tmp_path / "copy"))

@@ -181,6 +181,7 @@ final_fraction = 0.05
 """
 
 
+@pytest.mark.long
 def test_a_strip_is_answered_by_the_grains_that_go_on(tmp_path: Path) -> None:
     results = small_study.run(tmp_path, STRIP)
     (pile,) = results.plan.piles.values()
