@@ -27,8 +27,7 @@ from orchestrator.study.scene import Scene
 
 DOCS = Path(__file__).parents[1] / "docs"
 TABLE = DOCS / "measured" / "going.csv"
-"""A row for each load step. ``cut`` says by what the strips were cut: the heights of the centres of
-their grains, as until 2026, or their tops."""
+"""A row for each load step."""
 FIGURE = DOCS / "figures" / "going.svg"
 DRAWN = ("air 0.25 mm", "air 0.5 mm", "water 1 mm", "water 5 mm")
 FIELD = (0.0110, 0.0129)
@@ -144,7 +143,7 @@ def main(directory: Path, strips: list[tuple[str, int]]) -> pd.DataFrame:
         rows = run(GoingCase(scene_of(SETS[name], seed)), directory)
         rows.insert(0, "set", name)
         former = (table["set"] == name) & (table["seed"] == seed)
-        table = pd.concat([table[~former], rows.assign(cut="tops")])
+        table = pd.concat([table[~former], rows])
         print(name, seed, file=sys.stderr)
     return table.sort_values(["set", "seed", "shields"], ignore_index=True)
 
@@ -171,8 +170,7 @@ def draw(table: pd.DataFrame) -> Canvas:
         rows = table[table["set"] == name]
         for _, strip in rows.groupby("seed"):
             part = 100 * strip["went_on"] / strip["exposed"]
-            look = "o-" if (strip["cut"] == "tops").all() else "o:"
-            ax.plot(strip["shields"], part, look, color="#0072b2", ms=3)
+            ax.plot(strip["shields"], part, "o-", color="#0072b2", ms=3)
         alone = rows["closed_form"].iloc[0]
         one = ax.axvline(alone, color="#c24e00", label="one grain, closed form")
         curved = measured(name)
