@@ -1012,7 +1012,7 @@ def tabulated(grains: Grains, *, at_most: bool = False) -> Thresholds:
     >>> print(tabulated(sand).steady.round(3))
     [0.033 0.028]
     """
-    is_inside = _is_tabulated(grains)
+    is_inside = is_tabulated(grains)
     found = np.full((2, len(grains)), np.nan)
     table = _table()[2:] if at_most else _table()[:2]
     found[:, is_inside] = _interpolated(table, grains.at(is_inside))
@@ -1036,8 +1036,19 @@ def _points(grains: Grains) -> tuple[FloatArray, FloatArray, FloatArray]:
     return galileo, density, grains.slope_deg
 
 
-def _is_tabulated(grains: Grains) -> BoolArray:
-    """Whether the table holds each grain: its bed, its flow and its place."""
+def is_tabulated(grains: Grains) -> BoolArray:
+    """Tell whether the table holds each grain: its bed, its flow and its place.
+
+    Parameters
+    ----------
+    grains
+        The grains.
+
+    Returns
+    -------
+    ndarray
+        Truth values, shape (n,); others take a second for each few grains.
+    """
     is_inside = np.isclose(grains.roughness * SAND_GRAIN, 1, rtol=1e-6, atol=0)
     is_inside &= (grains.fall <= 0) & (grains.relative_size == 1)
     for nodes, point in zip(_AXES, _points(grains), strict=True):

@@ -29,6 +29,7 @@ from orchestrator.report.results import (
 from orchestrator.report.style import Figure, Look
 from orchestrator.report.theory import BINS, Line
 from orchestrator.study import fields
+from orchestrator.study.criterion import GOES_ON
 from orchestrator.types import BoolArray
 
 SHAPES = "os^DvP<X>p8hd*"
@@ -58,6 +59,8 @@ SERIES = ("nu_m2_s", "force_law", "regime", SHAPE)
 """Columns in which piles agree that a line joins."""
 FIELD_REYNOLDS = (8.8, 13.5)
 """Re* of the sites of `FIELD`."""
+GOING_DASH = (0, (7, 1.2, 1.5, 1.2))
+"""Dash of the curves of grains that go on."""
 GAP = np.full((1, 2), np.nan)
 BEYOND = 1e6  # a place above every frame, over the lower end of a bar
 """A point that interrupts a line."""
@@ -400,8 +403,10 @@ def single_grains(results: Results) -> pd.DataFrame:
     answers = results.joined("single_grain")
     if answers.empty:
         answers = pd.DataFrame(columns=["scene_id", *DEM, "ustar_m_s", "usable"])
-    extra = [name for name in answers if name not in scenes or name == "scene_id"]
-    return scenes[held(scenes)].merge(answers[extra], how="left", on="scene_id")
+    own = ("scene_id", "criterion")
+    extra = [name for name in answers if name not in scenes or name in own]
+    scenes = scenes[held(scenes)].drop(columns="criterion", errors="ignore")
+    return scenes.merge(answers[extra], how="left", on="scene_id")
 
 
 def draw(results: Results) -> Iterator[Figure]:
@@ -423,12 +428,7 @@ def draw(results: Results) -> Iterator[Figure]:
     percents = ", ".join(f"{100 * fraction:g}" for fraction in fractions)
     name = f"bed at n/N = {percents} %"
     points |= _draw_kind(ax, piles, name, PILE, "s", 3.6, shades, len(points))
-    laws_so_far: list[str] = []
-    for line in lines:
-        # a law on another bed has a thinner line
-        width = 1.4 / (1 + laws_so_far.count(line.law))
-        draw_line(ax, line, line.name, *theory.look(line.law), width)
-        laws_so_far.append(line.law)
+    names = _draw_lines(ax, lines, pd.concat([grains, piles]))
     prepare(sheet, xlim)
     canvas, axes = sheet.panels()
     of_laws = [one for one in style.samples(axes) if one.get_gid() == RESULT[0]]
@@ -439,12 +439,53 @@ def draw(results: Results) -> Iterator[Figure]:
         piles=about(piles),
         grains=about(grains),
         fractions=", ".join(f"{fraction:.0%}" for fraction in fractions),
-        names="; ".join(line.name for line in lines),
+        names="; ".join(names),
         about={**about(scenes), "sloped": ""},
     )
     title = "Extended Shields diagram"
     cases = case_names(piles, grains)
     yield Figure(NAME, title, text, cases, canvas, data=points, leads=True)
+
+
+def _draw_lines(ax: Axes, lines: Sequence[Line], answers: pd.DataFrame) -> list[str]:
+    """The curves of what is answered, by its criteria; their names.
+
+    Where no curve of grains that go on is known, that of their pockets stands there.
+    """
+    names = []
+    going: list[theory.Going] = []
+    criteria = set(answers.get("criterion", []))
+    if GOES_ON in criteria:
+        going = theory.going_on(answers.assign(alpha_deg=0.0))
+    for curve in going:
+        _draw_going(ax, curve, curve.name, theory.look(curve.law)[0])
+        names.append(curve.name)
+    if going and criteria == {GOES_ON}:
+        return names
+    laws_so_far: list[str] = []
+    for line in lines:
+        # a law on another bed has a thinner line
+        width = 1.4 / (1 + laws_so_far.count(line.law))
+        name = line.name
+        if GOES_ON in criteria:
+            name = f"{name}: {theory.LEAVING}"
+        draw_line(ax, line, name, *theory.look(line.law), width)
+        laws_so_far.append(line.law)
+        names.append(name)
+    return names
+
+
+def _draw_going(ax: Axes, curve: theory.Going, label: str, colour: str) -> None:
+    """A curve of grains that go on, dotted where its law does not hold."""
+    dotted = "dotted: the force law does not hold"
+    for chosen, dashes, name in (
+        (curve.holds, GOING_DASH, label),
+        (~curve.holds, ":", dotted),
+    ):
+        if chosen.any():
+            look: Look = {"color": colour, "lw": 1.6, "ls": dashes, "label": name}
+            points = np.where(chosen, (curve.reynolds, curve.tau), np.nan)
+            ax.plot(*points, gid=RESULT[0], **look)
 
 
 def _grains_on_the_least_slope(results: Results) -> pd.DataFrame:
@@ -457,13 +498,19 @@ def _grains_on_the_least_slope(results: Results) -> pd.DataFrame:
 
 def _few_exact(grains: pd.DataFrame) -> pd.DataFrame:
     """Single grains, of which few that the closed form answered are points as well."""
-    if grains.empty or grains["shields_dem"].notna().any() or len(grains) > FEW:
+    if grains.empty or len(grains) > FEW:
         return grains
-    return grains.assign(
-        shields_dem=grains["shields_closed_form"],
-        reynolds=grains["reynolds_closed_form"],
-        ustar_m_s=grains["ustar_closed_form_m_s"],
-    )
+    is_exact = grains["method"] != "dem"
+    exact = {
+        "shields_dem": "shields_closed_form",
+        "reynolds": "reynolds_closed_form",
+        "ustar_m_s": "ustar_closed_form_m_s",
+    }
+    filled = {
+        column: grains[column].where(~is_exact, grains[by])
+        for column, by in exact.items()
+    }
+    return grains.assign(**filled)
 
 
 def _draw_kind(
@@ -661,18 +708,36 @@ def _draw_laws(
     colours: Mapping[Any, str],
     dashes: Mapping[str, theory.Dash],
 ) -> None:
-    """The closed form of each law, in the colours of the laws or of the column `by`."""
+    """The closed form of each law by the criteria of the answers.
+
+    They are in the colours of the laws or of the column `by`.
+    """
+    criteria = set(part["criterion"].dropna())
+    going = theory.going_on(part) if GOES_ON in criteria else []
+    for curve in going:
+        name = labels.value("force_law", curve.law)
+        colour = _colour_of(curve, by, colours)
+        _draw_going(ax, curve, f"closed form: {name}, {theory.GOING}", colour)
+    if going and criteria == {GOES_ON}:
+        return
     for line in theory.lines(part):
         name = labels.value("force_law", line.law)
-        if by == "force_law":
-            colour, dash = theory.look(line.law)
-        else:
-            bed = dict(zip(theory.BED, line.bed, strict=True))
-            colour = colours.get(bed.get(by), "0.2")
+        dash = theory.look(line.law)[1]
+        if by != "force_law":
             dash = dashes[line.law]
             if line.law in theory.PAIR:
                 name = "Eqs. 3, 5"
-        draw_line(ax, line, f"closed form: {name}", colour, dash)
+        if GOES_ON in criteria:
+            name = f"{name}, {theory.LEAVING}"
+        draw_line(ax, line, f"closed form: {name}", _colour_of(line, by, colours), dash)
+
+
+def _colour_of(line: Line | theory.Going, by: str, colours: Mapping[Any, str]) -> str:
+    """The colour of a law, or of the value of the column `by` that its bed has."""
+    if by == "force_law":
+        return theory.look(line.law)[0]
+    bed = dict(zip(theory.BED, line.bed, strict=True))
+    return colours.get(bed.get(by), "0.2")
 
 
 def _join_piles(ax: Axes, group: pd.DataFrame, colour: str) -> None:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from orchestrator.physics import curves
+from orchestrator.physics import curves, saltation
 from orchestrator.physics.constants import GRAIN_COLUMNS
 from orchestrator.physics.curves import Air
 from orchestrator.physics.laws import LAWS, Exposure
@@ -28,6 +28,9 @@ from orchestrator.physics.threshold import (
 from orchestrator.report import labels
 from orchestrator.report.page import caption
 from orchestrator.report.results import Results, split
+from orchestrator.report.subjects import fluid
+from orchestrator.study.criterion import GOES_ON
+from orchestrator.tables.quoted import grain_ustar, hoppers
 from orchestrator.types import BoolArray, FloatArray
 
 PAIR = LAWS_OF["transition"]
@@ -73,6 +76,20 @@ POINTS = 240
 """Diameters of a curve for air."""
 BED = ["alpha_deg", "beta_deg", "z0_over_d", "alpha_s"]
 """Columns of all that a line depends on beside its law, in the order of `Bed`."""
+OF_GOING_ON = (
+    *BED,
+    "force_law",
+    "rho_sol_kg_m3",
+    "rho_f_kg_m3",
+    "nu_m2_s",
+    "g_m_s2",
+    "cohesion_n_m",
+)
+"""Columns that set curves of grains that go on apart."""
+SIZES, BESIDE = 25, 4.0
+"""Sizes of such a curve, and how far it reaches beyond those of a study, times."""
+GOING, LEAVING = "grains that go on", "grains that leave their pockets"
+"""What lines are of, by the criterion."""
 BAGNOLD_FROM = 3.5  # Bagnold's A is 0.1 above this Re* only; it rises below
 GAS_RATIO = (
     100.0  # least rho_sol/rho_f of a fluid that curves for air may be compared with
@@ -226,6 +243,69 @@ class Line:
         return (factor, float(MIDDLES[at])) if np.isfinite(factor) else (np.inf, 0.0)
 
 
+class Going(NamedTuple):
+    """The thresholds of grains that go on, over sizes of one kind of grain in a fluid.
+
+    Attributes
+    ----------
+    law, bed, name
+        The force law, the bed, and both in words.
+    reynolds, tau
+        Re* and tau at the thresholds, shape (n,).
+    holds
+        Whether the law holds there, shape (n,).
+    """
+
+    law: str
+    bed: Bed
+    name: str
+    reynolds: FloatArray
+    tau: FloatArray
+    holds: BoolArray
+
+
+def going_on(rows: pd.DataFrame) -> list[Going]:
+    """Find the curves of the grains among some answers that have to go on.
+
+    Unlike the closed form of a pocket they depend on the grains and the fluid, and not
+    on Re* alone.
+
+    Parameters
+    ----------
+    rows
+        Thresholds with the columns of their scenes.
+
+    Returns
+    -------
+    list of Going
+        A curve for each kind of grain that the table of `saltation` holds: others would
+        take seconds each.
+    """
+    found = []
+    rows = rows[rows["criterion"] == GOES_ON]
+    fluids = rows[["rho_f_kg_m3", "nu_m2_s"]].drop_duplicates()
+    for _, group in split(rows, *OF_GOING_ON):
+        first = group.iloc[0]
+        ends = group["d_m"].min() / BESIDE, group["d_m"].max() * BESIDE
+        d = np.geomspace(*ends, SIZES)
+        here = pd.DataFrame([first] * SIZES).assign(d_m=d, z0_m=first["z0_over_d"] * d)
+        here = here[saltation.is_tabulated(hoppers(here))]
+        if here.empty:
+            continue
+        ustar = grain_ustar(here)
+        reynolds = ustar * here["d_m"].to_numpy() / first["nu_m2_s"]
+        excess = first["rho_sol_kg_m3"] / first["rho_f_kg_m3"] - 1
+        tau = ustar**2 / (excess * first["g_m_s2"] * here["d_m"].to_numpy())
+        bed = Bed._make(first[BED].tolist())
+        line = Line(str(first["force_law"]), bed, np.inf, 0.0)
+        within = ""
+        if len(fluids) > 1:
+            within = f" in {fluid(first['rho_f_kg_m3'], first['nu_m2_s'])}"
+        name = f"{line.name}{within}: {GOING}"
+        found.append(Going(line.law, bed, name, reynolds, tau, line.holds(reynolds)))
+    return found
+
+
 def lines(scenes: pd.DataFrame) -> list[Line]:
     """The lines through some scenes, by rising slope, entrainment angle, z0, lift."""
     listed = []
@@ -341,10 +421,12 @@ def _ranges(chosen: BoolArray) -> str:
 def section(results: Results) -> dict[str, Any] | None:
     """The words of the page's section on measurements.
 
-    It is None without single grains on a flat bed.
+    It is None without single grains on a flat bed that leave their pockets: what is
+    compared is the closed form of these.
     """
     listed = ranked(results)
-    if not listed:
+    answers = results.joined("single_grain")
+    if not listed or (len(answers) and (answers["criterion"] == GOES_ON).all()):
         return None
     return {
         "source": MEASURED_SOURCE,

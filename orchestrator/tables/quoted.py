@@ -184,19 +184,35 @@ def _gust(told: str) -> float:
     return peak_over_mean(float(parts[2]), float(parts[1]))
 
 
-def _going_on(rows: pd.DataFrame, leaving: FloatArray, peak: FloatArray) -> FloatArray:
-    """The same of grains that go on, from the steady flow that turns them over."""
-    density = rows["rho_f_kg_m3"].to_numpy(float)
-    per_shields = _weight(rows) / density
-    grains = saltation.Grains.of(
+def hoppers(rows: pd.DataFrame) -> saltation.Grains:
+    """Make the single grains of rows as they hop over their beds.
+
+    Parameters
+    ----------
+    rows
+        Rows with the columns `GRAIN_COLUMNS`, n of them.
+
+    Returns
+    -------
+    Grains
+        The n grains.
+    """
+    return saltation.Grains.of(
         rows["d_m"],
         density=rows["rho_sol_kg_m3"],
-        fluid_density=density,
+        fluid_density=rows["rho_f_kg_m3"].to_numpy(float),
         viscosity=rows["nu_m2_s"],
         slope_deg=rows["alpha_deg"],
         roughness=rows["z0_m"],
         gravity=rows["g_m_s2"],
     )
+
+
+def _going_on(rows: pd.DataFrame, leaving: FloatArray, peak: FloatArray) -> FloatArray:
+    """The same of grains that go on, from the steady flow that turns them over."""
+    density = rows["rho_f_kg_m3"].to_numpy(float)
+    per_shields = _weight(rows) / density
+    grains = hoppers(rows)
     further = saltation.tabulated(grains).initiation(peak)
     steady = leaving**2 / per_shields
     found = saltation.motion(steady, further, saltation.hops(grains), peak)
