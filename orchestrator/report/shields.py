@@ -1,4 +1,4 @@
-"""Shields diagrams: that of a study, those of single grains and of piles; DEM over closed form."""
+"""Shields diagrams of a study, of single grains and of piles; DEM over closed form."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -43,9 +43,9 @@ REYNOLDS = np.geomspace(1e-4, 1e6, 601)
 AIR_DASHES = ("-.", "--", (0, (1, 1)))
 AIR_STYLES = dict(zip(curves.AIR, AIR_DASHES, strict=True))
 SLOPED = "Shao & Lu 2000"
-"""The curve for air that is drawn for sloping beds: three for each slope would hide the rest."""
+"""The curve for air of sloping beds: three for each slope would hide the rest."""
 RESULT = ("closed form", "points", "points, not usable")
-"""Names of artists: lines of the closed form, usable points, points that are not usable."""
+"""Names of artists: lines of the closed form, usable points, others."""
 NAME = "shields"
 TOLD = ("alpha_deg", "d_m", "z0_over_d", "force_law")
 """Columns that the text of a point always tells of its scene."""
@@ -127,8 +127,8 @@ def parted(table: pd.DataFrame, *shown: str) -> tuple[list[str], pd.DataFrame]:
     panels : list of str
         The columns that part panels: those of what is asked.
     rows : pandas.DataFrame
-        The table with a marker and its label for each force law and each combination of how
-        scenes are answered.
+        The table with a marker and its label for each force law and each combination
+        of how scenes are answered.
     """
     columns = labels.varying(table, *shown)
     panels = [name for name in columns if name in fields.OF_QUESTION]
@@ -191,14 +191,35 @@ def about(rows: pd.DataFrame) -> dict[str, Any]:
 
 
 def ends(scenes: pd.DataFrame, *drawn: pd.DataFrame) -> tuple[float, float]:
-    """Ends of an axis of Re* around the single grains of some scenes and rows that are drawn."""
+    """Find the ends of an axis of Re*.
+
+    Parameters
+    ----------
+    scenes
+        Scenes, whose single grains it holds.
+    *drawn
+        Rows that are drawn on it.
+
+    Returns
+    -------
+    low, high : float
+        The ends.
+    """
     shown = [rows["reynolds"] for rows in drawn if len(rows)]
     reach = np.concatenate([theory.span(scenes), *shown])
     return float(reach.min()) / 2, float(reach.max()) * 2
 
 
 def prepare(sheet: Sheet, xlim: tuple[float, float]) -> None:
-    """Logarithmic axes over a range of Re* and all lines in it; call it when all is drawn."""
+    """Set logarithmic axes over all lines in a range of Re*, when all is drawn.
+
+    Parameters
+    ----------
+    sheet
+        The panels.
+    xlim
+        The range.
+    """
     _, axes = sheet.panels()
     x, tau = _points_of(axes)
     is_shown = (x >= xlim[0]) & (x <= xlim[1]) & (tau > 0)
@@ -221,7 +242,15 @@ def _points_of(axes: Sequence[Axes]) -> Any:
 
 
 def shade_transition(ax: Axes, rows: pd.DataFrame) -> None:
-    """Shade where neither law of the paper holds, if some rows have them and the axes show it."""
+    """Shade where neither law of the paper holds, if some rows have them.
+
+    Parameters
+    ----------
+    ax
+        The panel, whose range of Re* is set.
+    rows
+        The rows that it shows.
+    """
     low, high = ax.get_xlim()
     viscous, rough = (LAWS[name].reynolds for name in theory.PAIR)
     left = max(viscous[1], low)
@@ -245,7 +274,7 @@ def draw_line(
     dash: theory.Dash,
     width: float = 1.1,
 ) -> None:
-    """A closed-form line, dotted where its law does not hold but the study has grains."""
+    """A closed-form line, dotted where the study has grains beyond its law."""
     tau = line.tau(REYNOLDS)
     holds = line.holds(REYNOLDS)
     is_dotted = line.near(REYNOLDS) & ~holds
@@ -313,7 +342,7 @@ def draw_points(
 def _draw_intervals(
     ax: Axes, x: Any, low: Any, high: Any, colour: str, size: float
 ) -> None:
-    """Bars with caps, as one line with gaps: by themselves they take three times as long.
+    """Bars with caps, as one line with gaps: singly they take three times as long.
 
     A bar without an upper end leaves the frame.
     """
@@ -327,9 +356,21 @@ def _draw_intervals(
 def draw_published(
     ax: Axes, scenes: pd.DataFrame, xlim: tuple[float, float], colours: Any = None
 ) -> None:
-    """Curves for air, and unless the bed slopes in a gas those and measurements for water.
+    """Draw published curves: for air, and those and measurements for water.
 
-    On slopes one curve for air is drawn, times the slope factor, in the colours of the slopes.
+    On slopes one curve for air is drawn, times the slope factor, in the colours of the
+    slopes; of beds that slope in a gas nothing for water is.
+
+    Parameters
+    ----------
+    ax
+        The panel.
+    scenes
+        The scenes that it shows.
+    xlim
+        The range of Re*.
+    colours
+        Colours by slope.
     """
     is_sloped = bool((scenes["alpha_deg"] > 0).any())
     for alpha in sorted(set(scenes["alpha_deg"])):
@@ -365,7 +406,7 @@ def _draw_field(ax: Axes, xlim: tuple[float, float]) -> None:
 
 
 def _draw_water(ax: Axes, xlim: tuple[float, float]) -> None:
-    """Published curves for water, and the measurements whose median is within some ends of x."""
+    """Published curves for water, and the measurements with medians within two ends."""
     lines = []
     for curve in curves.WATER:
         lines += [np.column_stack(curve.points()), GAP]
@@ -383,7 +424,22 @@ def _draw_water(ax: Axes, xlim: tuple[float, float]) -> None:
 
 
 def legends(sheet: Sheet, column: str, colours: Mapping[Any, str]) -> Canvas:
-    """Legends of the colours of a column above the panels, of all labels below them; the figure."""
+    """Write legends: of colours above the panels, of all labels below them.
+
+    Parameters
+    ----------
+    sheet
+        The panels.
+    column
+        The column that colours tell apart.
+    colours
+        Colours by its values.
+
+    Returns
+    -------
+    Figure
+        The figure.
+    """
     canvas, axes = sheet.panels()
     used = set(sheet.rows[column])
     top = []
@@ -410,7 +466,18 @@ def single_grains(results: Results) -> pd.DataFrame:
 
 
 def draw(results: Results) -> Iterator[Figure]:
-    """The one diagram of a study: its piles, single grains, laws and measurements in one frame."""
+    """Draw the one diagram of a study: piles, single grains, laws and measurements.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Yields
+    ------
+    Figure
+        One figure, or none.
+    """
     piles = shown_piles(results)
     grains = _grains_on_the_least_slope(results)
     lines = _lines(results)
@@ -419,32 +486,48 @@ def draw(results: Results) -> Iterator[Figure]:
     scenes = results.scenes
     panels = cache(partial(style.grid, [""], 3.5, *AXES))
     sheet = Sheet("", "", [scenes], scenes, panels)
-    (ax,) = panels()[1]
+    canvas, (ax,) = panels()
     xlim = ends(scenes, piles, grains)
     draw_published(ax, scenes.assign(alpha_deg=0.0), xlim)
-    shades = style.palette("alpha_deg", results.values("alpha_deg"))
-    points = _draw_kind(ax, grains, "single grain", DEM, "o", 2.4, shades, 0)
-    fractions = sorted(set(piles.get("fraction", [])))
-    percents = ", ".join(f"{100 * fraction:g}" for fraction in fractions)
-    name = f"bed at n/N = {percents} %"
-    points |= _draw_kind(ax, piles, name, PILE, "s", 3.6, shades, len(points))
+    points = _draw_answers(ax, grains, piles, results)
     names = _draw_lines(ax, lines, pd.concat([grains, piles]))
     prepare(sheet, xlim)
-    canvas, axes = sheet.panels()
-    of_laws = [one for one in style.samples(axes) if one.get_gid() == RESULT[0]]
-    others = [one for one in style.samples(axes) if one.get_gid() != RESULT[0]]
-    style.legends(canvas, of_laws, others)
+    _overview_legends(canvas, ax)
     text = caption(
         "overview",
         piles=about(piles),
         grains=about(grains),
-        fractions=", ".join(f"{fraction:.0%}" for fraction in fractions),
+        fractions=", ".join(f"{fraction:.0%}" for fraction in _fractions(piles)),
         names="; ".join(names),
         about={**about(scenes), "sloped": ""},
     )
     title = "Extended Shields diagram"
     cases = case_names(piles, grains)
     yield Figure(NAME, title, text, cases, canvas, data=points, leads=True)
+
+
+def _fractions(piles: pd.DataFrame) -> list[float]:
+    """The fractions of piles, rising."""
+    return sorted(set(piles.get("fraction", [])))
+
+
+def _draw_answers(
+    ax: Axes, grains: pd.DataFrame, piles: pd.DataFrame, results: Results
+) -> dict[str, list[list[str]]]:
+    """The points of single grains and of piles, and what the page says of each."""
+    shades = style.palette("alpha_deg", results.values("alpha_deg"))
+    points = _draw_kind(ax, grains, "single grain", DEM, "o", 2.4, shades, 0)
+    percents = ", ".join(f"{100 * fraction:g}" for fraction in _fractions(piles))
+    name = f"bed at n/N = {percents} %"
+    return points | _draw_kind(ax, piles, name, PILE, "s", 3.6, shades, len(points))
+
+
+def _overview_legends(canvas: Canvas, ax: Axes) -> None:
+    """Legends of the laws above the one diagram, of all else below it."""
+    samples = style.samples([ax])
+    of_laws = [one for one in samples if one.get_gid() == RESULT[0]]
+    others = [one for one in samples if one.get_gid() != RESULT[0]]
+    style.legends(canvas, of_laws, others)
 
 
 def _draw_lines(ax: Axes, lines: Sequence[Line], answers: pd.DataFrame) -> list[str]:
@@ -523,9 +606,9 @@ def _draw_kind(
     shades: Mapping[Any, str],
     number: int,
 ) -> dict[str, list[list[str]]]:
-    """Points of one kind, by slope; what the page says of each, by the name of its group.
+    """Points of one kind, by slope; what the page says of each, by its group.
 
-    `number` is that of the first group: the page's script finds the points by these names.
+    `number` is that of the first group: the page's script finds points by these names.
     """
     texts: dict[str, list[list[str]]] = {}
     if rows.empty:
@@ -557,8 +640,8 @@ def shown_piles(results: Results) -> pd.DataFrame:
 def _lines(results: Results) -> list[Line]:
     """The closed form on a flat bed: the laws of piles on their least and largest z0/d.
 
-    Other laws have one line, on the bed that fits the measurements best; the two laws of the paper
-    are one model, on one bed.
+    Other laws have one line, on the bed that fits the measurements best; the two laws
+    of the paper are one model, on one bed.
     """
     flat = theory.lines(results.beds("pile").assign(alpha_deg=0.0))
     beds = [line.bed for line in flat]
@@ -578,7 +661,7 @@ def _lines(results: Results) -> list[Line]:
 
 
 def _texts(row: pd.Series, columns: Sequence[str], telling: Sequence[str]) -> list[str]:
-    """What the page says of a point: its scene, its threshold, why it is not usable, its case."""
+    """What the page says of a point: scene, threshold, why it is not usable, case."""
     value, low, high = (row[name] for name in columns[1:])
     threshold = f"τ_c = {value:.4g}"
     if pd.notna(low) or pd.notna(high):
@@ -593,7 +676,18 @@ def _texts(row: pd.Series, columns: Sequence[str], telling: Sequence[str]) -> li
 
 
 def singles(results: Results) -> Iterator[Figure]:
-    """Figs. 5 to 8: on a flat bed by entrainment angle, or by law if there are many; on slopes."""
+    """Draw Figs. 5 to 8: on a flat bed by entrainment angle or law, and on slopes.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Yields
+    ------
+    Figure
+        A figure for each.
+    """
     grains = single_grains(results)
     flat = grains[grains["alpha_deg"] == 0]
     has_dem = bool(grains["shields_dem"].notna().any())
@@ -655,7 +749,7 @@ PANELS_BY = {
 def _diagrams(
     rows: pd.DataFrame, by: str, colours: Mapping[Any, str], name: str, title: str
 ) -> Iterator[Figure]:
-    """Single grains with or without thresholds by DEM, or piles, beside the closed form."""
+    """Single grains with or without thresholds by DEM, or piles, and closed forms."""
     columns = PILE if by == "fraction" else DEM
     every = rows[rows[columns[1]].notna()]
     # the closed form depends on nothing else that a panel does not show
@@ -741,7 +835,7 @@ def _colour_of(line: Line | theory.Going, by: str, colours: Mapping[Any, str]) -
 
 
 def _join_piles(ax: Axes, group: pd.DataFrame, colour: str) -> None:
-    """Lines through the piles that differ in the diameter alone; others are a scatter."""
+    """Lines through piles that differ in the diameter alone; others are a scatter."""
     joined = []
     for _, series in split(group, *SERIES):
         if series["d_m"].is_unique:
@@ -752,7 +846,18 @@ def _join_piles(ax: Axes, group: pd.DataFrame, colour: str) -> None:
 
 
 def accuracy(results: Results) -> Iterator[Figure]:
-    """u* of DEM over that of the closed form, a panel for each increment of the load steps."""
+    """Draw u* of DEM over that of the closed form, for each increment of load steps.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Yields
+    ------
+    Figure
+        A figure for each page of panels.
+    """
     dem = single_grains(results)
     dem = dem[dem["ustar_m_s"].notna()]
     if dem.empty:
