@@ -15,7 +15,7 @@ with the Shields number theta, the viscosity ``sqrt(s)/Ga``.
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import NamedTuple, Self
 
@@ -1156,7 +1156,26 @@ def weakest_thresholds(grains: Grains) -> Thresholds:
 
 
 def _beyond_table(grains: Grains, at_most: bool) -> Thresholds:
-    """The thresholds of grains that the table does not hold."""
+    """The thresholds of grains that the table does not hold, of alike ones once."""
+    fields = (
+        grains.galileo,
+        grains.density_ratio,
+        grains.slope_deg,
+        grains.roughness,
+        grains.fall,
+        grains.relative_size,
+    )
+    rows = [*zip(*(values.tolist() for values in fields), strict=True)]
+    unlike = tuple(dict.fromkeys(rows))
+    places = [unlike.index(row) for row in rows]
+    found = _of_unlike(unlike, at_most)
+    return Thresholds(found.steady[places], found.cessation[places])
+
+
+@lru_cache(maxsize=64)  # tables, cards and pictures ask for the same grains
+def _of_unlike(rows: tuple[tuple[float, ...], ...], at_most: bool) -> Thresholds:
+    """The same of grains by the numbers of each."""
+    grains = Grains(*np.array(rows).T)
     return weakest_thresholds(grains) if at_most else thresholds(grains)
 
 

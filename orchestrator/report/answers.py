@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -42,6 +43,8 @@ NONE = Card(
     Worth("bad", "no answer yet", "No case has given a result."),
 )
 """The card of a study without results."""
+OF_ONE_GRAIN = (*GRAIN_COLUMNS.values(), "gusts", "criterion")
+"""Columns that the thresholds of one grain by all laws follow from."""
 SHAPES = {
     "triangle": "pile",
     "dune": "dune",
@@ -160,7 +163,9 @@ def _scene(row: pd.Series, pile: Pile) -> str:
     if pile.scene.flow.towards != WITH_X:
         shape += f", {single.quantity(row).flow} towards {pile.scene.flow.towards}"
     within = fluid(float(row["rho_f_kg_m3"]), float(row["nu_m2_s"]))
-    return f"{shape[:1].upper()}{shape[1:]}; {grains}; {count}; in {within}."
+    if not bed.profile:
+        shape = f"{shape[:1].upper()}{shape[1:]}"
+    return f"{shape}; {grains}; {count}; in {within}."
 
 
 def _numbers_of_bed(
@@ -247,7 +252,7 @@ def _place(row: pd.Series, pile: Pile, results: Results) -> Number:
             x,
             "m",
             "x where motion starts",
-            f"x of {profile.name}, whose top is at {top} m",
+            f"the top of {profile.name} is at x = {top} m",
             low=low,
             high=high,
             interval_of=of_what,
@@ -549,14 +554,22 @@ def by_law(row: pd.Series) -> dict[str, tuple[float, bool]]:
         Friction velocity at the threshold, m/s, and whether the law holds there, by the
         name of the law.
     """
-    rows = pd.DataFrame([row] * len(LAWS)).assign(force_law=list(LAWS))
+    return dict(_by_law(tuple((column, row.get(column)) for column in OF_ONE_GRAIN)))
+
+
+@lru_cache(maxsize=8)  # the card and both drawings of a grain ask for the same
+def _by_law(
+    grain: tuple[tuple[str, Any], ...],
+) -> tuple[tuple[str, tuple[float, bool]], ...]:
+    """The same of the values of `OF_ONE_GRAIN`."""
+    rows = pd.DataFrame([dict(grain)] * len(LAWS)).assign(force_law=list(LAWS))
     # what goes on depends on no law: all are asked for at once
     ustar = grain_ustar(rows)
     found = {}
     for place, name in enumerate(LAWS):
         (holds,) = _holds(rows.iloc[[place]], ustar[[place]])
         found[name] = float(ustar[place]), bool(holds)
-    return found
+    return tuple(found.items())
 
 
 def by_this_law(rows: pd.DataFrame) -> tuple[FloatArray, BoolArray]:

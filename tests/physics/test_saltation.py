@@ -437,3 +437,23 @@ def test_the_weakest_rebounds_have_the_highest_thresholds() -> None:
     np.testing.assert_allclose(most.steady, direct.steady, rtol=3e-2)
     assert (most.steady > usual.steady).all()
     assert (most.cessation > usual.cessation).all()
+
+
+def test_alike_grains_beyond_the_table_are_followed_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    counts = []
+
+    def followed(grains: saltation.Grains) -> saltation.Thresholds:
+        counts.append(len(grains))
+        size = np.asarray(grains.galileo)
+        return saltation.Thresholds(size, 2 * size)
+
+    monkeypatch.setattr(saltation, "thresholds", followed)
+    rough = saltation.Grains([40.0, 50.0, 40.0, 40.0], 2208.0, roughness=0.0917)
+    for _ in range(2):
+        found = saltation.tabulated(rough)
+        assert found.steady.tolist() == [40.0, 50.0, 40.0, 40.0]
+        assert found.cessation.tolist() == [80.0, 100.0, 80.0, 80.0]
+    assert counts == [2]
+    saltation._of_unlike.cache_clear()
