@@ -8,11 +8,13 @@ import shutil
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import pandas as pd
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
 
 from orchestrator.benchmark import judge, pack, page
 from orchestrator.benchmark.export import Ours
@@ -133,20 +135,50 @@ def run(root: Path, command: str, out: Path | None, options: Options) -> Outcome
         # runs of an earlier time were not in turn with the solver
         shutil.rmtree(folder.path(f"{OURS}/cases"), ignore_errors=True)
         ours.root.mkdir(parents=True)
-        counts = Counter(chosen.scenes[name]["level"] for name in names)
-        begun: set[int] = set()
-        for name in names:
-            level = chosen.scenes[name]["level"]
-            if level not in begun:
-                begun.add(level)
-                text = f"level {level}: {number(counts[level], 'scene')}"
-                print(text, file=sys.stderr, flush=True)
+        for name in shown({name: chosen.scenes[name]["level"] for name in names}):
             _solve(words, chosen.root / pack.SCENES / name, options, folder, name)
             answer, times = ours.answer(name)
             folder.note(f"{OURS}/{name}/{ANSWER}", pack.csv(answer))
             folder.note(f"{OURS}/{name}/{USED}", text_of(times))
         pack.verify(chosen.root, chosen.manifest)
         return _written(chosen, judge.judge(chosen, names, [out]), folder)
+
+
+def shown(levels: Mapping[str, int]) -> Iterator[str]:
+    """Go through scenes and say on stderr how far it is.
+
+    On a terminal it is one line that renews itself, else a line for each level.
+
+    Parameters
+    ----------
+    levels
+        The level of each scene, by name.
+
+    Yields
+    ------
+    str
+        The name of each scene.
+    """
+    is_terminal = sys.stderr.isatty()
+    bar = Progress(
+        TextColumn("{task.completed:.0f}/{task.total:.0f} scenes"),
+        BarColumn(),
+        TextColumn("{task.description}"),
+        console=Console(stderr=True, highlight=False, markup=False),
+        disable=not is_terminal,
+    )
+    counts = Counter(levels.values())
+    begun: set[int] = set()
+    with bar:
+        task = bar.add_task("", total=len(levels))
+        for name, level in levels.items():
+            bar.update(task, description=f"level {level}: {name}")
+            if level not in begun and not is_terminal:
+                text = f"level {level}: {number(counts[level], 'scene')}"
+                print(text, file=sys.stderr, flush=True)
+            begun.add(level)
+            yield name
+            bar.advance(task)
 
 
 def _name_of_program(words: Sequence[str]) -> str:

@@ -1,9 +1,11 @@
 """Solvers as real processes, their results and pages: faults are named, nothing foreign is lost."""
 
+import io
 import json
 import os
 import re
 import shutil
+import sys
 from pathlib import Path
 
 import pandas as pd
@@ -380,3 +382,32 @@ def test_forms_of_answers_and_names_of_solvers(
     assert not outcome.failures
     assert "\x1b" not in outcome.summary + outcome.page.read_text(encoding="utf-8")
     assert sorted(results.rglob("*")) == before
+
+
+class Stream(io.StringIO):
+    """A stream that may be a terminal."""
+
+    def __init__(self, is_terminal: bool) -> None:
+        super().__init__()
+        self.is_terminal = is_terminal
+
+    def isatty(self) -> bool:
+        return self.is_terminal
+
+
+def test_one_line_on_a_terminal_says_how_far_it_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    levels = {"1-a": 1, "1-b": 1, "4-c": 4}
+    for is_terminal in (True, False):
+        stream = Stream(is_terminal)
+        monkeypatch.setattr(sys, "stderr", stream)
+        monkeypatch.setenv("TERM", "xterm")
+        assert list(compare.shown(levels)) == [*levels]
+        text = stream.getvalue()
+        if is_terminal:
+            assert "3/3 scenes" in text
+            assert "level 4: 4-c" in text
+            assert text.count("\n") <= 1
+        else:
+            assert text == "level 1: 2 scenes\nlevel 4: 1 scene\n"
