@@ -115,11 +115,15 @@ def write(
         # the name of a solver may have letters that the font has not
         warnings.filterwarnings("ignore", "Glyph .* missing from font")
         beds = _beds(numbers, theirs) + _shields(chosen, numbers)
+        listed = thresholds(numbers)
+        of_beds = Section("Beds", "", beds)
+        if len(listed):
+            of_beds = Section("Beds", THRESHOLDS, beds, (listed,))
         said = "\n\n".join([*notes, *judge.in_words(theirs)])
         sections = [
             Section("", said, (), (judge.summary(theirs),), card=_card(theirs)),
             Section("What failed", tables=(judge.failures(theirs),)),
-            Section("Beds", THRESHOLDS, beds, (thresholds(numbers),)),
+            of_beds,
             Section("Time and error", ERRORS, _speed(verdicts), (scenes,), LIMITS),
         ]
         names = ", ".join(theirs["solver"].unique())
