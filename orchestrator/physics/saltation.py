@@ -1048,6 +1048,11 @@ def is_tabulated(grains: Grains) -> BoolArray:
     -------
     ndarray
         Truth values, shape (n,); others take a second for each few grains.
+
+    Examples
+    --------
+    >>> print(is_tabulated(Grains([38.8, 38.8], 2208.0, roughness=[1 / 30, 0.1])))
+    [ True False]
     """
     is_inside = np.isclose(grains.roughness * SAND_GRAIN, 1, rtol=1e-6, atol=0)
     is_inside &= (grains.fall <= 0) & (grains.relative_size == 1)
