@@ -173,6 +173,10 @@ def _counted(scene: Scene, bed: PileBed) -> Iterator[Remark]:
         rest = "shares are of the grains between them"
     elif counts == "windward":
         where = "The sides that rise in the wind are counted."
+        rest = (
+            "so are ripples and noise of level ground beside the form; for the form "
+            "alone write its range: `bed.counted = [5.0, 34.0]`"
+        )
     else:
         where = "All of the bed is counted."
         rest = 'the windward sides alone: `bed.counted = "windward"`'

@@ -246,8 +246,8 @@ def _reasons_of_pile(row: Mapping[Any, Any], tolerance: float | None) -> Iterato
     yield from _open_ends(row)
     needed = row.get("smoothing_needed_m", 0.0)
     if needed > (row.get("smoothing") or 0.0) * (1 + 1e-9):
-        what = "the profile is noise at the scale of the mesh"
-        yield f"{what}: bed.smoothing = {needed:g}"
+        what = "the profile is noise at the scale of the mesh, which disturbs its flow"
+        yield f"{what} (write bed.smoothing = {needed:g} and run again)"
     yield from _held_row(row)
 
 
