@@ -150,6 +150,12 @@ def _check_exportable(asked: Study, planned: Plan, where: str) -> None:
         )
     remedy = "run the study without it into another directory"
     for pile in planned.piles.values():
+        if pile.goes_on:
+            raise InputError(
+                "threshold.criterion: a pack asks when grains leave their pockets",
+                where,
+                'write threshold.criterion = "leaves", run it into another directory',
+            )
         if pile.scene.threshold.update or pile.bed.width:
             what = "a pack holds one flow over each bed, in its plane"
             fields_of_it = "threshold.update or bed.width"

@@ -37,7 +37,7 @@ DRY_GRAINS = Remark(
 )
 FIRST_MOTION = Remark(
     "First motion, not transport.",
-    "Grains leave their places; how many are carried on, and how far, is not asked.",
+    "Grains start to move; how many are carried on, and how far, is not asked.",
 )
 
 

@@ -540,8 +540,10 @@ class Threshold(Part):
     )
     """displacement along the bed from which a grain counts as moved"""
     criterion: Literal["auto", "leaves", "goes on"] = field("auto", since=True)
-    """what a grain must do; left open, in another fluid than the paper's, it must go on
-    - auto: by fluid and forces
+    """what a grain must do
+    - auto: goes on in every fluid but the paper's; leaves where a field of the scene
+      rules hops out: unlike grains, gusts, shared stress, a bed that changes, the laws
+      of the paper, a single grain by DEM
     - leaves: leave its pocket in the flow, as in the paper
     - goes on: leave it in a gust of 2.28 times the mean stress, and hop on after it"""
     fractions: Annotated[tuple[Fraction, ...], List] = _pile(

@@ -209,6 +209,7 @@ def test_export_twice_and_without_liggghts(
         ('bed.packing = "poured"\nbed.width = 5.0', "bed.width"),
         ("threshold.update = 0.1", "threshold.update"),
         ('forces.sheltering = "balanced"', "forces.sheltering"),
+        ('fluid.kind = "water"', 'write threshold.criterion = "leaves"'),
         ("", "the study is not finished"),
     ],
 )
