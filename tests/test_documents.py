@@ -58,8 +58,9 @@ def test_the_page_of_commands_has_every_command_and_preset() -> None:
     assert presets == named - {"erosion"}
 
 
-def test_the_page_of_columns_is_written_from_the_program() -> None:
-    page = ROOT / "docs" / "columns.md"
+@pytest.mark.parametrize("name", ["columns", "paper"])
+def test_a_page_is_written_from_the_program(name: str) -> None:
+    page = ROOT / "docs" / f"{name}.md"
     written = runpy.run_path(str(page.with_suffix(".py")))["text"]()
     assert page.read_text(encoding="utf-8") == written
 
