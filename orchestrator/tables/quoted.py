@@ -166,8 +166,13 @@ def grain_ustar(rows: pd.DataFrame) -> FloatArray:
     if "criterion" not in rows:
         return leaving
     is_going_on = (rows["criterion"] == GOES_ON).to_numpy()
-    peak = np.nan_to_num(gust, nan=saltation.PEAK)
-    return np.where(is_going_on, _going_on(rows, found, peak), leaving)
+    if not is_going_on.any():
+        return leaving
+    peak = np.nan_to_num(gust, nan=saltation.PEAK)[is_going_on]
+    # those that only leave their pockets are not followed over their beds
+    going = rows[is_going_on]
+    leaving[is_going_on] = _going_on(going, found[is_going_on], peak)
+    return leaving
 
 
 def _gusts(rows: pd.DataFrame) -> FloatArray:
