@@ -3,8 +3,8 @@
 python tools/gallery.py DIRECTORY
 
 DIRECTORY holds the results of each preset below, in a directory of its name, as
-`orchestrator study PRESET --out DIRECTORY/PRESET > DIRECTORY/PRESET.txt` writes them; `stockpile`
-is run by `orchestrator erosion`. The pictures are drawn by chromium from the figures of the runs.
+`orchestrator study PRESET --out DIRECTORY/PRESET > DIRECTORY/PRESET.txt` writes them; those of
+`COMMANDS` are run by another command. The pictures are drawn by chromium from the figures of the runs.
 """
 
 import subprocess
@@ -30,6 +30,8 @@ SHOWN = {
     "paper": "fractions-reynolds-alpha15.svg",
 }
 """The figure that is shown of each preset."""
+COMMANDS = {"stockpile": "erosion stockpile", "paper": "study paper --tolerance 0.2"}
+"""Commands of presets that `study PRESET` does not run."""
 WIDE = 900  # pixels
 COLOURS = 64
 HEAD = """\
@@ -63,11 +65,11 @@ def section(directory: Path, preset: str) -> str:
     answer = (directory / f"{preset}.txt").read_text(encoding="utf-8")
     card = shortened(answer)
     question = card.splitlines()[0]
-    command = "erosion" if preset == "stockpile" else "study"
+    command = COMMANDS.get(preset, f"study {preset}")
     lines = [
         f"## {preset}",
         "",
-        f"`orchestrator {command} {preset}`, file [{file.name}](../{file.relative_to(ROOT)})",
+        f"`orchestrator {command}`, file [{file.name}](../{file.relative_to(ROOT)})",
         "",
         "```",
         card,

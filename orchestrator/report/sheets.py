@@ -269,7 +269,7 @@ def _thresholds(
     else:
         rows = rows.sort_values(["alpha_deg", "d_m"], kind="stable")
     told = quantity(rows)
-    rows = _with_tested(rows, told)
+    rows = with_tested(rows, told)
     rows = _open_ended(rows, "shields_low", "shields_high")
     rows = _open_ended(rows, told.column("_low"), told.column("_high"))
     number = rows.groupby(list(keys), dropna=False, sort=False).ngroup()
@@ -316,8 +316,21 @@ def _columns(
     return columns
 
 
-def _with_tested(rows: pd.DataFrame, told: Quantity) -> pd.DataFrame:
-    """Rows whose intervals are the tested ones where there are such."""
+def with_tested(rows: pd.DataFrame, told: Quantity) -> pd.DataFrame:
+    """Give thresholds their tested intervals where there are such.
+
+    Parameters
+    ----------
+    rows
+        Thresholds with the columns of their scenes.
+    told
+        What their flow is told by.
+
+    Returns
+    -------
+    DataFrame
+        The rows with other intervals of the Shields number and of the flow in its unit.
+    """
     is_tested = rows["tested_rows"] > 0
     if not is_tested.any():
         return rows

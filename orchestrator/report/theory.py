@@ -88,6 +88,8 @@ OF_GOING_ON = (
 """Columns that set curves of grains that go on apart."""
 SIZES, BESIDE = 25, 4.0
 """Sizes of such a curve, and how far it reaches beyond those of a study, times."""
+MOST_FLUIDS = 3
+"""Fluids up to which each has an entry of its own in a legend."""
 GOING, LEAVING = "grains that go on", "grains that leave their pockets"
 """What lines are of, by the criterion."""
 BAGNOLD_FROM = 3.5  # Bagnold's A is 0.1 above this Re* only; it rises below
@@ -299,7 +301,9 @@ def going_on(rows: pd.DataFrame) -> list[Going]:
         bed = Bed._make(first[BED].tolist())
         line = Line(str(first["force_law"]), bed, np.inf, 0.0)
         within = ""
-        if len(fluids) > 1:
+        if len(fluids) > MOST_FLUIDS:
+            within = " in each fluid"
+        elif len(fluids) > 1:
             within = f" in {fluid(first['rho_f_kg_m3'], first['nu_m2_s'])}"
         name = f"{line.name}{within}: {GOING}"
         found.append(Going(line.law, bed, name, reynolds, tau, line.holds(reynolds)))

@@ -10,9 +10,18 @@ from orchestrator.physics import saltation
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.threshold import SingleGrain, thresholds_of
 from orchestrator.physics.velocity import measurable_speeds
-from orchestrator.report import answers, drawing, head, head_grain, shields, single
+from orchestrator.report import (
+    answers,
+    drawing,
+    head,
+    head_grain,
+    sheets,
+    shields,
+    single,
+)
 from orchestrator.report.card import Card, Number, Worth, lines
 from orchestrator.report.results import Results
+from orchestrator.report.subjects import STRESS
 from tests.report.conftest import changed, copies, legend_of, only
 
 WIND = Number(13.44, "m/s", "wind", low=9.947, high=13.44, measured=9.683)
@@ -198,3 +207,16 @@ def test_labels_of_the_picture_of_a_grain_lie_on_no_points(
                     continue
                 points = ax.transData.transform(line.get_xydata())
                 assert not any(box.contains(x, y) for x, y in points)
+
+
+def test_a_table_has_the_tested_interval_in_the_unit_of_its_flow() -> None:
+    """A stress goes with the Shields number; a row without measurements keeps its own."""
+    row = {"rho_f_kg_m3": 1000.0, "ustar0_m_s": 0.02, "shields": 0.04}
+    row |= {"shields_low": 0.039, "shields_high": 0.041}
+    row |= {"stress_low_pa": 0.39, "stress_high_pa": 0.41}
+    row |= {"tested_low": 0.02, "tested_high": 0.08}
+    rows = pd.DataFrame([row | {"tested_rows": 9.0}, row | {"tested_rows": 0.0}])
+    found = sheets.with_tested(rows, STRESS)
+    assert found["stress_low_pa"].tolist() == pytest.approx([0.2, 0.39])
+    assert found["stress_high_pa"].tolist() == pytest.approx([0.8, 0.41])
+    assert found["shields_high"].tolist() == pytest.approx([0.08, 0.041])
