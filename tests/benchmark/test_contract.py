@@ -394,6 +394,15 @@ def test_a_pack_brings_the_contract(formulas: Path) -> None:
         assert heading in contract
 
 
+def test_the_small_pack_is_of_the_present_contract() -> None:
+    """Another page needs another pack: run its study.toml, and export it into its place."""
+    small = ROOT / "benchmark" / "small"
+    read = pack.read(small)
+    assert sorted({int(name[0]) for name in read.manifest.scenes}) == [1, 2, 3, 4, 5]
+    written = (small / pack.ABOUT).read_text(encoding="utf-8")
+    assert pack.contract() in written
+
+
 def _near(one: set[tuple[float, float]], other: set[tuple[float, float]]) -> None:
     """See that two sets of places are the same, d."""
     assert len(one) == len(other)

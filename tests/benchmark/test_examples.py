@@ -67,6 +67,15 @@ def test_the_native_starts_know_the_formulas(
     assert (verdicts["worst"] < 1e-6).all()
 
 
+@pytest.mark.long
+def test_the_small_pack_is_answered_at_all_levels(tmp_path: Path) -> None:
+    """The pack of the repository: a native start knows all but the levels of the flow."""
+    root = tmp_path / "pack"
+    shutil.copytree(ROOT / "benchmark" / "small", root)
+    result = _run(root, tmp_path, RIGHT, "*")
+    assert result.failures == []
+
+
 def test_the_native_starts_know_the_pivots_of_a_poured_bed(
     poured: Path, tmp_path: Path, native: str
 ) -> None:
