@@ -51,6 +51,7 @@ DUNE, FLAT_BED = (
 FENCE = '{ kind = "fence", x = -0.3, height = 0.01 }'
 BLOCK = '{ kind = "block", x = -0.1, height = 0.01 }'
 OBSTACLES = 'method.flow.model = "flat"; bed.obstacles = [{}, {}]'
+LEAVES = 'threshold.criterion = "leaves"'
 AS_PROFILE = 'bed.profile = "bed.csv"; bed.counted = "windward"'
 
 
@@ -60,8 +61,12 @@ AS_PROFILE = 'bed.profile = "bed.csv"; bed.counted = "windward"'
         *((scaled(size), "", 1e-6) for size in (0.1, 10, 1000)),
         (f"{scaled(10)}; {PEELING}", PEELING, 1e-5),
         ("fluid.density = 9e3; grain.density = 23850.0", "", 1e-6),
-        # four times the submerged density
-        (f"grain.density = {1000 + 4 * 1650.0}; fluid.viscosity = 2e-6", "", 1e-6),
+        # four times the submerged density: it changes how far a grain hops, not when it leaves
+        (
+            f"grain.density = {1000 + 4 * 1650.0}; fluid.viscosity = 2e-6; {LEAVES}",
+            LEAVES,
+            1e-6,
+        ),
         ("method.grains.mobile_layers = 5", "", 1e-9),
         ('method.kind = "local"', "", 5e-3),
         ("bed.seed = 3", "", 1e-6),

@@ -305,7 +305,10 @@ def test_grains_of_poured_beds_leave_in_a_gust_and_go_on_by_their_own_sizes(
 ) -> None:
     results: Results = request.getfixturevalue(name)
     cases = results.cases
-    fields: dict[str, object] = {"forces.sheltering": sheltering}
+    fields: dict[str, object] = {
+        "forces.sheltering": sheltering,
+        "threshold.criterion": "leaves",
+    }
     if sheltering == "balanced":
         fields["forces.exposure"] = "protrusion"
     scene = changed(_pile(results, "pivot").scene, fields)
