@@ -165,6 +165,7 @@ def test_what_no_flow_reaches_is_infinite() -> None:
     assert np.isnan(thresholds(Grains(127.0, 2.65, slope_deg=-80.0)).cessation[0])
 
 
+@pytest.mark.long
 def test_thresholds_converge_with_the_time_step() -> None:
     # 0.3 mm in air, 1 and 5 mm in water
     grains = Grains([51.0, 127.0, 1423.0], [2208.0, 2.65, 2.65])
@@ -190,6 +191,7 @@ def test_the_angle_at_which_a_grain_leaves_hardly_matters(
         np.testing.assert_allclose(thresholds(grains).steady, usual, rtol=2e-2)
 
 
+@pytest.mark.long
 def test_answers_are_those_of_an_independent_computation() -> None:
     # made with another program on a grid of 7 %, which is right to that
     d = np.array([0.1, 0.2, 0.3, 0.5, 1.0]) * 1e-3
@@ -222,6 +224,7 @@ def test_thresholds_have_not_changed() -> None:
     )
 
 
+@pytest.mark.long
 def test_a_gust_that_lasts_long_gives_the_limit() -> None:
     air = Grains.of(np.array([2e-4, 5e-4]), **AIR)
     limit = thresholds(air).initiation(2.28)
@@ -286,6 +289,7 @@ def test_what_traps_more_needs_more() -> None:
     assert np.all(np.diff(steady, axis=0) > 0)
 
 
+@pytest.mark.long
 def test_the_slope_law_is_that_of_a_friction_angle() -> None:
     # cos a + sin a/tan(phi), with the phi of natural sand, none of which was put in
     slopes_deg = np.array([-20.0, -10.0, 0.0, 10.0, 20.0])

@@ -65,6 +65,7 @@ def test_each_criterion_has_a_curve_of_its_own_with_its_name(tmp_path: Path) -> 
     assert theory.section(made) is not None
 
 
+@pytest.mark.long
 def test_beds_that_no_table_holds_have_the_curve_of_their_pockets(
     tmp_path: Path,
 ) -> None:
