@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from orchestrator.digits import percent
 from orchestrator.grains.pile import Pile
 from orchestrator.physics.constants import GRAIN_COLUMNS
 from orchestrator.physics.laws import LAWS, Exposure
@@ -455,8 +456,9 @@ def _of_mixture(row: pd.Series, results: Results) -> Card:
     spread = Number(
         float(stress[0]),
         "Pa",
-        "from the finest sizes to the coarsest",
-        f"{sizes[0]:.3g} mm to {sizes[-1]:.3g} mm; measured: Wilcock and Crowe 2003, "
+        f"stress that moves {percent(row['fraction'])} of the finest size, and of the "
+        "coarsest",
+        f"{sizes[0]:.3g} mm and {sizes[-1]:.3g} mm; measured: Wilcock and Crowe 2003, "
         "at the measured stress of d50",
         last=float(stress[-1]),
         measured=beside[0],
