@@ -216,6 +216,10 @@ def _of_many(rows: Sequence["Row"], asked: str, varied: Sequence[str]) -> Iterat
     heads = {PARAMETERS[name].column: PARAMETERS[name].label for name in varied}
     if asked == "paper" or len(laws) > 1:
         heads["law"] = "force law"
+    depths = {row["depth_m"] for row in chosen if not _is_nan(row["depth_m"])}
+    if len(depths) > 1:
+        # those of a river of one slope
+        heads["depth_m"] = PARAMETERS["depth"].label
     heads |= _quantities(rows)
     if "decides" in rows[0]:
         heads |= OF_CRITERION

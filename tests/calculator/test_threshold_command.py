@@ -384,6 +384,10 @@ def test_a_river_has_a_depth_and_a_velocity(run: Run) -> None:
     rising = _json(run(*gravel, "--bed-slope", "0.005", "--json"))
     assert falling == rising
     answer = falling["bridged-gravel"]
+    sizes = ("--diameter", "0.01:0.03:3", "--density", "2650", "--fluid", "water")
+    many = run(*sizes, "--bed-slope", "0.005")[1].splitlines()
+    assert many[1].split("  ")[0:1] == ["d, m"]
+    assert "depth, m" in many[1]
     row = run(*gravel, "--bed-slope", "0.005", "--csv")[1].splitlines()
     heads = row[0].split(",")
     values = dict(zip(heads, row[1].split(","), strict=True))
