@@ -239,11 +239,20 @@ def _quantities(rows: Sequence["Row"]) -> dict[str, str]:
     return labels
 
 
+def _whether_it_holds(row: "Row") -> str:
+    """Whether the law holds: where the grain leaves, which hopping on may exceed."""
+    if not row["why_not"]:
+        return "yes"
+    is_further = row.get("decides") == "goes on"
+    where = "no, when it leaves" if is_further else "no"
+    return f"{where}: {row['why_not']}"
+
+
 def _as_table(rows: Sequence["Row"], heads: Mapping[str, str]) -> Iterator[str]:
     """Lines of a table, with a last column that says whether the law holds."""
     holds = ["holds"]
     for row in rows:
-        holds.append(f"no: {row['why_not']}" if row["why_not"] else "yes")
+        holds.append(_whether_it_holds(row))
     columns = []
     for column, head in heads.items():
         if column in TOO_MANY:
