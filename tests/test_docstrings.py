@@ -28,16 +28,9 @@ PHYSICS = (
 )
 """Modules whose public functions have an example each."""
 UNDESCRIBED = (
-    "orchestrator.study.surface",
-    "orchestrator.experiments.surface",
-    "orchestrator.experiments.surface_erosion",
     "orchestrator.experiments.surface_truth",
     "orchestrator.flow.mesh3",
-    "orchestrator.report.along",
-    "orchestrator.report.answers",
     "orchestrator.report.flows",
-    "orchestrator.report.head_line",
-    "orchestrator.report.maps",
     "orchestrator.report.shields",
     "orchestrator.report.theory",
 )

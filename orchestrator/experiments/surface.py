@@ -121,7 +121,18 @@ def experiment(study: SurfaceStudy, out: Path) -> Experiment:
 
 
 def flow_of(scene: SurfaceScene) -> SurfaceFlowCase:
-    """The run of a scene."""
+    """The run of a scene.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+
+    Returns
+    -------
+    SurfaceFlowCase
+        The run of its flow.
+    """
     roughness = scene.solve_roughness
     relief = scene.heights.relief
     asked = scene.method.flow
@@ -146,7 +157,19 @@ def flow_of(scene: SurfaceScene) -> SurfaceFlowCase:
 def alike(
     scenes: Sequence[SurfaceScene],
 ) -> dict[SurfaceScene, list[SurfaceScene]]:
-    """Scenes by the one that they are but for the direction of the wind."""
+    """Scenes by the one that they are but for the direction of the wind.
+
+    Parameters
+    ----------
+    scenes
+        Scenes of a study.
+
+    Returns
+    -------
+    dict
+        By a scene whose wind comes from 0 degrees: those that differ from it in the
+        direction alone.
+    """
     found: dict[SurfaceScene, list[SurfaceScene]] = {}
     for scene in scenes:
         flow = scene.flow.model_copy(update={"from_deg": 0.0})
@@ -156,7 +179,20 @@ def alike(
 
 
 def ground_of(scene: SurfaceScene, threshold: float | None) -> Ground:
-    """What lies on the surface of a scene; a threshold replaces the closed form."""
+    """What lies on the surface of a scene; a threshold replaces the closed form.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    threshold
+        Friction velocity of every face, m/s; None: the closed form.
+
+    Returns
+    -------
+    Ground
+        The grains of its faces.
+    """
     return Ground(
         grain=scene.grain_in_pocket,
         law=scene.law,
@@ -187,7 +223,18 @@ def _answer(
 
 
 def tables(found: Sequence[Answer]) -> dict[str, pd.DataFrame]:
-    """The tables: directions, shares against the wind, and all faces."""
+    """The tables: directions, shares against the wind, and all faces.
+
+    Parameters
+    ----------
+    found
+        Answers of a study.
+
+    Returns
+    -------
+    dict of str to DataFrame
+        The tables by their names.
+    """
     rows = []
     curves = []
     made = {}
@@ -214,7 +261,18 @@ def _winds(answer: Answer) -> FloatArray:
 
 
 def files(found: Sequence[Answer]) -> dict[str, bytes]:
-    """GeoTIFFs of the maps for a GIS, and files of VTK for ParaView, by their paths."""
+    """GeoTIFFs of the maps for a GIS, and files of VTK for ParaView, by their paths.
+
+    Parameters
+    ----------
+    found
+        Answers of a study.
+
+    Returns
+    -------
+    dict of str to bytes
+        Contents by path in the directory of the study.
+    """
     made = {}
     for number, answer in enumerate(found, 1):
         grid = answer.grid
@@ -242,7 +300,20 @@ def _vtk(answer: Answer) -> bytes:
 
 
 def sections(found: Sequence[Answer], source: str) -> list[Section]:
-    """The page: the answer with the map of the least wind, then all else."""
+    """The page: the answer with the map of the least wind, then all else.
+
+    Parameters
+    ----------
+    found
+        Answers of a study.
+    source
+        What the study was read from, in words.
+
+    Returns
+    -------
+    list of Section
+        The sections, in their order.
+    """
     words = TEXTS["surface"]
     listed: list[Section] = []
     for number, answer in enumerate(found, 1):

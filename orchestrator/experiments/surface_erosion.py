@@ -123,7 +123,24 @@ def piles(
     least: float | None,
     cases: Path,
 ) -> list[erosion.Pile]:
-    """The piles of some scenes, each with a surface for every direction of the wind."""
+    """The piles of some scenes, each with a surface for every direction of the wind.
+
+    Parameters
+    ----------
+    scenes
+        The scenes.
+    flows
+        The run of the flow of each.
+    least
+        Threshold friction velocity of every face, m/s; None: the closed form.
+    cases
+        The directory of the finished runs.
+
+    Returns
+    -------
+    list of Pile
+        The piles.
+    """
     found = []
     for bare, members in surface.alike(scenes).items():
         surfaces = []

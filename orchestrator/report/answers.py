@@ -104,12 +104,34 @@ def _of_beds(results: Results) -> Card:
 
 
 def are_several_beds(rows: pd.DataFrame) -> bool:
-    """Whether thresholds are of beds that differ in more than the share that moves."""
+    """Whether thresholds are of beds that differ in more than the share that moves.
+
+    Parameters
+    ----------
+    rows
+        Thresholds with the columns of their scenes.
+
+    Returns
+    -------
+    bool
+        Whether they are.
+    """
     return len(rows[labels.varying(rows, "fraction")].drop_duplicates()) > 1
 
 
 def is_one_grain(grains: pd.DataFrame) -> bool:
-    """Whether thresholds of single grains are those of one grain."""
+    """Whether thresholds of single grains are those of one grain.
+
+    Parameters
+    ----------
+    grains
+        Thresholds with the columns of their scenes.
+
+    Returns
+    -------
+    bool
+        Whether they are.
+    """
     questions = [*GRAIN_COLUMNS.values(), "force_law", "depth_m"]
     return len(grains[questions].drop_duplicates()) == 1
 

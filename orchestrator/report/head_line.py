@@ -96,7 +96,20 @@ def _place(x: float, pile: Pile) -> str:
 
 
 def grains_of(row: pd.Series, results: Results) -> pd.DataFrame:
-    """The counted places or grains of a bed, by their place."""
+    """The counted places or grains of a bed, by their place.
+
+    Parameters
+    ----------
+    row
+        The threshold of a bed with the columns of its scene.
+    results
+        The study with its tables.
+
+    Returns
+    -------
+    DataFrame
+        A row for each place or grain.
+    """
     grains = results.tables["pile_grain"]
     here: pd.DataFrame = grains[grains["scene_id"] == row["scene_id"]]
     return here.sort_values("x_m")

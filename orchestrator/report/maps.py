@@ -205,6 +205,16 @@ def nice(length: float) -> float:
     --------
     >>> [nice(length) for length in (0.7, 23.0, 5.0)]
     [0.5, 20.0, 5.0]
+
+    Parameters
+    ----------
+    length
+        A length of any unit, above 0.
+
+    Returns
+    -------
+    float
+        In the same unit.
     """
     power = 10.0 ** np.floor(np.log10(length) + 1e-9)
     fits = [part * power for part in NICE if part * power <= length * (1 + 1e-9)]

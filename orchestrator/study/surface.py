@@ -269,7 +269,29 @@ def surface_of(
 ) -> Surface:
     """Make a surface of its heights, with its digest.
 
-    The parameters are its attributes.
+    Parameters
+    ----------
+    name
+        Name of the file or the shape.
+    x, y
+        Axes of the raster to the east and to the north, m, shapes (nx,) and (ny,).
+    z
+        Heights as the file has them, m, shape (ny, nx).
+    level
+        Height of the ground around the form, m.
+    spread
+        Standard deviation of the smoothing, in cells of the flow's mesh.
+    said
+        What was done to the heights, in words.
+    tags
+        Tags of the GeoTIFF that say where on the Earth it is.
+    noise
+        Standard deviation of the heights of the rim, m.
+
+    Returns
+    -------
+    Surface
+        The surface.
     """
     relief = float(z.max() - level)
     of_rim = float(on_grid(noise, relief, 6))
