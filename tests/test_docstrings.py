@@ -29,8 +29,6 @@ PHYSICS = (
 """Modules whose public functions have an example each."""
 UNDESCRIBED = (
     "orchestrator.experiments.surface_truth",
-    "orchestrator.flow.mesh3",
-    "orchestrator.report.flows",
     "orchestrator.report.shields",
     "orchestrator.report.theory",
 )

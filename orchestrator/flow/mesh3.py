@@ -75,7 +75,15 @@ LEVELS = {level.name: level for level in (COARSE, STANDARD)}
 
 
 class Sizes(NamedTuple):
-    """Ends of a form along and across the wind, m."""
+    """Ends of a form along and across the wind.
+
+    Attributes
+    ----------
+    start, end
+        Of the form along the wind, m.
+    right, left
+        Of the form across the wind, m; the left lies at the larger coordinate.
+    """
 
     start: float
     end: float

@@ -112,7 +112,18 @@ def _kinds(results: Results) -> list[list[Pile]]:
 
 
 def drawn(results: Results) -> list[Pile]:
-    """A pile for each kind of flow whose files are kept."""
+    """A pile for each kind of flow whose files are kept.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Returns
+    -------
+    list of Pile
+        The piles.
+    """
     found = []
     for kind in _kinds(results):
         kept = [pile for pile in kind if is_whole(pile.flow, results.cases)]
@@ -121,7 +132,18 @@ def drawn(results: Results) -> list[Pile]:
 
 
 def stress(results: Results) -> Iterator[Figure]:
-    """The friction velocity along beds, for each slope at its least and largest z0."""
+    """The friction velocity along beds, for each slope at its least and largest z0.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Yields
+    ------
+    Figure
+        The figures.
+    """
     piles = []
     for smoothest, *rougher in _kinds(results):
         piles += [smoothest, *rougher[-1:]]
@@ -282,7 +304,18 @@ def over_u_e(
 
 
 def flow(results: Results) -> Iterator[Figure]:
-    """Speed and streamlines: a panel for each slope and height, at its least z0."""
+    """Speed and streamlines: a panel for each slope and height, at its least z0.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Yields
+    ------
+    Figure
+        One figure, or none.
+    """
     for name, title, shown in style.pages(drawn(results)):
         settings = [pile.scene.method.flow for pile in shown]
         models = [
@@ -377,7 +410,18 @@ def _smooth(psi: FloatArray) -> FloatArray:
 
 
 def mesh(results: Results) -> Iterator[Figure]:
-    """The mesh of the study's least slope, which stands for all, and its crest."""
+    """The mesh of the study's least slope, which stands for all, and its crest.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Yields
+    ------
+    Figure
+        One figure, or none.
+    """
     for pile in drawn(results)[:1]:
         first_over_z0 = pile.flow.first_cell_m / pile.bed.roughness
         text = caption(
