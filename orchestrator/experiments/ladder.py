@@ -487,9 +487,6 @@ def _known(table: pd.DataFrame, part: str, rung: str, again: str) -> pd.DataFram
 def _sections(pairs: pd.DataFrame, known: pd.DataFrame) -> list[Section]:
     """The sections of the page."""
     words = TEXTS["ladder"]
-    percent = 100 * pairs[[*HEADS]]
-    means = pairs.sort_values(["packing", "cost_core_s"]).assign(**percent)
-    means = means[["packing", *PAIR, "piles", "cost_core_s", *HEADS]]
     charts = [
         Figure(
             "speed-against-accuracy",
@@ -506,7 +503,7 @@ def _sections(pairs: pd.DataFrame, known: pd.DataFrame) -> list[Section]:
             chart(pairs, HEADS),
         ),
     ]
-    means = means.rename(columns=COLUMN_HEADS)
+    means = table_of(pairs)
     title = "The rungs, and what is known of them"
     of_rungs = _tables_of_rungs(known)
     return [
@@ -514,6 +511,32 @@ def _sections(pairs: pd.DataFrame, known: pd.DataFrame) -> list[Section]:
         Section("Speed against accuracy", words["accuracy"], charts, [means]),
         Section(title, words["rungs"], (), of_rungs, [words["limit"]]),
     ]
+
+
+def table_of(pairs: pd.DataFrame) -> pd.DataFrame:
+    """List the pairs of rungs with their numbers in the charts, costs and errors.
+
+    Parameters
+    ----------
+    pairs
+        The pairs, by `together`.
+
+    Returns
+    -------
+    DataFrame
+        A row for each packing and pair, by rising cost; errors in %.
+    """
+    percent = 100 * pairs[[*HEADS]]
+    means = pairs.assign(number=_numbers(pairs), **percent)
+    means = means.sort_values(["packing", "cost_core_s"])
+    means = means[["number", "packing", *PAIR, "piles", "cost_core_s", *HEADS]]
+    return means.rename(columns=COLUMN_HEADS)
+
+
+def _numbers(pairs: pd.DataFrame) -> Any:
+    """The number of each pair of rungs, in the figures and in the table."""
+    names = pairs["flow_rung"] + ", " + pairs["grain_rung"]
+    return pd.factorize(names)[0] + 1
 
 
 def _card(pairs: pd.DataFrame) -> Card:
@@ -589,14 +612,10 @@ def chart(pairs: pd.DataFrame, columns: Mapping[str, str]) -> Canvas:
     is_single = len(columns) == 1
     names = pairs["flow_rung"] + ", " + pairs["grain_rung"]
     colours = pairs["grain_rung"].map(METHODS).fillna(METHODS["DEM"])
-    table = pairs.assign(name=names, number=pd.factorize(names)[0] + 1, colour=colours)
+    table = pairs.assign(name=names, number=_numbers(pairs), colour=colours)
     packings = [rows for _, rows in table.groupby("packing", sort=False)]
-    of_row = 1.7
-    numbered = table[table["pareto"]]
-    if is_single:
-        of_row = 2.6
-        numbered = table
-    height = of_row * len(packings) + 0.06 * table["number"].nunique() + 1.2
+    of_row = 2.6 if is_single else 1.7
+    height = of_row * len(packings) + 1.2
     canvas = style.canvas(height)
     grid = canvas.subplots(
         len(packings), len(columns), sharex=True, sharey=True, squeeze=False
@@ -610,7 +629,7 @@ def chart(pairs: pd.DataFrame, columns: Mapping[str, str]) -> Canvas:
         for tolerance in TOLERANCES:
             ax.axhline(tolerance, color="0.45", lw=0.7, ls=(0, (4, 2)), zorder=1)
     grid[-1, len(columns) // 2].set_xlabel("cost, s of one core")
-    samples = _samples(numbered.drop_duplicates("number"), has_front=is_single)
+    samples = _samples(has_front=is_single)
     style.legends(canvas, [style.entry(*method) for method in METHODS.items()], samples)
     canvas.draw_without_rendering()  # labels are placed in a finished layout
     for ax, texts in tags:
@@ -640,14 +659,9 @@ def _row_of_panels(
     return tags
 
 
-def _samples(numbered: pd.DataFrame, *, has_front: bool) -> list[Artist]:
-    """Samples for the legend: the numbers of pairs, marks, bands and the front."""
+def _samples(*, has_front: bool) -> list[Artist]:
+    """Samples for the legend: marks, bands and the front."""
     samples: list[Artist] = []
-    rows: Any = numbered.itertuples(index=False)
-    for row in rows:
-        number = Line2D([], [], ls="", ms=5, label=row.name, color=row.colour)
-        number.set_marker(f"${row.number}$")
-        samples.append(number)
     mark: Look = {"ls": "", "ms": 5, "mec": "0.2", "mew": 0.9}
     for text, look in MARKS.items():
         samples.append(Line2D([], [], label=text, **mark, **look))

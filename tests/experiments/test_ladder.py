@@ -184,3 +184,15 @@ def test_points_are_the_errors_of_the_pairs() -> None:
     np.testing.assert_array_equal(
         xy, pairs[["cost_core_s", "largest"]].abs().clip(ladder.FLOOR)
     )
+
+
+def test_the_legends_of_the_charts_are_short_and_the_table_has_the_numbers() -> None:
+    pairs = ladder.together(ladder.errors(_table()))
+    canvas = ladder.chart(pairs, {"largest": ""})
+    for legend in canvas.legends:
+        assert len(legend.get_texts()) <= 7
+    table = ladder.table_of(pairs).set_index("number")
+    for text in canvas.axes[0].texts:
+        number, _, name = text.get_text().partition(": ")
+        row = table.loc[[int(number)]].iloc[0]
+        assert name in ("", f"{row['flow']}, {row['grains']}")
