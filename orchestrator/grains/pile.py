@@ -887,7 +887,10 @@ class Peeling(Method):
 
     def last(self, cases: Path) -> Worn:
         """The grains of a bed that changes, when the last round has ended."""
-        *_, flow = (self.geometry.flow, *self.cases)
+        flow: Flow = self.geometry.flow
+        runs = self.cases
+        if runs:
+            flow = runs[-1]
         return peeled(self.geometry, flow, cases)
 
 
@@ -1001,9 +1004,10 @@ class Pile(Geometry):
     @property
     def last_run(self) -> str | None:
         """Name of the last of these cases; None without a run."""
-        for case in reversed(self.runs):
-            return case.name
-        return None
+        runs = self.runs
+        if not runs:
+            return None
+        return runs[-1].name
 
     def is_run(self, done: Container[str]) -> bool:
         """Whether all of its runs are among those that are done, by name.

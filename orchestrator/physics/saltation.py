@@ -1171,9 +1171,9 @@ def _beyond_table(grains: Grains, at_most: bool) -> Thresholds:
         grains.relative_size,
     )
     rows = [*zip(*(values.tolist() for values in fields), strict=True)]
-    unlike = tuple(dict.fromkeys(rows))
-    places = [unlike.index(row) for row in rows]
-    found = _of_unlike(unlike, at_most)
+    unlike: dict[tuple[float, ...], int] = {}
+    places = [unlike.setdefault(row, len(unlike)) for row in rows]
+    found = _of_unlike(tuple(unlike), at_most)
     return Thresholds(found.steady[places], found.cessation[places])
 
 

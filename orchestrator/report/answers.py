@@ -323,7 +323,7 @@ def share(row: pd.Series, told: Quantity) -> Number:
     """
     ustar = float(row["ustar0_m_s"])
     low, high, of_what = _share_interval(row)
-    part = f"{row['fraction']:.0%}".replace("%", " %")
+    part = percent(row["fraction"])
     what = "of the bed" if row["method"] == "local" else "of the grains"
     return _flow_number(row, told, f"{part} {what}", (ustar, low, high), of_what)
 
@@ -366,6 +366,7 @@ def _of_several(rows: pd.DataFrame, results: Results) -> Card:
     ]
     rows = rows.assign(**{column: values})
     shown = rows.loc[shown.index].sort_values(column, kind="stable")
+    shown = sheets.with_tested(shown, told)
     telling = labels.varying(rows, "fraction")
     numbers = [
         _end_of_range(shown.iloc[0], told, telling, "least"),
@@ -429,13 +430,11 @@ def _end_of_range(
     what = ", ".join(labels.told(row, list(telling)[:3]))
     moves = "moves a grain"
     if "fraction" in row:
-        moves = f"moves {row['fraction']:.0%}".replace("%", " %")
+        moves = f"moves {percent(row['fraction'])}"
     low = single.known(row.get(told.column("_low")))
     high = single.known(row.get(told.column("_high")))
     of_what = ""
     if row["tested_rows"] > 0:
-        ends = single.tested(row, ustar)
-        low, high = (single.in_unit(row, end, told) for end in ends)
         of_what = single.tested_on(row)
     return Number(
         single.in_unit(row, ustar, told),
@@ -528,7 +527,7 @@ def _of_grains(grains: pd.DataFrame) -> Card:
     told = sheets.quantity(grains)
     usable = grains[valid(grains)]
     shown = usable if len(usable) else grains
-    shown = shown.sort_values("ustar0_m_s", kind="stable")
+    shown = sheets.with_tested(shown.sort_values("ustar0_m_s", kind="stable"), told)
     telling = labels.varying(grains, "bed")
     return Card(
         f"At which {told.flow} does one grain start to move, by its size and bed?",

@@ -141,7 +141,7 @@ def _follows_dem(pile: Pile) -> bool:
     two flows, and at that flow no load step was run. Such grains are shown where they
     were packed.
     """
-    return isinstance(pile.method, piles.Dem) and not pile.goes_on
+    return pile.by_dem and not pile.goes_on
 
 
 def _grains_shown(pile: Pile) -> IntArray:

@@ -8,6 +8,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
+from orchestrator.digits import percent
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import within
 from orchestrator.report import single
@@ -223,7 +224,7 @@ def _line(
     has_moved = grains["ustar0_m_s"].to_numpy(float) <= float(row["ustar0_m_s"])
     height = bed.level(pile.model.line.height(bed.along(places)))
     ax.plot(*_moved(places, height, has_moved), color=ANSWER, lw=3.5)
-    part = f"{row['fraction']:.0%}".replace("%", " %")
+    part = percent(row["fraction"])
     flow = single.in_unit(row, float(row["ustar0_m_s"]), told)
     told_at = f"orange: the {part} that moves by {flow:.3g} {told.unit}"
     ax.set_title("Bed line, m" if narrow else f"Bed line, m; {told_at}")

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure as Canvas
 
+from orchestrator.digits import percent
 from orchestrator.report import answers, single
 from orchestrator.report.drawing import (
     ANSWER,
@@ -158,7 +159,7 @@ def sizes(row: pd.Series, results: Results) -> Head:
         ax.axvline(at, color=ANSWER, lw=1, ls=(0, (2, 2)), zorder=0.5)
         ax.set_yticks(places, names)
         ax.set(xlim=(0, top), ylim=(-0.6, len(here) - 0.4))
-        part = f"{row['fraction']:.0%}".replace("%", " %")
+        part = percent(row["fraction"])
         name = f"Stress that moves {part} of a size, Pa"
         if narrow:
             ax.set_title(name, x=-0.5)

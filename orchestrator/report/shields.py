@@ -30,7 +30,7 @@ from orchestrator.report.style import Figure, Look
 from orchestrator.report.theory import BINS, Line
 from orchestrator.study import fields
 from orchestrator.study.criterion import GOES_ON
-from orchestrator.types import BoolArray
+from orchestrator.types import BoolArray, FloatArray
 
 SHAPES = "os^DvP<X>p8hd*"
 """Markers, in the order in which rows take them."""
@@ -61,9 +61,12 @@ FIELD_REYNOLDS = (8.8, 13.5)
 """Re* of the sites of `FIELD`."""
 GOING_DASH = (0, (7, 1.2, 1.5, 1.2))
 """Dash of the curves of grains that go on."""
+DOTTED = "dotted: the force law does not hold"
+"""Label of the part of a curve that is dotted."""
 GAP = np.full((1, 2), np.nan)
-BEYOND = 1e6  # a place above every frame, over the lower end of a bar
 """A point that interrupts a line."""
+BEYOND = 1e6
+"""A place above every frame, over the lower end of a bar."""
 AXES = labels.RE_AXIS, labels.TAU_AXIS
 DEM = ("reynolds", "shields_dem", "shields_dem_low", "shields_dem_high")
 """Columns of a single grain: x, y and the ends of its interval."""
@@ -275,14 +278,24 @@ def draw_line(
     width: float = 1.1,
 ) -> None:
     """A closed-form line, dotted where the study has grains beyond its law."""
-    tau = line.tau(REYNOLDS)
     holds = line.holds(REYNOLDS)
     is_dotted = line.near(REYNOLDS) & ~holds
-    dotted = "dotted: the force law does not hold"
-    for chosen, dashes, name in ((holds, dash, label), (is_dotted, ":", dotted)):
+    points = np.array([REYNOLDS, line.tau(REYNOLDS)])
+    look: Look = {"color": colour, "lw": width}
+    _draw_curve(ax, points, {label: (holds, dash), DOTTED: (is_dotted, ":")}, look)
+
+
+def _draw_curve(
+    ax: Axes,
+    points: FloatArray,
+    parts: Mapping[str, tuple[BoolArray, theory.Dash]],
+    look: Look,
+) -> None:
+    """The parts of a curve, each where it is chosen and with its dash, by its label."""
+    for label, (chosen, dash) in parts.items():
         if chosen.any():
-            look: Look = {"color": colour, "lw": width, "ls": dashes, "label": name}
-            ax.plot(*np.where(chosen, (REYNOLDS, tau), np.nan), gid=RESULT[0], **look)
+            shown = np.where(chosen, points, np.nan)
+            ax.plot(*shown, gid=RESULT[0], ls=dash, label=label, **look)
 
 
 def draw_points(
@@ -560,15 +573,9 @@ def _draw_lines(ax: Axes, lines: Sequence[Line], answers: pd.DataFrame) -> list[
 
 def _draw_going(ax: Axes, curve: theory.Going, label: str, colour: str) -> None:
     """A curve of grains that go on, dotted where its law does not hold."""
-    dotted = "dotted: the force law does not hold"
-    for chosen, dashes, name in (
-        (curve.holds, GOING_DASH, label),
-        (~curve.holds, ":", dotted),
-    ):
-        if chosen.any():
-            look: Look = {"color": colour, "lw": 1.6, "ls": dashes, "label": name}
-            points = np.where(chosen, (curve.reynolds, curve.tau), np.nan)
-            ax.plot(*points, gid=RESULT[0], **look)
+    points = np.array([curve.reynolds, curve.tau])
+    parts = {label: (curve.holds, GOING_DASH), DOTTED: (~curve.holds, ":")}
+    _draw_curve(ax, points, parts, {"color": colour, "lw": 1.6})
 
 
 def _grains_on_the_least_slope(results: Results) -> pd.DataFrame:
