@@ -14,8 +14,7 @@ from orchestrator.report.results import Results
 from orchestrator.runs import case, cluster, engine, terminal, workspace
 from orchestrator.runs.case import Case
 from orchestrator.runs.cluster import Queue
-from orchestrator.runs.files import text_of
-from orchestrator.runs.workspace import STATE, STUDY, Workspace, claimed, read_marker
+from orchestrator.runs.workspace import STATE, STUDY, Workspace, claimed
 from orchestrator.study.profile import Files
 from orchestrator.study.study import Study, parse
 
@@ -81,7 +80,14 @@ def run(
     # what cannot be answered is refused before anything is written
     planned = plan.make(study, cases=space.cases)
     with claimed(space.root, STUDY, study.name):
-        changed = _describe(space, study, planned)
+        changed = space.describe(
+            STUDY,
+            study.name,
+            planned.cases,
+            study.source.described(space.root) if study.source else {},
+            study=study.text,
+            tolerance=study.tolerance,
+        )
         states = planned.done(space.cases)
         todo = planned.missing(space.cases, states)
         failed = complete(
@@ -118,22 +124,6 @@ def _with_advice(failures: Failures, planned: Plan) -> Failures:
         remedies = filter(None, (error.remedy, plan.BY_DEM))
         advised[name] = type(error)(error.what, error.where, "; or ".join(remedies))
     return advised
-
-
-def _describe(space: Workspace, study: Study, planned: Plan) -> bool:
-    """Write into the directory what is asked for; whether it has changed."""
-    about = {"study": study.text, "tolerance": study.tolerance}
-    before = read_marker(space.root, STUDY)
-    changed = any(before.get(key, value) != value for key, value in about.items())
-    source: dict[str, object] = {}
-    if study.source:
-        source = study.source.described(space.root)
-    other = space.file_of_another(STUDY, source.get("file"))
-    if changed and other:
-        what = f"the directory holds the study of another file, {other}"
-        raise InputError(what, str(space.root), "choose another with --out")
-    space.describe(STUDY, study.name, list(planned.cases), **about, source=source)
-    return changed
 
 
 def complete(
@@ -293,6 +283,5 @@ def _draw(
             raise
     terminal.check()
     if not failures and not undrawn:
-        state = {**space.drawn_of(planned.ids), "answer": answer}
-        space.note(STATE, text_of(state))
+        space.note_answer(planned.ids, answer)
     return answer, undrawn

@@ -140,7 +140,9 @@ class Experiment:
         """
         space = Workspace(out.absolute())
         with claimed(space.root, EXPERIMENT, self.name) as folder:
-            self._describe(space)
+            # all experiments of a name have one directory by default
+            source = self.source.described(space.root) if self.source else {}
+            space.describe(EXPERIMENT, self.name, self.planned.cases, source)
             todo = self._todo(space.cases)
             failed = pipeline.complete(
                 todo, space, workers=workers, limit_s=self.limit_s
@@ -187,21 +189,6 @@ class Experiment:
                 solvers = case.programs(cases, self.planned.cases)
                 page.write(self.title, sections, folder, space.page.name, solvers)
         return sections
-
-    def _describe(self, space: Workspace) -> None:
-        """Write into the directory what it is of, unless it is of another file.
-
-        All experiments of a name have one directory by default, whatever file they are
-        on.
-        """
-        source: dict[str, object] = {}
-        if self.source:
-            source = self.source.described(space.root)
-        other = space.file_of_another(EXPERIMENT, source.get("file"))
-        if other:
-            what = f"the directory holds the {self.name} of another file, {other}"
-            raise InputError(what, str(space.root), "choose another with --out")
-        space.describe(EXPERIMENT, self.name, list(self.planned.cases), source=source)
 
 
 def piles(study: Study) -> dict[Scene, PileBed]:

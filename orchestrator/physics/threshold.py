@@ -772,6 +772,31 @@ def thresholds_of(name: str, grains: Sequence[SingleGrain]) -> list[Threshold]:
     return [_ANSWERS[key] for key in keys]
 
 
+def usual_law(grain: SingleGrain) -> str:
+    """Choose the force law that answers a grain for which none is asked.
+
+    Parameters
+    ----------
+    grain
+        The grain.
+
+    Returns
+    -------
+    str
+        Its name.
+
+    Examples
+    --------
+    >>> water = {"fluid_density": 1000.0, "viscosity": 1e-6}
+    >>> bed = {"roughness": 1e-4, "slope_deg": 0.0, "entrainment_angle_deg": 60.0}
+    >>> sand = {"diameter": 1e-3, "density": 2650.0, "lift_coefficient": 1.615}
+    >>> usual_law(SingleGrain(**sand, **bed, **water, gravity=9.81))
+    'bridged'
+    """
+    (at,) = thresholds_of("bridged", [grain])
+    return str(default_laws(at.friction_velocity, grain.exposure))
+
+
 def forget() -> None:
     """Forget the thresholds that were found: the time of the next is its own.
 

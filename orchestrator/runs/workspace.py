@@ -6,7 +6,7 @@ import fcntl
 import os
 import socket
 from collections import Counter
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -196,7 +196,14 @@ class Workspace(Folder):
             return isinstance(error, BlockingIOError)
         return False
 
-    def describe(self, kind: Kind, name: str, cases: list[str], **about: Any) -> None:
+    def describe(
+        self,
+        kind: Kind,
+        name: str,
+        cases: Iterable[str],
+        source: Mapping[str, object],
+        **question: Any,
+    ) -> bool:
         """Write which study this is; only the holder may.
 
         Parameters
@@ -205,36 +212,47 @@ class Workspace(Folder):
             Kind and name of the contents.
         cases
             Names of its cases.
-        **about
-            More about it.
+        source
+            What it was read from: `study.source.Source.described`; empty for a study
+            that was not read from a file.
+        **question
+            What else is asked.
+
+        Returns
+        -------
+        bool
+            Whether the directory held another question before.
+
+        Raises
+        ------
+        InputError
+            If the directory is of another study file, which is still there, and not of
+            the same question.
         """
+        before = read_marker(self.root, kind)
+        asked_before = {key: before.get(key, question[key]) for key in question}
+        changed = asked_before != question
+        other = self._file_of_another(before, source.get("file"))
+        is_same = bool(question) and not changed
+        if other and not is_same:
+            holds = f"the directory holds the {kind.word} {name}"
+            what = f"{holds} of another file, {other}"
+            raise InputError(what, str(self.root), "choose another with --out")
         value = {
             "orchestrator": __version__,
             "kind": kind.word,
             "name": name,
-            "cases": cases,
-            **about,
+            "cases": [*cases],
+            "source": dict(source),
+            **question,
         }
-        if read_marker(self.root, kind) != value:
+        if before != value:
             self.note(kind.marker, files.text_of(value))
+        return changed
 
-    def file_of_another(self, kind: Kind, file: object) -> str:
-        """Find the study file that the directory is of, if it is another one.
-
-        Parameters
-        ----------
-        kind
-            Kind of the contents.
-        file
-            The study file that is asked for, relative to the directory, or None.
-
-        Returns
-        -------
-        str
-            Its path relative to the directory; empty if it is the same file, or is not
-            there any more.
-        """
-        source = read_marker(self.root, kind).get("source")
+    def _file_of_another(self, before: Mapping[str, Any], file: object) -> str:
+        """The study file in a marker, if it is there and not the one asked for."""
+        source = before.get("source")
         if not isinstance(source, dict):
             return ""
         other = str(source.get("file", ""))
@@ -263,19 +281,8 @@ class Workspace(Folder):
         remedy = "name the directory that a study was written to"
         raise InputError("there is no study in this directory", str(self.root), remedy)
 
-    def drawn_of(self, ids: Mapping[str, str]) -> dict[str, Any]:
-        """List all that a page is made of.
-
-        Parameters
-        ----------
-        ids
-            The ids of the cases by name.
-
-        Returns
-        -------
-        dict
-            Digests of the question, the code and the files, and the ids.
-        """
+    def _drawn_of(self, ids: Mapping[str, str]) -> dict[str, Any]:
+        """All that a page of some cases is made of: digests, and the ids by name."""
         about = self.description()
         question = canonical_json([about.get("study"), about.get("tolerance")])
         return {
@@ -299,11 +306,23 @@ class Workspace(Folder):
             The answer; None where it is not finished, or has changed.
         """
         marker = read_json(self.drawn)
-        if not marker or {**marker, **self.drawn_of(ids)} != marker:
+        if not marker or {**marker, **self._drawn_of(ids)} != marker:
             return None
         if not self.is_whole():
             return None
         return str(marker.get("answer", ""))
+
+    def note_answer(self, ids: Mapping[str, str], answer: str) -> None:
+        """Note that the page of some cases is finished, and what it answers.
+
+        Parameters
+        ----------
+        ids
+            The ids of the cases by name.
+        answer
+            The answer, which `answer` looks up.
+        """
+        self.note(STATE, files.text_of({**self._drawn_of(ids), "answer": answer}))
 
     def left(self, asked: Container[str]) -> tuple[str, ...]:
         """List the cases of an earlier study file.

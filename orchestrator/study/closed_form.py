@@ -18,9 +18,9 @@ from orchestrator.physics.threshold import (
     Regime,
     SingleGrain,
     Threshold,
-    default_laws,
     regime,
     thresholds_of,
+    usual_law,
 )
 from orchestrator.study.scene import CELLS_OVER_Z0, Scene
 
@@ -75,7 +75,9 @@ def closed_form(scene: Scene, name: str | None = None) -> Threshold:
     Threshold
         The threshold, of shape ().
     """
-    at = thresholds_of(name or law_of(scene), [single_grain(scene)])[0]
+    grain = single_grain(scene)
+    law = name or _law_of(scene, grain)
+    (at,) = thresholds_of(law, [grain])
     if scene.gust == 1:
         return at
     root = scene.gust**0.5
@@ -146,39 +148,11 @@ def law_holds(scene: Scene) -> bool:
     return bool(closed_form(scene).valid)
 
 
-def law_of(scene: Scene) -> str:
-    """Choose the force law that answers a scene.
-
-    Parameters
-    ----------
-    scene
-        The scene.
-
-    Returns
-    -------
-    str
-        Its name; where none is asked for, one that holds.
-    """
+def _law_of(scene: Scene, grain: SingleGrain) -> str:
+    """The force law of a scene and its grain; one that holds if none is asked for."""
     if scene.forces.law != AUTO:
         return scene.forces.law
-    return usual_law(single_grain(scene))
-
-
-def usual_law(grain: SingleGrain) -> str:
-    """Choose the force law that answers a grain for which none is asked.
-
-    Parameters
-    ----------
-    grain
-        The grain.
-
-    Returns
-    -------
-    str
-        Its name.
-    """
-    (at,) = thresholds_of("bridged", [grain])
-    return str(default_laws(at.friction_velocity, grain.exposure))
+    return usual_law(grain)
 
 
 def resolved(scenes: Sequence[Scene]) -> Iterator[tuple[Scene, ...]]:
@@ -214,7 +188,7 @@ def resolved(scenes: Sequence[Scene]) -> Iterator[tuple[Scene, ...]]:
     for scene in scenes:
         laws: tuple[str, ...] = (scene.forces.law,)
         if scene.forces.law == AUTO:
-            laws = (law_of(scene),)
+            laws = (_law_of(scene, grains[scene.id]),)
         elif scene.forces.law == PAPER:
             laws = LAWS_OF[regime_of(scene)]
         yield tuple(_under(scene, law) for law in laws)

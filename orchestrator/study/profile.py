@@ -19,9 +19,10 @@ from numpy.typing import ArrayLike
 
 from orchestrator.digits import on_grid, rounded
 from orchestrator.errors import InputError
-from orchestrator.runs.files import digest_text, opened
+from orchestrator.runs.files import digest_text
 from orchestrator.study.noise import needed_smoothing
 from orchestrator.study.shapes import SHAPES
+from orchestrator.study.source import decoded, read_bytes
 from orchestrator.study.units import number
 from orchestrator.types import FloatArray
 
@@ -368,74 +369,6 @@ def _classes(rows: list[list[float]], where: str) -> list[list[float]]:
             diameter = 1e-3 * math.sqrt(smaller * larger)
             classes.append([rounded(diameter), rounded((above - below) / 100)])
     return classes
-
-
-def read_bytes(path: Path, largest: int, where: str) -> bytes:
-    """Read a file of the user.
-
-    Parameters
-    ----------
-    path
-        The file.
-    largest
-        Largest size, bytes.
-    where
-        Its name in messages.
-
-    Returns
-    -------
-    bytes
-        The content.
-
-    Raises
-    ------
-    InputError
-        For a file that is missing, no regular one, or larger.
-    """
-    try:
-        with opened(path) as stream:
-            content = stream.read(largest + 1) or b""  # None of a file that would wait
-    except (OSError, ValueError) as error:
-        raise _unreadable(error, where) from None
-    if len(content) > largest:
-        raise _unreadable(ValueError(f"larger than {largest // 2**20} MiB"), where)
-    return content
-
-
-def decoded(content: bytes, where: str) -> str:
-    """Decode a file of the user.
-
-    Parameters
-    ----------
-    content
-        The content, text in UTF-8.
-    where
-        Its name in messages.
-
-    Returns
-    -------
-    str
-        The text.
-
-    Raises
-    ------
-    InputError
-        For any other content.
-    """
-    try:
-        # some editors begin with a mark of the encoding
-        text = content.decode("utf-8-sig")
-    except ValueError as error:
-        raise _unreadable(error, where) from None
-    if "\0" in text:
-        raise _unreadable(ValueError("binary, not text"), where)
-    return text
-
-
-def _unreadable(error: Exception, where: str) -> InputError:
-    why = getattr(error, "strerror", None) or error
-    remedy = "it is a text in UTF-8; a path in a study file is relative to that file"
-    return InputError(f"not a readable text file: {why}", where, remedy)
 
 
 def read_columns(

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orchestrator.errors import InputError
-from orchestrator.study.profile import decoded, read_bytes
+from orchestrator.study.source import decoded, read_bytes
 from orchestrator.study.surface import (
     FEWEST,
     MOST_NODES,

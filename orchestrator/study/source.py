@@ -1,6 +1,7 @@
 """Where a study comes from.
 
-It is a preset by its name or a file, and the bytes it was read from.
+It is a preset by its name or a file, and the bytes it was read from. The files that a
+study names are read here, too.
 
 Nothing here imports a library: a finished study is told from its bytes in a tenth of a
 second.
@@ -12,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator.errors import InputError, suggestion
-from orchestrator.runs.files import digest_file
+from orchestrator.runs.files import digest_file, opened
 
 
 @dataclass(frozen=True)
@@ -97,6 +98,74 @@ def find(source: str | Path) -> Path:
     remedy = f"{suggestion(str(source), brought)} {names}".lstrip()
     what = "there is no such study file, nor a preset of this name"
     raise InputError(what, str(source), remedy)
+
+
+def read_bytes(path: Path, largest: int, where: str) -> bytes:
+    """Read a file of the user.
+
+    Parameters
+    ----------
+    path
+        The file.
+    largest
+        Largest size, bytes.
+    where
+        Its name in messages.
+
+    Returns
+    -------
+    bytes
+        The content.
+
+    Raises
+    ------
+    InputError
+        For a file that is missing, no regular one, or larger.
+    """
+    try:
+        with opened(path) as stream:
+            content = stream.read(largest + 1) or b""  # None of a file that would wait
+    except (OSError, ValueError) as error:
+        raise _unreadable(error, where) from None
+    if len(content) > largest:
+        raise _unreadable(ValueError(f"larger than {largest // 2**20} MiB"), where)
+    return content
+
+
+def decoded(content: bytes, where: str) -> str:
+    """Decode a file of the user.
+
+    Parameters
+    ----------
+    content
+        The content, text in UTF-8.
+    where
+        Its name in messages.
+
+    Returns
+    -------
+    str
+        The text.
+
+    Raises
+    ------
+    InputError
+        For any other content.
+    """
+    try:
+        # some editors begin with a mark of the encoding
+        text = content.decode("utf-8-sig")
+    except ValueError as error:
+        raise _unreadable(error, where) from None
+    if "\0" in text:
+        raise _unreadable(ValueError("binary, not text"), where)
+    return text
+
+
+def _unreadable(error: Exception, where: str) -> InputError:
+    why = getattr(error, "strerror", None) or error
+    remedy = "it is a text in UTF-8; a path in a study file is relative to that file"
+    return InputError(f"not a readable text file: {why}", where, remedy)
 
 
 def digests_now(folder: Path, names: Iterable[str]) -> dict[str, str | None]:

@@ -27,7 +27,7 @@ from orchestrator.study.fidelities import AUTO, fields_of
 from orchestrator.study.fields import PARTS, SEED
 from orchestrator.study.keys import Table, Tables, by_name, check_moved, nested
 from orchestrator.study.parts import Erosion, PileBed, Sizes, percentile
-from orchestrator.study.profile import WITH_X, Files, decoded, read_bytes
+from orchestrator.study.profile import WITH_X, Files
 from orchestrator.study.reading import (
     CONFIRMED,
     MISSING,
@@ -46,7 +46,7 @@ from orchestrator.study.reading import (
 )
 from orchestrator.study.scene import Scene, roughness_length
 from orchestrator.study.shapes import SHAPES
-from orchestrator.study.source import Source, find, presets
+from orchestrator.study.source import Source, decoded, find, presets, read_bytes
 
 BED = {"kind": "grain", "roughness": "d/30"}
 """Fields of a bed that a file may leave out."""

@@ -10,8 +10,7 @@ from typing import Annotated, Literal, Self, get_args
 from pydantic import Field, InstanceOf, model_validator
 
 from orchestrator.physics.fluids import PAPER as PAPER_FLUID
-from orchestrator.physics.threshold import AUTO, PAPER, SingleGrain
-from orchestrator.study.closed_form import usual_law
+from orchestrator.physics.threshold import AUTO, PAPER, SingleGrain, usual_law
 from orchestrator.study.declare import Height, Part, Roughness, UnfitError, Viscosity
 from orchestrator.study.declare import field as declared
 from orchestrator.study.method import Turbulence

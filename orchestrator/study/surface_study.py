@@ -20,7 +20,6 @@ from orchestrator.study.declare import Part, UnfitError
 from orchestrator.study.fields import PARTS as IN_A_PLANE
 from orchestrator.study.keys import Table, Tables
 from orchestrator.study.parts import Drag, Fluid
-from orchestrator.study.profile import decoded, read_bytes
 from orchestrator.study.raster import read_surface
 from orchestrator.study.reading import (
     CONFIRMED,
@@ -37,7 +36,7 @@ from orchestrator.study.reading import (
 )
 from orchestrator.study.rose import Rose, read_rose
 from orchestrator.study.scene import roughness_length
-from orchestrator.study.source import Source, find
+from orchestrator.study.source import Source, decoded, find, read_bytes
 from orchestrator.study.surface import Surface
 from orchestrator.study.surface_parts import (
     SurfaceBed,

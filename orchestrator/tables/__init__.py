@@ -298,7 +298,8 @@ def write(tables: Mapping[str, pd.DataFrame], folder: Folder, place: str) -> Non
     """
     used: set[str] = set()
     for name, table in tables.items():
-        folder.put(f"{place}/{name}.csv", csv(table))
+        text = csv(table)
+        folder.put(f"{place}/{name}.csv", text)
         used.update(map(str, table))
     meanings = [(column, COLUMNS[column]) for column in sorted(used)]
     table = pd.DataFrame(meanings, columns=["column", "meaning"])

@@ -217,7 +217,7 @@ def test_what_cannot_be_exported(fields: str, named: str, tmp_path: Path) -> Non
     text = f'grain.diameter = 1e-3\nbed.kind = "pile"\nbed.slope_deg = 20.0\n{fields}\n'
     text += 'method.kind = "dem"\nmethod.flow.first_cell_height = 1e-3\n'
     with claimed(tmp_path, STUDY, "held"):
-        Workspace(tmp_path).describe(STUDY, "held", [], study=text, tolerance=None)
+        Workspace(tmp_path).describe(STUDY, "held", [], {}, study=text, tolerance=None)
     with pytest.raises(InputError, match=re.escape(named)):
         export(tmp_path / "pack", tmp_path, ())
     with pytest.raises(InputError, match=r"level 3 needs .*--from"):

@@ -194,7 +194,7 @@ def test_another_file_has_another_directory(tmp_path: Path) -> None:
     page = run[0](out, workers=1).page
     before = page.read_bytes()
     with pytest.raises(
-        InputError, match=r"the erosion of another file, .*heap\.toml.*--out"
+        InputError, match=r"the experiment erosion of another file, .*heap\.toml.*--out"
     ):
         run[1](out, workers=1)
     assert page.read_bytes() == before
