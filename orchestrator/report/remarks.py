@@ -23,7 +23,7 @@ MOST = 6
 """Remarks up to which those are added that are true of every study of a kind."""
 PAPER_FLUID = Remark(
     "The gas is not quite air.",
-    "It is the paper’s, 1 kg/m³ and 1e-5 m²/s. For real air write "
+    "The gas is that of the paper, 1 kg/m³ and 1e-5 m²/s. For real air write "
     '`fluid.kind = "air"`.',
 )
 BARE_GROUND = Remark(
@@ -37,7 +37,7 @@ DRY_GRAINS = Remark(
 )
 FIRST_MOTION = Remark(
     "First motion, not transport.",
-    "Grains start to move; how many are carried on, and how far, is not asked.",
+    "The answer is when grains start to move, not how many are carried on or how far.",
 )
 
 
@@ -79,8 +79,8 @@ def _of_laws(results: Results) -> Iterator[Remark]:
     if len(best) <= theory.MANY:
         return
     for sentence in theory.nearest(results):
-        head, _, rest = sentence.partition(" is ")
-        if rest:
+        if sentence.startswith("Nearest"):
+            head, _, rest = sentence.partition(" is ")
             yield Remark(f"{head}:", rest)
         else:
             yield Remark("Where no law is as measured.", sentence)
@@ -132,7 +132,7 @@ def _usable(table: pd.DataFrame) -> Iterator[Remark]:
     reasons = table.loc[~table["usable"].astype(bool), "why_not"]
     most = str(reasons.mode().iloc[0])
     head = f"Usable: {usable} of {count} thresholds."
-    yield Remark(head, f"Most often against the others: {most}.")
+    yield Remark(head, f"The most frequent reason against the others: {most}.")
 
 
 def _of_piles(results: Results, piles: pd.DataFrame) -> Iterator[Remark]:
@@ -150,7 +150,7 @@ def _of_piles(results: Results, piles: pd.DataFrame) -> Iterator[Remark]:
     yield from _fidelity(results)
     if "check" in results.tables:
         text = caption("checked", checks=results.tables["check"])
-        yield Remark("Some beds were checked.", text)
+        yield Remark("Some beds were checked by DEM.", text)
     yield from _tolerance(results, piles)
 
 
@@ -170,12 +170,12 @@ def _counted(scene: Scene, bed: PileBed) -> Iterator[Remark]:
     if isinstance(counts, tuple):
         start, end = counts
         where = f"The bed between x = {start:g} and {end:g} m is counted."
-        rest = "shares are of the grains between them"
+        rest = "shares are parts of the grains between them"
     elif counts == "windward":
         where = "The sides that rise in the wind are counted."
         rest = (
-            "so are ripples and noise of level ground beside the form; for the form "
-            "alone write its range: `bed.counted = [5.0, 34.0]`"
+            "ripples and noise of level ground beside the form are counted, too; to "
+            "count the form alone, write its range: `bed.counted = [5.0, 34.0]`"
         )
     else:
         where = "All of the bed is counted."
@@ -256,4 +256,4 @@ def _tolerance(results: Results, piles: pd.DataFrame) -> Iterator[Remark]:
         ends=(low.max(), high.max()),
         share=rows["model_share"].mode().iloc[0],
     )
-    yield Remark("The tolerance is about numerics.", text)
+    yield Remark("The tolerance is for numerical errors alone.", text)

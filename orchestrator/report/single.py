@@ -455,10 +455,10 @@ def worth(row: Row, few: bool = False) -> Worth:
     if is_measured(row):
         return Worth("good", "usable", "It is within what was measured on level beds.")
     what = "wind" if is_gas(float(row["rho_f_kg_m3"])) else "flow"
-    advice = f"for a {what} take the measured value; to compare beds, this one."
+    advice = f"For the {what} take the measured value. To compare beds take the computed one."
     if not is_level(row) and row["bed"] != "grain":
-        advice = f"The place holds; {advice}"
-    return Worth("care", "usable, with a correction", _sentence(advice))
+        advice = f"Take the place as computed. {advice}"
+    return Worth("care", "usable, with a correction", advice)
 
 
 def is_measured(row: Row) -> bool:

@@ -80,7 +80,7 @@ def test_laws_that_answer_at_few_re_are_not_compared_with_the_curves_for_air(
     assert sentence.startswith("None of the 2 combinations can be compared")
     assert "inf" not in sentence
     (sentence,) = theory._nearest_in_air(results, [low, bridged(0.1, 170.0)])
-    assert "nearest in water has no answer at half of these Re*" in sentence
+    assert "nearest in water has no threshold at half of these Re*" in sentence
     assert "inf" not in sentence
     (sentence,) = theory._nearest_in_air(results, [bridged(), bridged(0.1, 170.0)])
     assert "nearest in water is off by" in sentence
