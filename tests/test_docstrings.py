@@ -27,12 +27,6 @@ PHYSICS = (
     "orchestrator.physics.velocity",
 )
 """Modules whose public functions have an example each."""
-UNDESCRIBED = (
-    "orchestrator.experiments.surface_truth",
-    "orchestrator.report.shields",
-    "orchestrator.report.theory",
-)
-"""Modules whose public names still lack sections of numpydoc."""
 
 
 def _modules() -> list[str]:
@@ -101,7 +95,7 @@ def _raises(function: Any) -> bool:
     return any(isinstance(error, ast.Call) for error in raised)
 
 
-@pytest.mark.parametrize("name", sorted({*_modules()} - {*UNDESCRIBED}))
+@pytest.mark.parametrize("name", _modules())
 def test_docstrings_describe_what_goes_in_and_out(name: str) -> None:
     for thing in _public(name):
         where = f"{name}: {thing.__qualname__}"

@@ -88,33 +88,14 @@ Row = Mapping[str, object]
 """A row of the table of what was compared."""
 
 
-def row(part: str, name: str, quantity: str, value: float, beside: float) -> Row:
-    """Make a row of the table of what was compared.
-
-    Parameters
-    ----------
-    part
-        What is compared: a key of `--surfaces`.
-    name
-        The case.
-    quantity
-        What the value is.
-    value
-        The value of the flow over the surface.
-    beside
-        What it is compared with, NaN where it stands alone.
-
-    Returns
-    -------
-    Row
-        The row.
-    """
+def _row(part: str, name: str, quantity: str, value: float, beside: float) -> Row:
+    """A row of the table of what was compared; `beside` is NaN where nothing is."""
     columns = {"part": part, "case": name, "quantity": quantity}
     return {**columns, "value": value, "compared_with": beside}
 
 
 @dataclass(frozen=True)
-class RidgeFlow(SurfaceFlowCase):
+class _RidgeFlow(SurfaceFlowCase):
     """The flow over a ridge that goes on beyond the sides of the mesh."""
 
     section: FlowCase | None = None
@@ -142,7 +123,7 @@ class RidgeFlow(SurfaceFlowCase):
         cell = (end - foot) / 2 / self.level.per_radius
         x, _ = mesh3.grid_lines(Sizes(foot, end, -h, h), h, cell, self.level)
         if self.has_its_lines:
-            x = lines_of(self.section)
+            x = _lines_of(self.section)
         count = mesh3.rows(h, self.first_cell, self.level)
         return Columns.over(
             lambda x, y: line.height(x),
@@ -154,7 +135,7 @@ class RidgeFlow(SurfaceFlowCase):
         )
 
 
-def lines_of(section: FlowCase) -> FloatArray:
+def _lines_of(section: FlowCase) -> FloatArray:
     """Grid lines along a section, m."""
     grid = section.grid
     lines = [np.array(grid.line.x[:1])]
@@ -166,7 +147,7 @@ def lines_of(section: FlowCase) -> FloatArray:
 
 
 @cache
-def ridge_flows() -> dict[str, SurfaceFlowCase]:
+def _ridge_flows() -> dict[str, SurfaceFlowCase]:
     """The flows over a ridge, on two meshes."""
     first = RIDGE / 40
     settings = FlowMethod(
@@ -181,7 +162,7 @@ def ridge_flows() -> dict[str, SurfaceFlowCase]:
     section = FlowCase(RIDGE, RIDGE_DEG_UP, settings)
     flows: dict[str, SurfaceFlowCase] = {}
     for name in ("grid lines of the section", "even cells"):
-        flows[name] = RidgeFlow(
+        flows[name] = _RidgeFlow(
             cone(RIDGE, RIDGE_DEG_UP),
             270.0,
             10.0,
@@ -195,14 +176,14 @@ def ridge_flows() -> dict[str, SurfaceFlowCase]:
     return flows
 
 
-def ridge(cases: Path) -> Iterator[Row]:
+def _ridge(cases: Path) -> Iterator[Row]:
     """A ridge in three dimensions against its section, by means of its sides."""
     face = RIDGE / np.tan(np.radians(RIDGE_DEG_UP))
     sides = {"windward": (0.0, face), "lee": (face, 2 * face)}
-    for name, one in ridge_flows().items():
+    for name, one in _ridge_flows().items():
         (section,) = one.needs
         plane = WallStress.from_csv(cases / section.name / WALL_STRESS)
-        stress = stress_of(one, cases)
+        stress = _stress_of(one, cases)
         # the whole stress along the slope, not its part along the wind
         ours = np.sign(stress.tau_along) * stress.ustar_over_ustar0
         for side, (start, end) in sides.items():
@@ -211,15 +192,15 @@ def ridge(cases: Path) -> Iterator[Row]:
             theirs = plane.ustar_over_ustar0_wall[of_plane]
             value = float(np.average(ours[of_wide], weights=stress.area_m2[of_wide]))
             beside = float(np.average(theirs, weights=plane.length_m[of_plane]))
-            yield row("ridge", name, f"mean u*/u*_0, {side} side", value, beside)
+            yield _row("ridge", name, f"mean u*/u*_0, {side} side", value, beside)
 
 
-def stress_of(one: SurfaceFlowCase, cases: Path) -> SurfaceStress:
+def _stress_of(one: SurfaceFlowCase, cases: Path) -> SurfaceStress:
     """The stress on the bed of a case."""
     return one.stress(cases / one.name)[0]
 
 
-def pile_flow(
+def _pile_flow(
     surface: Surface,
     from_deg: float = 270.0,
     roughness: float = ROUGHNESS,
@@ -229,26 +210,26 @@ def pile_flow(
     return SurfaceFlowCase(surface, from_deg, 10.0, roughness, AIR, level)
 
 
-def on_form(stress: SurfaceStress, height: float) -> BoolArray:
+def _on_form(stress: SurfaceStress, height: float) -> BoolArray:
     """Whether a face is a part of the form."""
     return np.asarray(stress.z_m > 0.01 * height)
 
 
-def measures(stress: SurfaceStress, height: float) -> dict[str, float]:
+def _measures(stress: SurfaceStress, height: float) -> dict[str, float]:
     """A few numbers of the stress on a form."""
-    form = on_form(stress, height)
+    form = _on_form(stress, height)
     area = stress.area_m2[form]
     tau = np.linalg.norm(stress.tau[form], axis=1)
     is_reversed = stress.tau_along[form] < 0
     return {
         "mean tau/u*_0^2": float(np.average(tau, weights=area)),
-        "u*/u*_0 that 1 % of the area exceeds": exceeded(np.sqrt(tau), area, 0.01),
-        "u*/u*_0 that half of the area exceeds": exceeded(np.sqrt(tau), area, 0.5),
+        "u*/u*_0 that 1 % of the area exceeds": _exceeded(np.sqrt(tau), area, 0.01),
+        "u*/u*_0 that half of the area exceeds": _exceeded(np.sqrt(tau), area, 0.5),
         "reversed, % of the area": 100 * float(area[is_reversed].sum() / area.sum()),
     }
 
 
-def exceeded(values: FloatArray, area: FloatArray, share: float) -> float:
+def _exceeded(values: FloatArray, area: FloatArray, share: float) -> float:
     """The value that a share of the area exceeds."""
     order = np.argsort(values)[::-1]
     part = np.cumsum(area[order]) / area.sum()
@@ -256,22 +237,28 @@ def exceeded(values: FloatArray, area: FloatArray, share: float) -> float:
 
 
 @cache
-def turn_flows() -> dict[str, SurfaceFlowCase]:
+def _turn_flows() -> dict[str, SurfaceFlowCase]:
     """The flows over a cone from three directions."""
     surface = cone(PILE, PILE_SLOPE)
     names = {0.0: "by 0 deg", 30.0: "by 30 deg", 90.0: "by 90 deg"}
-    return {name: pile_flow(surface, 270.0 - turn) for turn, name in names.items()}
+    return {name: _pile_flow(surface, 270.0 - turn) for turn, name in names.items()}
 
 
-def turn(cases: Path) -> Iterator[Row]:
+def _turn(cases: Path) -> Iterator[Row]:
     """A cone whose raster is turned against the wind."""
-    return beside_the_first("turn", turn_flows(), cases)
+    return _beside_the_first("turn", _turn_flows(), cases)
 
 
 @cache
 def interval_flows() -> dict[str, SurfaceFlowCase]:
-    """The flows over a cone on other meshes, with other first cells and models."""
-    coarse = pile_flow(cone(PILE, PILE_SLOPE))
+    """Make the flows over a cone with other meshes, first cells and models.
+
+    Returns
+    -------
+    dict of str to SurfaceFlowCase
+        The flows by what sets them apart; the first has the coarse level.
+    """
+    coarse = _pile_flow(cone(PILE, PILE_SLOPE))
     return {
         "coarse": coarse,
         "first cell h/20": replace(coarse, first_cell_m=PILE / 20),
@@ -282,31 +269,31 @@ def interval_flows() -> dict[str, SurfaceFlowCase]:
     }
 
 
-def interval(cases: Path) -> Iterator[Row]:
+def _interval(cases: Path) -> Iterator[Row]:
     """A cone with other meshes, first cells and models."""
-    return beside_the_first("interval", interval_flows(), cases)
+    return _beside_the_first("interval", interval_flows(), cases)
 
 
-def beside_the_first(
+def _beside_the_first(
     part: str, flows: Mapping[str, SurfaceFlowCase], cases: Path
 ) -> Iterator[Row]:
     """Measures of the flows over a cone beside those of the first."""
     found = {}
     for name, one in flows.items():
-        found[name] = measures(stress_of(one, cases), PILE)
+        found[name] = _measures(_stress_of(one, cases), PILE)
     first, *others = found
     for name in others:
         for quantity, value in found[name].items():
-            yield row(part, name, quantity, value, found[first][quantity])
+            yield _row(part, name, quantity, value, found[first][quantity])
 
 
-def speeds(
+def _speeds(
     one: SurfaceFlowCase, directory: Path, above: float, upright: FloatArray
 ) -> FloatArray:
-    """Speed so far over each face of the bed, m/s, of the shape of its faces.
+    """Speed at a distance over each face of the bed, m/s, of the shape of its faces.
 
-    `upright` is the vertical part of the unit vectors along which the distance counts,
-    of a shape that broadcasts to it.
+    `upright` is the vertical part of the unit vectors along which the distance is
+    taken, of a shape that broadcasts to it.
     """
     velocity = np.linalg.norm(one.velocity(directory), axis=-1)[1:]
     away = one.mesh.over_bed[1:] * upright[..., None]
@@ -316,52 +303,52 @@ def speeds(
     return np.reshape(found, velocity.shape[:2])
 
 
-def speed_over_bed(one: SurfaceFlowCase, directory: Path, above: float) -> FloatArray:
+def _speed_over_bed(one: SurfaceFlowCase, directory: Path, above: float) -> FloatArray:
     """Speed so far over each face of the bed along its normal, m/s, in their order."""
     along, across, _ = one.mesh.shape
     upright = one.stress(directory)[0].normal[:, 2].reshape(along - 1, across)
-    return speeds(one, directory, above, upright).ravel()
+    return _speeds(one, directory, above, upright).ravel()
 
 
-def reference_speed(one: SurfaceFlowCase, directory: Path) -> float:
+def _reference_speed(one: SurfaceFlowCase, directory: Path) -> float:
     """Speed of the approaching flow at the reference height, m/s."""
     ustar0 = one.stress(directory)[1]
     return float(log_law_speed(ustar0, REFERENCE, one.roughness_m))
 
 
 @cache
-def piles_flows() -> dict[str, SurfaceFlowCase]:
+def _piles_flows() -> dict[str, SurfaceFlowCase]:
     """The flows over the shapes that the tunnel had."""
     round_one = cone(PILE, PILE_SLOPE)
     long_one = oval(PILE, OVAL_SLOPE, OVAL_LENGTH, OVAL_WIDTH)
     flows = {}
     for roughness in (ROUGHNESS, 3 * ROUGHNESS):
         name = f"cone, z0 {1e3 * roughness:g} mm"
-        flows[name] = pile_flow(round_one, roughness=roughness)
+        flows[name] = _pile_flow(round_one, roughness=roughness)
     for angle in (0.0, 20.0, 40.0):
         name = f"oval, {angle:g} deg"
-        flows[name] = pile_flow(long_one, 270.0 - angle, level=QUICK)
+        flows[name] = _pile_flow(long_one, 270.0 - angle, level=QUICK)
     return flows
 
 
-def piles(cases: Path) -> Iterator[Row]:
+def _piles(cases: Path) -> Iterator[Row]:
     """Areas of AP-42's classes on the shapes that the tunnel had."""
-    for name, one in piles_flows().items():
+    for name, one in _piles_flows().items():
         directory = cases / one.name
-        ratio = speed_over_bed(one, directory, ABOVE_PILE)
-        ratio /= reference_speed(one, directory)
-        stress = stress_of(one, cases)
-        form = on_form(stress, PILE)
+        ratio = _speed_over_bed(one, directory, ABOVE_PILE)
+        ratio /= _reference_speed(one, directory)
+        stress = _stress_of(one, cases)
+        form = _on_form(stress, PILE)
         area = stress.area_m2[form]
         counts, _ = np.histogram(ratio[form], BANDS, weights=area)
         of_epa = AREAS[name.partition(", z0")[0]]
         for band, count in enumerate(counts):
             quantity = f"us/ur from {BANDS[band]:g}, % of the area"
             share = 100 * float(count / area.sum())
-            yield row("piles", name, quantity, share, of_epa[band])
+            yield _row("piles", name, quantity, share, of_epa[band])
 
 
-def askervein_hill() -> Surface:
+def _askervein_hill() -> Surface:
     """Askervein hill by the Copernicus model of heights, tapered to level ground."""
     table = pd.read_csv(MEASURED / "askervein_terrain.csv", comment="#")
     x, y = np.unique(table["x_m"]), np.unique(table["y_m"])
@@ -376,22 +363,22 @@ def askervein_hill() -> Surface:
     return surface_of("Askervein", x, y, tapered, level, SPREAD_OF_SHAPE)
 
 
-def at_places(
+def _at_places(
     one: SurfaceFlowCase, directory: Path, places: FloatArray, above: float
 ) -> FloatArray:
     """Speed over some places in the axes of the file, m/s, linear between columns."""
     from scipy.interpolate import RegularGridInterpolator
 
-    of_faces = speeds(one, directory, above, np.ones((1, 1)))
+    of_faces = _speeds(one, directory, above, np.ones((1, 1)))
     middles = [(lines[1:] + lines[:-1]) / 2 for lines in (one.mesh.x, one.mesh.y)]
     over = RegularGridInterpolator(middles, of_faces)
     return np.asarray(over((places - one.surface.centre) @ one.axes.T))
 
 
 @cache
-def askervein_flows() -> dict[str, SurfaceFlowCase]:
+def _askervein_flows() -> dict[str, SurfaceFlowCase]:
     """The flows over Askervein hill, on two meshes."""
-    surface = askervein_hill()
+    surface = _askervein_hill()
     flows = {}
     for level in HILLS:
         flows[level.name] = SurfaceFlowCase(
@@ -400,10 +387,10 @@ def askervein_flows() -> dict[str, SurfaceFlowCase]:
     return flows
 
 
-def askervein(cases: Path) -> Iterator[Row]:
+def _askervein(cases: Path) -> Iterator[Row]:
     """The wind at the masts over that at the reference site far upstream."""
     masts = pd.read_csv(MEASURED / "askervein_masts.csv", comment="#")
-    for one in askervein_flows().values():
+    for one in _askervein_flows().values():
         for line, table in masts.groupby("line"):
             yield from _at_masts(one, cases / one.name, str(line), table)
 
@@ -416,28 +403,28 @@ def _at_masts(
     top = np.unravel_index(int(surface.z.argmax()), surface.z.shape)
     start = np.array([surface.x[top[1]], surface.y[top[0]]])
     if line == "AA":
-        start = start + TO_CP * towards(RIDGE_DEG)
+        start = start + TO_CP * _towards(RIDGE_DEG)
     bearing = RIDGE_DEG if line == "B" else ALONG_DEG
     along = 1000 * masts["distance_km"].to_numpy()
-    places = start + along[:, None] * towards(bearing)
+    places = start + along[:, None] * _towards(bearing)
     half = (surface.x[-1] - surface.x[0]) / 2 - TAPERED
     is_in = np.all(np.abs(places - surface.centre) <= half, axis=1)
-    speeds = at_places(one, directory, places[is_in], REFERENCE)
-    speeds /= reference_speed(one, directory)
+    speeds = _at_places(one, directory, places[is_in], REFERENCE)
+    speeds /= _reference_speed(one, directory)
     measured = masts["speed_over_reference"].to_numpy()[is_in]
     cells = f"{one.mesh.cells} cells, line {line}"
     for place, value, beside in zip(along[is_in], speeds, measured, strict=True):
         name = f"{cells}, {place:.0f} m"
-        yield row("askervein", name, AT_MAST, float(value), float(beside))
+        yield _row("askervein", name, AT_MAST, float(value), float(beside))
     error = speeds - measured
     name = f"{cells}, {len(error)} masts"
     rms = float(np.sqrt(np.mean(error**2)))
-    yield row("askervein", name, "rms of the differences", rms, np.nan)
+    yield _row("askervein", name, "rms of the differences", rms, np.nan)
     bias = float(error.mean())
-    yield row("askervein", name, "mean of the differences", bias, np.nan)
+    yield _row("askervein", name, "mean of the differences", bias, np.nan)
 
 
-def towards(bearing_deg: float) -> FloatArray:
+def _towards(bearing_deg: float) -> FloatArray:
     """Unit vector of a bearing, degrees from north."""
     angle = np.radians(bearing_deg)
     return np.array([np.sin(angle), np.cos(angle)])
@@ -445,18 +432,26 @@ def towards(bearing_deg: float) -> FloatArray:
 
 @dataclass(frozen=True)
 class Part:
-    """A comparison: its flows by name, and the rows of its table."""
+    """A comparison.
+
+    Attributes
+    ----------
+    flows
+        Makes its flows, by name.
+    rows
+        Makes the rows of its table from the directory of the cases.
+    """
 
     flows: Callable[[], Mapping[str, SurfaceFlowCase]]
     rows: Callable[[Path], Iterator[Row]]
 
 
 PARTS = {
-    "ridge": Part(ridge_flows, ridge),
-    "turn": Part(turn_flows, turn),
-    "interval": Part(interval_flows, interval),
-    "piles": Part(piles_flows, piles),
-    "askervein": Part(askervein_flows, askervein),
+    "ridge": Part(_ridge_flows, _ridge),
+    "turn": Part(_turn_flows, _turn),
+    "interval": Part(interval_flows, _interval),
+    "piles": Part(_piles_flows, _piles),
+    "askervein": Part(_askervein_flows, _askervein),
 }
 """The comparisons by their names."""
 

@@ -75,18 +75,25 @@ PILE = ("reynolds", "shields", "shields_low", "shields_high")
 
 
 class Sheet(NamedTuple):
-    """Panels of one figure, and the rows that they show."""
+    """Panels of one figure, and the rows that they show.
+
+    Attributes
+    ----------
+    name, title
+        Endings of the figure's name and of its title.
+    parts
+        Rows of each panel.
+    rows
+        Rows of all panels.
+    panels
+        Makes the figure and its panels, once.
+    """
 
     name: str
-    """Ending of the figure's name."""
     title: str
-    """Ending of the figure's title."""
     parts: list[pd.DataFrame]
-    """Rows of each panel."""
     rows: pd.DataFrame
-    """Rows of all panels."""
     panels: Callable[[], tuple[Canvas, list[Axes]]]
-    """Makes the figure and its panels, once."""
 
 
 def sheets(
@@ -106,6 +113,11 @@ def sheets(
         Labels of the axes.
     **layout
         Further arguments of `style.grid`.
+
+    Yields
+    ------
+    Sheet
+        One for each figure.
     """
     panels = [part for _, part in split(rows, *keys)]
 
@@ -123,7 +135,14 @@ def sheets(
 
 
 def parted(table: pd.DataFrame, *shown: str) -> tuple[list[str], pd.DataFrame]:
-    """How rows are told apart that agree in all columns that are shown.
+    """Tell rows apart that agree in all columns that are shown.
+
+    Parameters
+    ----------
+    table
+        The rows.
+    *shown
+        Columns that a figure shows.
 
     Returns
     -------
@@ -159,7 +178,18 @@ def _combinations(table: pd.DataFrame, looks: list[str]) -> Any:
 
 
 def about(rows: pd.DataFrame) -> dict[str, Any]:
-    """The values of the captions of a figure that follow from its rows."""
+    """Find what the caption of a figure says of its rows.
+
+    Parameters
+    ----------
+    rows
+        The rows.
+
+    Returns
+    -------
+    dict
+        Values for the macros of ``captions.j2``; empty without rows.
+    """
     if rows.empty:
         return {}
     is_dem = rows["method"] == "dem"
@@ -277,7 +307,21 @@ def draw_line(
     dash: theory.Dash,
     width: float = 1.1,
 ) -> None:
-    """A closed-form line, dotted where the study has grains beyond its law."""
+    """Draw a closed-form line, dotted where the study has grains beyond its law.
+
+    Parameters
+    ----------
+    ax
+        The panel.
+    line
+        The line.
+    label
+        Its entry in the legend.
+    colour, dash
+        Its look where the law holds.
+    width
+        Its width, points.
+    """
     holds = line.holds(REYNOLDS)
     is_dotted = line.near(REYNOLDS) & ~holds
     points = np.array([REYNOLDS, line.tau(REYNOLDS)])
@@ -464,9 +508,19 @@ def legends(sheet: Sheet, column: str, colours: Mapping[Any, str]) -> Canvas:
 
 
 def single_grains(results: Results) -> pd.DataFrame:
-    """Single grains under a held flow, with the thresholds of those that moved in DEM.
+    """List the single grains under a held flow.
 
-    Ramps of the flow are left out: they give no threshold.
+    Grains under a ramp of the flow are left out: a ramp gives no threshold.
+
+    Parameters
+    ----------
+    results
+        The study.
+
+    Returns
+    -------
+    DataFrame
+        Their scenes, with the thresholds of those that moved in DEM.
     """
     scenes = results.beds("grain")
     answers = results.joined("single_grain")
@@ -635,7 +689,18 @@ def _draw_kind(
 
 
 def shown_piles(results: Results) -> pd.DataFrame:
-    """The thresholds of piles that are drawn: of many piles at one fraction."""
+    """List the thresholds of piles that the one diagram shows.
+
+    Parameters
+    ----------
+    results
+        The study.
+
+    Returns
+    -------
+    DataFrame
+        The thresholds at all fractions of few piles, and at one fraction of many.
+    """
     rows = results.joined("pile_threshold")
     if rows.empty:
         return rows
@@ -723,7 +788,18 @@ def singles(results: Results) -> Iterator[Figure]:
 
 
 def piles(results: Results) -> Iterator[Figure]:
-    """Figs. 15 and 16, the extended Shields diagram by slope, figures for each z0/d."""
+    """Make the extended Shields diagrams by slope, as Figs. 15 and 16 of the paper.
+
+    Parameters
+    ----------
+    results
+        The study.
+
+    Yields
+    ------
+    Figure
+        The figures for each z0/d.
+    """
     every = results.joined("pile_threshold")
     if every.empty:
         return

@@ -455,7 +455,8 @@ def worth(row: Row, few: bool = False) -> Worth:
     if is_measured(row):
         return Worth("good", "usable", "It is within what was measured on level beds.")
     what = "wind" if is_gas(float(row["rho_f_kg_m3"])) else "flow"
-    advice = f"For the {what} take the measured value. To compare beds take the computed one."
+    advice = f"For the {what} take the measured value."
+    advice += " To compare beds take the computed one."
     if not is_level(row) and row["bed"] != "grain":
         advice = f"Take the place as computed. {advice}"
     return Worth("care", "usable, with a correction", advice)

@@ -125,12 +125,36 @@ HEAD = (
 
 
 def look(name: str) -> tuple[str, Dash]:
-    """Colour and dash of a law where colours mean laws."""
+    """Choose the look of a law in a figure whose colours mean laws.
+
+    Parameters
+    ----------
+    name
+        Name of the law.
+
+    Returns
+    -------
+    colour : str
+        Its colour.
+    dash : Dash
+        Its dash.
+    """
     return LOOKS[list(LAWS).index(name) % len(LOOKS)]
 
 
 def drawn(names: Iterable[str]) -> list[str]:
-    """The laws drawn for some scenes: of the paper's pair both if either is used."""
+    """List the laws that are drawn for some scenes.
+
+    Parameters
+    ----------
+    names
+        Names of the laws of the scenes.
+
+    Returns
+    -------
+    list of str
+        The names in the order of `LAWS`; both of the paper's pair if either is used.
+    """
     used = set(names)
     if used & set(PAIR):
         used |= set(PAIR)
@@ -138,7 +162,19 @@ def drawn(names: Iterable[str]) -> list[str]:
 
 
 def dashes(names: Iterable[str]) -> dict[str, Dash]:
-    """A dash for each of the laws that are drawn; the paper's pair has one."""
+    """Choose a dash for each law where colours mean something else.
+
+    Parameters
+    ----------
+    names
+        Names of the laws of the scenes.
+
+    Returns
+    -------
+    dict of str to Dash
+        Dashes by law; the paper's pair shares one, and laws beyond the last dash have
+        none.
+    """
     found: dict[str, Dash] = {}
     free = iter(DASHES)
     for name in drawn(names):
@@ -153,7 +189,17 @@ def dashes(names: Iterable[str]) -> dict[str, Dash]:
 
 
 class Bed(NamedTuple):
-    """All that a line depends on beside its law; angles in degrees."""
+    """All that a line depends on beside its law.
+
+    Attributes
+    ----------
+    slope_deg, entrainment_angle_deg
+        Slope of the bed and entrainment angle, degrees.
+    roughness_ratio
+        Roughness length of the bed, d.
+    lift_coefficient
+        Coefficient of the lift.
+    """
 
     slope_deg: float
     entrainment_angle_deg: float
@@ -165,8 +211,15 @@ class Bed(NamedTuple):
 class Line:
     """The closed form of one grain by a law on a bed, and where a study has grains.
 
-    That is between the Re* `first` and `last`, which are infinite and 0 if it has none
-    of that law.
+    Attributes
+    ----------
+    law
+        Name of the law.
+    bed
+        The bed.
+    first, last
+        Least and largest Re* of the grains of the study by this law; infinite and 0 if
+        there are none.
     """
 
     law: str
@@ -187,11 +240,34 @@ class Line:
         return ", ".join(self.words)
 
     def tau(self, reynolds: FloatArray) -> FloatArray:
-        """Tau of the grain whose threshold is at some Re*, also where no law holds."""
+        """Find the threshold Shields number at some Re*, also where no law holds.
+
+        Parameters
+        ----------
+        reynolds
+            Re* at the threshold, shape (n,).
+
+        Returns
+        -------
+        FloatArray
+            tau_c, shape (n,).
+        """
         return shields_at(LAWS[self.law], reynolds, **self.bed._asdict())
 
     def holds(self, reynolds: FloatArray) -> BoolArray:
-        """Whether the law holds at some Re*; in units of d, nu, rho_f they are u*."""
+        """Say where the law holds.
+
+        Parameters
+        ----------
+        reynolds
+            Re* at the threshold, shape (n,).
+
+        Returns
+        -------
+        BoolArray
+            Whether it holds, shape (n,).
+        """
+        # in units of d, nu and rho_f the friction velocity is Re*
         unit = Exposure(
             diameter=1.0,
             roughness=self.bed.roughness_ratio,
@@ -202,13 +278,33 @@ class Line:
         return LAWS[self.law].valid(reynolds, unit)
 
     def near(self, reynolds: FloatArray) -> BoolArray:
-        """Whether the study has grains on both sides of some Re*."""
+        """Say where the study has grains on both sides.
+
+        Parameters
+        ----------
+        reynolds
+            Re* at the threshold, shape (n,).
+
+        Returns
+        -------
+        BoolArray
+            Whether it has, shape (n,).
+        """
         return np.asarray((reynolds >= self.first) & (reynolds <= self.last))
 
     def answers(self, reynolds: FloatArray) -> FloatArray:
-        """Tau where the study has grains and the law holds, else NaN.
+        """Find the thresholds where the study has grains and the law holds.
 
-        No answer is a threshold of 0: such a grain lies loose.
+        Parameters
+        ----------
+        reynolds
+            Re* at the threshold, shape (n,).
+
+        Returns
+        -------
+        FloatArray
+            tau_c, shape (n,); NaN elsewhere, and for a grain that lies loose, whose
+            tau_c is 0.
         """
         tau = self.tau(reynolds)
         is_answered = self.holds(reynolds) & self.near(reynolds) & (tau > 0)
@@ -311,7 +407,18 @@ def going_on(rows: pd.DataFrame) -> list[Going]:
 
 
 def lines(scenes: pd.DataFrame) -> list[Line]:
-    """The lines through some scenes, by rising slope, entrainment angle, z0, lift."""
+    """Make the lines through the single grains of some scenes.
+
+    Parameters
+    ----------
+    scenes
+        Scenes with the columns of their grains.
+
+    Returns
+    -------
+    list of Line
+        The lines, by rising slope, entrainment angle, roughness and lift coefficient.
+    """
     listed = []
     for key, group in split(
         scenes[[*GRAIN_COLUMNS.values(), "z0_over_d", "force_law"]], *BED
@@ -324,7 +431,18 @@ def lines(scenes: pd.DataFrame) -> list[Line]:
 
 
 def span(scenes: pd.DataFrame) -> tuple[float, float]:
-    """Least and largest Re* of scenes at the thresholds of their single grains."""
+    """Find the range of Re* at the thresholds of the single grains of scenes.
+
+    Parameters
+    ----------
+    scenes
+        Scenes with the columns of their grains.
+
+    Returns
+    -------
+    least, largest : float
+        Its ends; infinite and 0 where no grain has a threshold.
+    """
     found = []
     for law in scenes["force_law"].unique():
         of_law = scenes[scenes["force_law"] == law]
@@ -335,23 +453,58 @@ def span(scenes: pd.DataFrame) -> tuple[float, float]:
 
 
 def thresholds(scenes: pd.DataFrame, law: str) -> list[Threshold]:
-    """The closed form of the single grains of some rows under a law."""
+    """Find the closed form of the single grains of some rows under a law.
+
+    Parameters
+    ----------
+    scenes
+        Rows with the columns of their grains.
+    law
+        Name of the force law.
+
+    Returns
+    -------
+    list of Threshold
+        A threshold for each row.
+    """
     rows = scenes[list(GRAIN_COLUMNS.values())].to_dict("records")
     return thresholds_of(law, [SingleGrain.of_row(row) for row in rows])
 
 
 def in_gas(scenes: pd.DataFrame) -> "pd.Series[bool]":
-    """Which scenes may be compared with curves for air."""
+    """Say which scenes may be compared with curves for air.
+
+    Parameters
+    ----------
+    scenes
+        Scenes with the densities of grains and fluid.
+
+    Returns
+    -------
+    Series of bool
+        Whether the grains are at least `GAS_RATIO` times as dense as the fluid.
+    """
     return scenes["rho_sol_kg_m3"] >= GAS_RATIO * scenes["rho_f_kg_m3"]
 
 
 def air_lines(
     scenes: pd.DataFrame, slope: float = 0.0
 ) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """Re* and theta_c of the curves for air, by name, for the grains of some scenes.
+    """Compute the published curves for air for the grains of some scenes.
 
-    The factor of the slope (degrees) is on u*. Of several gases the one of the least
-    viscosity is taken; without a gas there are no lines.
+    Of several gases the one of the least viscosity is taken.
+
+    Parameters
+    ----------
+    scenes
+        The scenes.
+    slope
+        Slope of the bed, degrees; its factor is on u*.
+
+    Returns
+    -------
+    dict of str to tuple
+        Re* and tau_c of each curve, by its name; empty without a gas.
     """
     scenes = scenes[in_gas(scenes)]
     if scenes.empty:
@@ -384,10 +537,18 @@ def _ustar(name: str, air: Air, first: float, last: float) -> FloatArray:
 
 @lru_cache(maxsize=1)
 def ranked(results: Results) -> list[Line]:
-    """The lines of a study's single grains on a flat bed.
+    """List the lines of a study's single grains on a flat bed, the nearest first.
 
-    The widest within measurements comes first; equally wide ones go by their factor
-    from the medians.
+    Parameters
+    ----------
+    results
+        The study.
+
+    Returns
+    -------
+    list of Line
+        The line that is within the measured range over most decades comes first; equal
+        ones are in the order of their factor from the medians.
     """
     grains = results.beds("grain")
     every = lines(grains[grains["alpha_deg"] == 0])
@@ -398,7 +559,18 @@ def ranked(results: Results) -> list[Line]:
 
 
 def best(listed: Sequence[Line]) -> list[Line]:
-    """The first of each law."""
+    """Take the first line of each law.
+
+    Parameters
+    ----------
+    listed
+        The lines.
+
+    Returns
+    -------
+    list of Line
+        One for each law.
+    """
     firsts: dict[str, Line] = {}
     for line in listed:
         firsts.setdefault(line.law, line)
@@ -406,7 +578,18 @@ def best(listed: Sequence[Line]) -> list[Line]:
 
 
 def ranges(chosen: BoolArray) -> list[tuple[float, float]]:
-    """The ranges of Re* of the chosen points of `GRID`."""
+    """Find the ranges of Re* of the chosen points of `GRID`.
+
+    Parameters
+    ----------
+    chosen
+        Which points are chosen, shape (2000,).
+
+    Returns
+    -------
+    list of tuple
+        Both ends of each range.
+    """
     edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(int), [0]])))
     return [(float(EDGES[a]), float(EDGES[b])) for a, b in edges.reshape(-1, 2)]
 
@@ -423,10 +606,18 @@ def _ranges(chosen: BoolArray) -> str:
 
 
 def section(results: Results) -> dict[str, Any] | None:
-    """The words of the page's section on measurements.
+    """Make what the page's section on measurements shows.
 
-    It is None without single grains on a flat bed that leave their pockets: what is
-    compared is the closed form of these.
+    Parameters
+    ----------
+    results
+        The study.
+
+    Returns
+    -------
+    dict or None
+        Its source, sentences and tables, by name. None without single grains on a flat
+        bed that leave their pockets: what is compared is the closed form of these.
     """
     listed = ranked(results)
     answers = results.joined("single_grain")
@@ -442,7 +633,18 @@ def section(results: Results) -> dict[str, Any] | None:
 
 
 def sheet(listed: Iterable[Line]) -> pd.DataFrame:
-    """A row for each line: law, entrainment angle, z0/d, and how near it is to data."""
+    """Make the table that compares lines with measurements.
+
+    Parameters
+    ----------
+    listed
+        The lines.
+
+    Returns
+    -------
+    DataFrame
+        A row of texts for each line, with the columns `HEAD`.
+    """
     rows = []
     for line in listed:
         worst, at = line.worst
@@ -457,7 +659,19 @@ def sheet(listed: Iterable[Line]) -> pd.DataFrame:
 
 
 def nearest(results: Results) -> list[str]:
-    """The law and bed nearest to data in water, what none meets, the nearest in air."""
+    """Write which line is nearest to measurements.
+
+    Parameters
+    ----------
+    results
+        The study.
+
+    Returns
+    -------
+    list of str
+        Sentences: the nearest line in water, the Re* at which no line is within the
+        measured range, and the nearest line in air.
+    """
     listed = ranked(results)
     in_air = _nearest_in_air(results, listed)
     return [*_nearest_in_water(listed), *_unmet(listed), *in_air]
