@@ -254,7 +254,7 @@ class Plot:
         self._results = results
 
     def __repr__(self) -> str:
-        """What it has."""
+        """The names of its figures."""
         return ".plot.shields(), the extended Shields diagram"
 
     def shields(self) -> "Figure":
@@ -309,9 +309,9 @@ class Opened:
     def thresholds(self) -> pd.DataFrame:
         """The thresholds of the piles, or else of single grains, beside their scenes.
 
-        First come the twelve columns that matter: what tells points apart, the flow,
-        its interval, the measured one, the Shields number, and whether it is usable.
-        Where it is, ``why_not`` is NaN.
+        The first twelve columns are those that most users need. They tell points apart,
+        and have the flow, its interval, the measured flow, the Shields number, and
+        whether the threshold is usable. ``why_not`` is NaN for a usable threshold.
         """
         piles = self._results.joined("pile_threshold")
         rows = piles if len(piles) else self._results.joined("single_grain")

@@ -1,5 +1,6 @@
 """A study from its file to its page: plan, run what is missing, tables, figures."""
 
+import os
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -20,6 +21,8 @@ from orchestrator.study.study import Study, parse
 
 Failures = Mapping[str, OrchestratorError]
 States = Mapping[str, Any]
+COMMANDS = {"surface": "study", "surfaces": "validate --surfaces PART"}
+"""Commands of the experiments whose names are other ones."""
 
 
 class Finished(NamedTuple):
@@ -188,12 +191,20 @@ def reopen(space: Workspace) -> tuple[Study, Plan]:
     where = str(space.root)
     if "study" not in about:
         what = f"this is the experiment {about['name']}"
-        raise InputError(what, where, "its own command draws it again")
+        again = f"orchestrator {_command_of(about, space.root)} --out {where}"
+        raise InputError(what, where, f"to draw it again: {again}")
     # its text has those of the files that it names
     files = Files(None)
     study = parse(about["study"], name=about["name"], where=where, files=files)
     study = replace(study, tolerance=about.get("tolerance"))
     return study, plan.make(study, space.cases)
+
+
+def _command_of(about: Mapping[str, Any], root: Path) -> str:
+    """The command of an experiment, with the file that it is on."""
+    command = COMMANDS.get(about["name"], about["name"])
+    file = about.get("source", {}).get("file")
+    return f"{command} {os.path.normpath(root / file)}" if file else command
 
 
 def redraw(out: Path, *, every: bool = False) -> Finished:

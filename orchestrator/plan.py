@@ -77,9 +77,10 @@ class Plan:
 
     @property
     def chosen(self) -> frozenset[str]:
-        """The names of the cases of chosen fidelities.
+        """The names of the cases that only chosen fidelities need.
 
-        No scene as it is written needs them, and no check by DEM.
+        A case that a scene needs as it is written, or a check by DEM, is not among
+        them.
         """
         piles = [*self.checks.values()]
         for asked, pile in self.piles.items():
@@ -102,8 +103,8 @@ class Plan:
     ) -> dict[str, dict[str, Any]]:
         """Read the markers of the cases that are done.
 
-        Results are checked. A case that other code has made, and that the code as it is
-        now would make otherwise, is not done; nor is one that needs such a case.
+        Results are checked. A case that other code has made is done only if the present
+        code would make the same. A case is not done either if it needs one that is not.
 
         Parameters
         ----------

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator import cli, examples
+from orchestrator import cli, examples, pipeline
 from orchestrator.errors import LONGEST, Fault, InputError, of_exception
+from orchestrator.runs.workspace import EXPERIMENT, Workspace
 from tests.conftest import Command
 
 GRAINS = """
@@ -168,6 +169,16 @@ def test_a_failed_case_is_named_and_the_others_are_finished(
     assert "ERROR" in (tmp_path / "out" / "report.html").read_text()
     again = orchestrator("study", grains, "--out", "out")
     assert again.returncode == 0, again.stderr
+
+
+def test_report_on_an_experiment_says_the_command_that_draws_it(tmp_path: Path) -> None:
+    space = Workspace(tmp_path / "out")
+    space.root.mkdir()
+    space.describe(EXPERIMENT, "ladder", [], {"file": "../mine.toml"})
+    file = re.escape(str(tmp_path / "mine.toml"))
+    place = re.escape(str(space.root))
+    with pytest.raises(InputError, match=f"orchestrator ladder {file} --out {place}"):
+        pipeline.redraw(space.root)
 
 
 def test_any_failure_has_a_message_of_one_printable_line() -> None:

@@ -72,8 +72,8 @@ def drawn(
     """Draw the diameters of grains.
 
     They are evenly spread over the distribution by number: no bed has more of a size by
-    chance. In 3 dimensions a size has its part of the volume. In 2 it has that part of
-    the area, as on the face of any bed and on every cut through it.
+    chance. In three dimensions each size takes its share of the volume. In two it takes
+    the same share of the area, as on the face of any bed and on every cut through it.
 
     Parameters
     ----------

@@ -110,7 +110,7 @@ def _of_flow(scene: Scene) -> Known:
 
 
 def _no_finer(part: str, scene: Scene) -> Rung:
-    """The dearest measured rung that is no finer than a scene; `OWN` if none is."""
+    """The costliest measured rung no finer than a scene's method; `OWN` without one."""
     if part == FLOW and scene_class(FLOW, scene) == LEVEL_BED:
         return FLAT if FLAT.describes(scene) else OWN
     name = scene_class(part, scene)

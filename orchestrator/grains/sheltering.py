@@ -1,14 +1,15 @@
 """Sheltering: the level at which the flow begins between the grains of a bed.
 
 A force law gives the drag on a grain that stands alone. The drags on all exposed grains
-of a bed would add up to several times the stress of the flow. So on each patch of the
-bed the level at which the flow begins is raised until they do not: ``sum of drag_i(u*,
-gap_i - level) = tau x area``. The level is the only unknown. Grains that stand clear
-keep most of their drag, those between them lose it. Where the drags do not reach the
-stress, as on a grain alone on a plane, nothing changes.
+of a bed would add up to several times the stress of the flow. On each patch of the bed
+the level at which the flow begins is therefore raised until the drags add up to the
+stress: ``sum of drag_i(u*, gap_i - level) = tau x area``. The level is the only
+unknown. Grains that stand clear keep most of their drag; grains between them lose it.
+Where the drags do not reach the stress, as on a single grain on a plane, the level is
+that of the bed.
 
-A patch is a stretch of the bed that stays. When one of its grains has gone, those that
-it hid are exposed and take part in a new balance.
+The patches of a bed do not change. When a grain of a patch has gone, the grains that it
+hid are exposed, and a new balance is made with them.
 """
 
 from collections.abc import Callable
@@ -180,7 +181,7 @@ def balanced(
         is_crowded = excess(low) > 0
 
         def beyond(level: FloatArray) -> FloatArray:
-            """What has its root at the level: at 0 where grains are not crowded."""
+            """The function whose root is the level, 0 where grains are not crowded."""
             return np.where(is_crowded, excess(level), level)
 
         levels[:, known] = root(beyond, low, high)

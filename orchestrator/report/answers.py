@@ -242,7 +242,8 @@ def _flow_number(
 
 def _of_seeds(row: pd.Series) -> str:
     """What the interval of several beds is of."""
-    return f"{row['seeds']} beds that differ in chance alone"
+    beds = f"{row['seeds']} beds that differ in chance alone"
+    return f"{beds}; the table has the interval of the method"
 
 
 def _share_interval(row: pd.Series) -> tuple[float, float, str]:

@@ -392,7 +392,9 @@ def _check_shape(bed: PileBed) -> None:
             "bed.slope_deg", f"{slope:g} deg", f"choose {low:g} to {high:g}"
         )
     if slope and not bed.form.rises:
-        raise UnfitError("bed.slope_deg", f"the shape {bed.shape} does not rise", OUT)
+        what = f"the shape {bed.shape} does not rise"
+        remedy = f'{OUT}; bed.kind = "grain" has a slope'
+        raise UnfitError("bed.slope_deg", what, remedy)
     if bed.smoothing:
         raise UnfitError("bed.smoothing", "it is of a profile", OUT)
     fields_of_some: set[str] = set()

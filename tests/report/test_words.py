@@ -122,7 +122,7 @@ def test_seeds_are_one_row_with_their_range(results: Results) -> None:
     assert set(sheet.frame["usable"]) == {"3 of 3 seeds"}
     assert set(sheet.frame[sheets.TAU_HEAD]) == {"0.0400 … 0.0900"}
     share = answers.card(study).numbers[-1]
-    assert share.interval_of == "3 beds that differ in chance alone"
+    assert share.interval_of.startswith("3 beds that differ in chance alone; ")
     # a wind goes nearly with the root of the Shields number
     ends = (share.low / share.value, share.high / share.value)
     assert ends == pytest.approx(np.sqrt([0.04 / 0.06, 0.09 / 0.06]), rel=0.02)

@@ -49,11 +49,16 @@ def test_other_texts_are_no_numbers(text: str) -> None:
         units.whole_number(text)
 
 
+def test_cobbles_of_a_river_are_not_asked_about() -> None:
+    assert units.questions({"grain.diameter": [0.057, 0.09]}, {}) == []
+    assert len(units.questions({"grain.diameter": [0.057, 0.1]}, {})) == 1
+
+
 ASKED = {
     # a study, the field and what it is asked, and whether another rule refuses the scene
     f"{QUARTZ}grain.diameter = 0.25\n{PILE}": "0.25 mm, grain.diameter = 0.00025?",
     f"{QUARTZ}grain.diameter = 250.0": "250 um, grain.diameter = 0.00025?",
-    f"{QUARTZ}grain.diameter = 0.06": "0.06 mm, grain.diameter = 6e-05?",
+    f"{QUARTZ}grain.diameter = 0.12": "0.12 mm, grain.diameter = 0.00012?",
     "grain = { diameter = 1e-3, density = 2.65 }": "2.65 g/cm3, grain.density = 2650?",
     f"{WATER}grain = {{ diameter = 1e-3, density = 2.65 }}": "grain.density = 2650?",
     f"{SAND}bed.slope_deg = 0.26": "0.26 rad, bed.slope_deg = 14.9?",
@@ -99,7 +104,7 @@ def test_presets_are_asked_nothing(name: str) -> None:
 
 def test_a_study_and_the_command_ask_alike() -> None:
     parameters = {
-        "diameter": 0.06,
+        "diameter": 0.12,
         "density": 2650.0,
         "fluid_density": 1000.0,
         "viscosity": 1e-3,
