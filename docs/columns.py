@@ -3,8 +3,14 @@
 python docs/columns.py > docs/columns.md
 """
 
+from pathlib import Path
+
+import pandas as pd
+
 from orchestrator import tables
 
+LISTED = Path(__file__).with_name("columns.csv")
+"""The columns of each table, in their order."""
 TABLES = {
     "scenes": "a scene: the values of its fields",
     "methods": "a scene: how it was answered, and why",
@@ -13,10 +19,12 @@ TABLES = {
     "pile_curve": "a pile and a load step: the part of the grains that has moved",
     "pile_grain": "a grain of a pile: where it lies and when it moved",
     "size_class": "a size class of a mixture and a fraction: its threshold, hiding",
+    "bed_change": "a pile on a bed that changes and a number of moved grains",
     "form": "a form of a train and a fraction: its threshold",
     "flow": "a solved flow",
     "wall_stress": "a place on the bed of a solved flow",
     "check": "a threshold that DEM answered too, as a check of a fast method",
+    "timings": "a case: the times of its run, in `timings/timings.csv`",
 }
 """Tables of a study, with what a row is."""
 HEAD = """\
@@ -27,9 +35,8 @@ question. The names of columns end with their SI units: `_m` is metres, `_m_s` m
 without a unit is a number, a text or a truth value. An empty cell means that there is no such value. `columns.csv` beside the tables
 explains the columns that they have.
 
-This page is written by `python docs/columns.py` from the descriptions in the program.
-
-## Tables
+This page is written by `python docs/columns.py` from the descriptions in the program. A table has those of its columns that belong to the
+question of the study. Columns that several tables have are explained in each of them.
 
 | table | a row is |
 |---|---|
@@ -44,11 +51,14 @@ END = """
 
 def text() -> str:
     """Write the page."""
-    lines = [f"| `{name}` | {row} |" for name, row in TABLES.items()]
-    lines += ["", "## Columns", "", "| column | meaning |", "|---|---|"]
-    for column, meaning in sorted(tables.COLUMNS.items()):
-        told = meaning.replace("*", r"\*").replace("|", r"\|").replace("<", r"\<")
-        lines.append(f"| `{column}` | {told} |")
+    listed = pd.read_csv(LISTED)
+    lines = [f"| [{name}](#{name}) | {row} |" for name, row in TABLES.items()]
+    for name in TABLES:
+        lines += ["", f"## {name}", "", "| column | meaning |", "|---|---|"]
+        for column in listed.loc[listed["table"] == name, "column"]:
+            meaning = tables.COLUMNS[column]
+            told = meaning.replace("*", r"\*").replace("|", r"\|").replace("<", r"\<")
+            lines.append(f"| `{column}` | {told} |")
     return HEAD + "\n".join(lines) + "\n" + END
 
 

@@ -1,18 +1,22 @@
 """Documents that must follow the code: the citation, and the links between pages."""
 
+import ast
 import copy
 import re
 import runpy
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import nbclient
 import nbformat
+import pandas as pd
 import pytest
 
 import orchestrator
 from orchestrator import __version__, cli, plan, tables
+from orchestrator.report.results import Results
 from orchestrator.study import study
 from tests.conftest import Command
 
@@ -63,6 +67,15 @@ def test_a_page_is_written_from_the_program(name: str) -> None:
     page = ROOT / "docs" / f"{name}.md"
     written = runpy.run_path(str(page.with_suffix(".py")))["text"]()
     assert page.read_text(encoding="utf-8") == written
+
+
+def test_the_page_of_columns_has_every_column_of_every_table(results: Results) -> None:
+    listed = pd.read_csv(ROOT / "docs" / "columns.csv")
+    assert not listed.duplicated().any()
+    assert set(listed["column"]) == set(tables.COLUMNS)
+    for name, table in results.tables.items():
+        columns = set(listed.loc[listed["table"] == name, "column"])
+        assert set(table) - columns == set(), name
 
 
 def test_the_gallery_shows_presets_with_small_pictures() -> None:
@@ -135,7 +148,34 @@ INSTEAD = {
     r"all levels share": "all methods share",
     r"Shields stress": "Shields number",
     r"aligned rows": "rows along the slope",
+    r"\bdear(er|est)?\b": "costly",
 }
+
+
+def _texts(module: Path) -> Iterator[str]:
+    """The texts of a module that are no docstrings: messages, labels, captions."""
+    tree = ast.parse(module.read_text(encoding="utf-8"))
+    docstrings = {
+        id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)
+    }
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Constant) or id(node) in docstrings:
+            continue
+        if isinstance(node.value, str):
+            yield node.value
+
+
+def test_messages_and_figures_use_the_words_of_the_glossary() -> None:
+    package = ROOT / "orchestrator"
+    texts: list[str] = []
+    for module in package.rglob("*.py"):
+        texts += _texts(module)
+    for name in ("*.j2", "texts.toml", "claims.toml", "fidelities.toml"):
+        texts += [path.read_text("utf-8") for path in package.rglob(name)]
+    assert len(texts) > 5000
+    for text in texts:
+        plain = " ".join(text.split())
+        assert [word for word in INSTEAD if re.search(word, plain)] == [], plain[:200]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))

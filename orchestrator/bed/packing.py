@@ -264,7 +264,8 @@ class Lattice:
     def layers(self) -> int:
         """Layers that hold mobile grains.
 
-        Under a slope's level rows a grain rests on one that lies deeper below the face.
+        Of horizontal rows under a slope a grain rests on one that lies deeper below the
+        face.
         """
         return self.mobile_layers + (1 if self.pattern == "horizontal" else 0)
 

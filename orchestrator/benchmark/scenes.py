@@ -41,8 +41,8 @@ runs do that differ by round-off: grains hold up others, chains go at once
 POURED_SCATTER = 0.15
 """The same of poured beds."""
 LEVEL_ROWS = 0.35
-"""Part of N until which level rows are judged: then a whole step goes at once or not,
-as the least detail decides (docs/engines.md)."""
+"""Part of N until which horizontal rows are judged: beyond it a whole step goes at once
+or not, as the least detail decides (docs/engines.md)."""
 LIFT_OFF = 0.20
 """Tolerance of thresholds where grains are carried off, which collide."""
 LIFT_OFF_SCATTER = 0.25

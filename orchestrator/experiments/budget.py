@@ -190,7 +190,7 @@ class _Packing(Choice):
             return {f"poured, seed {seed}": {"bed.seed": seed} for seed in SEEDS}
         alternatives: dict[str, Fields] = {
             "rows along the slope": {"bed.packing": "aligned"},
-            "level rows": {"bed.packing": "horizontal"},
+            "horizontal rows": {"bed.packing": "horizontal"},
         }
         for seed in SEEDS:
             alternatives[f"random gaps, seed {seed}"] = {
@@ -281,7 +281,7 @@ CHOICES: tuple[Choice, ...] = (
     ),
     Choice(
         name=FROZEN,
-        why="The paper, and every level, keeps the flow of the whole pile until the "
+        why="The paper, and every fidelity, keeps the flow of the whole pile until the "
         "last grain has gone. Else the bed line is drawn anew after each tenth.",
         field="threshold.update",
         values=[0.1],

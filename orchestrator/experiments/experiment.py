@@ -262,7 +262,7 @@ def _packing(bed: PileBed) -> str:
     if bed.packing == "aligned":
         return "rows along the slope"
     if bed.packing == "horizontal":
-        return "level rows"
+        return "horizontal rows"
     if bed.packing == "disordered":
         return f"gaps up to {bed.disorder:g} d, seed {bed.seed}"
     return f"poured, seed {bed.seed}"

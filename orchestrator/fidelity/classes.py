@@ -129,7 +129,8 @@ def _grain_class(scene: Scene) -> str:
         return f"{name}, level bed"
     if is_curved(bed):
         return f"{name}, curved forms"
-    # which grain of level rows and of large gaps goes first is chaotic on any slope
+    # on any slope it is chaotic which grain of horizontal rows and of large gaps goes
+    # first
     if is_near_row and is_limiting(scene):
         name += LIMITING
     if bed.packing == "aligned" and is_small(scene):

@@ -1,4 +1,4 @@
-"""Fidelities: named ways to answer a pile, from cheap to dear.
+"""Fidelities: named ways to answer a pile, from fast to accurate.
 
 A fidelity changes how a scene is answered, never what it asks. It has two rungs of the
 ladder of models, one for the flow and one for the grains. ``study/fidelities.toml``
@@ -293,7 +293,7 @@ FLAT = Rung(
     "flat", "log law on a flat bed: u*₀ everywhere", {"method.flow.model": "flat"}
 )
 FIDELITIES = _load()
-"""The fidelities, from cheap to dear: the last one is the reference."""
+"""The fidelities, from fast to accurate: the last one is the reference."""
 QUICK, REFERENCE = FIDELITIES[0], FIDELITIES[-1]
 OWN = Rung("own", "numbers of the study file")
 OWN_NUMBERS = Fidelity("own numbers", "numbers of the study file", OWN, OWN)

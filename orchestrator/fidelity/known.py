@@ -70,7 +70,7 @@ def known(fidelity: Fidelity, scene: Scene) -> Known:
     ----------
     fidelity
         The fidelity. That of a scene with numbers of its own has, for flow and grains
-        each, the error of the dearest fidelity that is no finer.
+        each, the error of the costliest fidelity that is no finer.
     scene
         The pile as it is asked for, or as it is answered where it has its own numbers.
 

@@ -48,7 +48,8 @@ def compared(answer: Scene) -> dict[float, Scene]:
         By each of `FACTORS` the scene with so much smoothing, by the closed form along
         the bed line, under the flow model of the answer. One that cannot be meshed or
         smoothed is left out. Empty for a scene without noise, and for grains that have
-        no such closed form: poured ones, level rows, and those that share the stress.
+        no such closed form: of poured beds, of horizontal rows, and of grains that
+        share the stress.
     """
     length = length_of(answer)
     is_along = has_rows_along(answer) and answer.forces.sheltering == "none"

@@ -967,7 +967,7 @@ class GoingOn(Method):
 
 METHODS: dict[str, type[Method]]
 METHODS = {"local": Pivot, "pivot": Pivot, "peeling": Peeling, "dem": Dem}
-"""The methods by what a study file calls them, cheap to dear."""
+"""The methods by what a study file calls them, from fast to accurate."""
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,7 @@ INSENSITIVE = 0.01
 PACKINGS = {
     "aligned": "rows along the slope",
     "disordered": "random gaps",
-    "horizontal": "level rows",
+    "horizontal": "horizontal rows",
 }
 """What the lines of claims call packings."""
 

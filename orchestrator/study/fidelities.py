@@ -44,7 +44,7 @@ class Written:
 
 
 def _read() -> dict[str, Written]:
-    """Every fidelity by its name, from cheap to dear."""
+    """Every fidelity by its name, from fast to accurate."""
     text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
     found = {}
     for name, table in tomllib.loads(text).items():
@@ -75,7 +75,7 @@ def _by_name(method: Mapping[str, Any]) -> Fields:
 
 
 WRITTEN: Mapping[str, Written] = _read()
-"""The fidelities by their names, from cheap to dear: the last one is the reference."""
+"""The fidelities by name, from fast to accurate: the last one is the reference."""
 
 
 def packing_of(bed: Mapping[str, Any]) -> str:

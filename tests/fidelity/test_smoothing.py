@@ -47,7 +47,7 @@ def test_half_and_twice_the_smoothing_are_those_of_their_own_studies(
         assert row["smoothing_compared_m"] == pytest.approx(compared, abs=0.02)
         is_noisy = used < row["smoothing_needed_m"]
         assert ("the profile is noise" in row["why_not"]) == is_noisy
-        assert ("are noise at the scale of the mesh" in said) == is_noisy
+        assert ("are noisy at the scale of the mesh" in said) == is_noisy
         for factor, column in columns.items():
             length = factor * row["smoothing_compared_m"]
             other = small_study.run(tmp_path / f"{length}", text(length))
