@@ -69,6 +69,12 @@ def test_a_page_is_written_from_the_program(name: str) -> None:
     assert page.read_text(encoding="utf-8") == written
 
 
+def test_the_tables_of_known_errors_are_those_of_the_calibration() -> None:
+    tool = runpy.run_path(str(ROOT / "tools" / "errors.py"))
+    page = (ROOT / "docs" / "ladder.md").read_text(encoding="utf-8")
+    assert tool["BEGIN"] + tool["tables"]() + tool["END"] in page
+
+
 def test_the_page_of_columns_has_every_column_of_every_table(results: Results) -> None:
     listed = pd.read_csv(ROOT / "docs" / "columns.csv")
     assert not listed.duplicated().any()

@@ -1,8 +1,9 @@
-"""The picture docs/ladder.png: known errors of each fidelity, by class of scenes.
+"""The picture docs/ladder.png and the tables of docs/ladder.md: known errors.
 
 python tools/errors.py
 
-It is drawn from the stored measurements, orchestrator/fidelity/calibration/errors.csv.
+Both are made from the stored measurements,
+orchestrator/fidelity/calibration/errors.csv.
 """
 
 from pathlib import Path
@@ -15,6 +16,11 @@ from orchestrator.report import style
 ROOT = Path(__file__).parents[1]
 ERRORS = ROOT / "orchestrator" / "fidelity" / "calibration" / "errors.csv"
 PICTURE = ROOT / "docs" / "ladder.png"
+PAGE = ROOT / "docs" / "ladder.md"
+BEGIN, END = "<!-- by tools/errors.py -->\n", "<!-- end -->\n"
+"""Lines of the page between which its tables stand."""
+MOST_COLUMNS = 6
+"""Classes in one table of the page."""
 FIDELITIES = {
     "quick": ("o", "#0072b2"),
     "static": ("s", "#009e73"),
@@ -53,8 +59,54 @@ NAMES = {
 FEWEST = 10  # scenes of a class with a known error
 
 
+def tables() -> str:
+    """Write the tables of the page: the largest error of each fidelity in each class.
+
+    Returns
+    -------
+    str
+        The tables. A column for the cost has that of the first class of each part.
+    """
+    errors = pd.read_csv(ERRORS)
+    written = []
+    for part, names in NAMES.items():
+        classes = list(names)
+        for first in range(0, len(classes), MOST_COLUMNS):
+            of_part = errors[errors["part"] == part]
+            chosen = classes[first : first + MOST_COLUMNS]
+            written.append(_table(part, of_part, chosen, classes[0]))
+    return "\n".join(written)
+
+
+def _table(part: str, errors: pd.DataFrame, classes: list[str], first: str) -> str:
+    """One table: a row for each fidelity, the reference and the number of scenes."""
+    largest = errors.groupby(["rung", "scene_class"]).max(numeric_only=True)
+    heads = [NAMES[part][name] for name in classes]
+    lines = [
+        f"| {part} | core-s | {' | '.join(heads)} |",
+        "|---|---|" + "---|" * len(classes),
+    ]
+    for rung in (*FIDELITIES, "reference"):
+        column = "error"
+        name = f"`{rung}`"
+        if rung == "reference":
+            column = "uncertainty"
+            name = "uncertainty of the reference"
+        cells = [f"{largest.loc[(rung, first), 'cost_core_s']:.2g}"]
+        for scene_class in classes:
+            cells.append(f"{100 * largest.loc[(rung, scene_class), column]:.3g} %")
+        lines.append(f"| {name} | {' | '.join(cells)} |")
+    counts = [f"{largest.loc[('quick', name), 'scenes']:.0f}" for name in classes]
+    lines.append(f"| scenes | | {' | '.join(counts)} |")
+    return "\n".join(lines) + "\n"
+
+
 def main() -> None:
-    """Draw the picture."""
+    """Draw the picture, and write the tables into the page."""
+    page = PAGE.read_text(encoding="utf-8")
+    before, rest = page.split(BEGIN)
+    _, after = rest.split(END)
+    PAGE.write_text(f"{before}{BEGIN}{tables()}{END}{after}", encoding="utf-8")
     errors = pd.read_csv(ERRORS)
     with style.settings():
         canvas = style.canvas(6.2)
