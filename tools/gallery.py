@@ -28,10 +28,20 @@ SHOWN = {
     "mixture": "hiding.svg",
     "shields": "shields.svg",
     "paper": "fractions-reynolds-alpha15.svg",
+    "ladder": "speed-against-accuracy.svg",
 }
 """The figure that is shown of each preset."""
-COMMANDS = {"stockpile": "erosion stockpile", "paper": "study paper --tolerance 0.2"}
+COMMANDS = {
+    "stockpile": "erosion stockpile",
+    "paper": "study paper --tolerance 0.2",
+    "ladder": "ladder",
+}
 """Commands of presets that `study PRESET` does not run."""
+NOTES = {
+    "paper": "Without a tolerance DEM answers all piles, and all claims are judged: "
+    "[paper.md](paper.md)."
+}
+"""What is added to the section of a preset."""
 WIDE = 900  # pixels
 COLOURS = 64
 HEAD = """\
@@ -78,6 +88,8 @@ def section(directory: Path, preset: str) -> str:
         f"![{preset}: {question}](figures/gallery-{preset}.png)",
         "",
     ]
+    if preset in NOTES:
+        lines += [NOTES[preset], ""]
     return "\n".join(lines)
 
 

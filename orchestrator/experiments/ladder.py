@@ -507,7 +507,7 @@ def _sections(pairs: pd.DataFrame, known: pd.DataFrame) -> list[Section]:
     title = "The rungs, and what is known of them"
     of_rungs = _tables_of_rungs(known)
     return [
-        Section("", card=_card(pairs)),
+        Section("", card=_card(_of_most_piles(pairs))),
         Section("Speed against accuracy", words["accuracy"], charts, [means]),
         Section(title, words["rungs"], (), of_rungs, [words["limit"]]),
     ]
@@ -539,8 +539,17 @@ def _numbers(pairs: pd.DataFrame) -> Any:
     return pd.factorize(names)[0] + 1
 
 
+def _of_most_piles(pairs: pd.DataFrame) -> pd.DataFrame:
+    """The pairs of rungs of the packing that most piles have.
+
+    Packings have different pairs: over a level bed no flow is solved.
+    """
+    packing = pairs.groupby("packing")["piles"].max().idxmax()
+    return pairs[pairs["packing"] == packing]
+
+
 def _card(pairs: pd.DataFrame) -> Card:
-    """The answer card: what the cheapest models within some errors cost."""
+    """The answer card of one packing: what the cheapest models within errors cost."""
     alike = pairs[pairs["same_model"]]
     each = alike.assign(largest=alike["largest"].abs()).groupby(PAIR, sort=False)
     worst = each["largest"].max()
@@ -562,11 +571,12 @@ def _card(pairs: pd.DataFrame) -> Card:
         if math.isfinite(off):
             note = f"other numbers of its own move it by up to {off:.2g} %"
         numbers.append(Number(float(cost[best]), "s", meaning, note))
-    count = int(pairs.groupby(PAIR)["piles"].sum().max())
+    count = int(pairs["piles"].max())
     piles_ = "pile" if count == 1 else "piles, each"
     return Card(
         "How much computing time does a threshold need, by how far off it may be?",
-        f"{count} {piles_} by {len(worst)} pairs of models for flow and grains.",
+        f"{count} {piles_} by {len(worst)} pairs of models for flow and grains; "
+        f"{pairs['packing'].iloc[0]} packing.",
         tuple(numbers),
         "Nothing is measured here: errors are those from the most costly models, the "
         "reference, at 10, 30, 50 and 70 % of the grains.",
