@@ -86,6 +86,8 @@ TABLE = Path(__file__).with_name("tested.csv")
 ROW_HOLD = 1.05
 """u*_0 of the first grain in its row, over that of the grain alone, from which the row
 holds it."""
+NOT_MEASURED = "nothing was measured"
+"""The beginning of a reason why a threshold is not usable: no measurement is near."""
 MOST_SLOPE_DEG = 30.0
 """Slope to which an interval of grains that go on is given, degrees."""
 FRICTION_DEG = (32.0, 50.0)

@@ -215,10 +215,12 @@ def _model(row: pd.Series, results: Results) -> Iterator[Remark]:
         return
     choice = row["model_share"]
     part = percent(row["fraction"])
+    of_intervals = "The intervals in the table do not contain this."
+    if row["tested_rows"] > 0:
+        of_intervals = "The intervals in the table are those of measured thresholds."
     text = (
         f"Models with other choices of packing, forces and angles give Shields numbers "
-        f"of {labels.interval(low, high)} for the {part}. The intervals in the table "
-        "do not contain this."
+        f"of {labels.interval(low, high)} for the {part}. {of_intervals}"
     )
     yield Remark(f"{str(choice).capitalize()} matters more than all else.", text)
 

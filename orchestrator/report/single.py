@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from orchestrator.digits import percent
-from orchestrator.physics.beside import FIELD, GOES_ON, LEVEL_DEG
+from orchestrator.physics.beside import FIELD, GOES_ON, LEVEL_DEG, NOT_MEASURED
 from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.report.card import Card, Number, Worth, decimals
 from orchestrator.report.subjects import (
@@ -444,7 +444,8 @@ def worth(row: Row, few: bool = False) -> Worth:
         if has_remedy:
             reason, _, remedy = reason.removesuffix(")").rpartition(" (")
             remedies.insert(0, remedy)
-        if not remedies and known(row["measured_level_ustar_m_s"]) > 0:
+        has_measured = known(row["measured_level_ustar_m_s"]) > 0
+        if has_measured and not remedies and not reason.startswith(NOT_MEASURED):
             remedies.append("take the measured value")
         return Worth("bad", f"not usable: {reason}", _sentence("; ".join(remedies)))
     if few:

@@ -8,7 +8,7 @@ import pandas as pd
 
 from orchestrator.flow.case import SPEED_HEIGHT
 from orchestrator.grains.threshold import within
-from orchestrator.physics.beside import GOES_ON, ROW_HOLD, beside
+from orchestrator.physics.beside import GOES_ON, NOT_MEASURED, ROW_HOLD, beside
 from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import standing_out, why_not
 from orchestrator.physics.velocity import (
@@ -208,7 +208,7 @@ def _untested(row: Mapping[Any, Any]) -> Iterator[str]:
     if not is_closed or row.get("criterion") != GOES_ON or np.isnan(row["reynolds"]):
         return
     if not row["tested_rows"]:
-        yield f"nothing was measured near such grains at Re* {row['reynolds']:.3g}"
+        yield f"{NOT_MEASURED} near such grains at Re* {row['reynolds']:.3g}"
 
 
 def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
