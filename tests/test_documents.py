@@ -69,10 +69,14 @@ def test_a_page_is_written_from_the_program(name: str) -> None:
     assert page.read_text(encoding="utf-8") == written
 
 
-def test_the_tables_of_known_errors_are_those_of_the_calibration() -> None:
-    tool = runpy.run_path(str(ROOT / "tools" / "errors.py"))
-    page = (ROOT / "docs" / "ladder.md").read_text(encoding="utf-8")
-    assert tool["BEGIN"] + tool["tables"]() + tool["END"] in page
+def test_tables_of_pages_are_those_of_their_measurements() -> None:
+    for name, page, function in (
+        ("errors", "ladder", "tables"),
+        ("budget", "budget", "table"),
+    ):
+        tool = runpy.run_path(str(ROOT / "tools" / f"{name}.py"))
+        text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+        assert tool["BEGIN"] + tool[function]() + tool["END"] in text
 
 
 def test_the_page_of_columns_has_every_column_of_every_table(results: Results) -> None:

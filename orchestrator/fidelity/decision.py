@@ -116,8 +116,8 @@ def decide(scene: Scene, tolerance: float | None) -> Decision:
         A scene with one force law.
     tolerance
         Relative error that tau_c may have, the uncertainty of its reference included.
-        None: with ``auto`` the least of `spread.floors`, half the spread of the choices
-        that all fidelities share.
+        None: with ``auto`` that of `spread.floors` for the class of the scene, half the
+        spread of the choices that all fidelities share.
 
     Returns
     -------
@@ -180,7 +180,7 @@ def _leaving(scene: Scene, tolerance: float | None) -> Decision:
         return as_written(scene, why_as_written)
     most = tolerance
     if most is None:
-        most = min(spread.floors().values())
+        most = spread.floors()[spread.model_class(scene)]
     fidelity, why = _looked_up(scene, most)
     if fidelity is None:
         return as_written(scene, why)

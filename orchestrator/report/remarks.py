@@ -236,7 +236,7 @@ def _fidelity(results: Results) -> Iterator[Remark]:
         "defaults",
         names=", ".join(names),
         error=max(item.known.total for item in chosen),
-        floor=min(spread.floors().values()),
+        floor=min(spread.floors()[spread.model_class(item.scene)] for item in chosen),
     )
     yield Remark("The method was chosen by default.", text)
 
