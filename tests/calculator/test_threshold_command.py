@@ -161,7 +161,10 @@ def test_csv_and_json_say_the_same(run: Run) -> None:
 @pytest.mark.parametrize(
     ("arguments", "question"),
     [
-        (["--diameter", "0.5"], "0.5 m: did you mean 0.5 mm, --diameter 0.0005?"),
+        (
+            [*WATER, "--diameter", "0.1"],
+            "0.1 m: did you mean 0.1 mm, --diameter 0.0001?",
+        ),
         ([*D, "--fluid-density", "1000"], "1e-05 m2/s, or 0.01 Pa s, is unusual"),
         ([*QUARTZ_IN_WATER, "--viscosity", "1e-3"], "is it right? --fluid names water"),
         ([*D, "--density", "2.65"], "2.65 g/cm3, --density 2650?"),

@@ -73,6 +73,11 @@ WARNED: list[tuple[dict[str, object], str, str]] = [
         "half-way",
     ),
     ({"method.grains.waiting_time": 2.0}, "method.grains.waiting_time", "ramp"),
+    (
+        {"method.kind": "dem", "method.grains.stiffness": 1e8},
+        "method.grains.stiffness",
+        "6 to 11 % too high",
+    ),
     ({"method.grains.load_increment": 0.1}, "method.grains.load_increment", "interval"),
     ({"forces.loaded_grains": "all but crest"}, "forces.loaded_grains", "blocks"),
     (
