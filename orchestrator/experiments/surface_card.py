@@ -34,8 +34,8 @@ INTERVAL_OF = "other first cells, meshes and models, on a cone"
 WORTH = Worth(
     "care",
     "usable, to compare directions and parts",
-    "Take the interval: it is that of the flow alone, and the threshold of the grain "
-    "has its own.",
+    "Quote the interval. It is that of the flow alone; the threshold of the grain has "
+    "an interval of its own.",
 )
 
 
