@@ -93,10 +93,7 @@ def thresholds(
     ['bridged'] [0.89]
     """
     _check_law(asked)
-    if criterion not in (*CRITERIA, BY_FLUID):
-        what = f"no criterion {criterion!r}"
-        remedy = f"choose {', '.join(CRITERIA)}, {BY_FLUID}"
-        raise InputError(what, "threshold: criterion", remedy)
+    _check_criterion(criterion)
     grains = _grains(points)
     if criterion == BY_FLUID:
         criterion = _criterion(grains, asked)
@@ -106,6 +103,29 @@ def thresholds(
         raise InputError(what, "threshold: criterion", remedy)
     if "depth" in points:
         _check_depth(grains)
+    # numbers beyond all floats end as laws that do not hold
+    with np.errstate(all="ignore"):
+        table = _of_all_laws(grains, asked, criterion)
+    if criterion == GOES_ON and not np.isfinite(table["shields"]).any():
+        remedy = f"take the criterion {LEAVES}, or a larger grain"
+        raise InputError(NO_START, "threshold: criterion", remedy)
+    if not table["valid"].any():
+        remedy = "are all numbers in SI units?"
+        raise InputError("no force law holds", "threshold", remedy)
+    _mark_laminar(table)
+    return table
+
+
+def _check_criterion(criterion: str) -> None:
+    """Refuse a criterion that is none."""
+    if criterion not in (*CRITERIA, BY_FLUID):
+        what = f"no criterion {criterion!r}"
+        remedy = f"choose {', '.join(CRITERIA)}, {BY_FLUID}"
+        raise InputError(what, "threshold: criterion", remedy)
+
+
+def _of_all_laws(grains: Table, asked: str, criterion: str) -> Table:
+    """The thresholds of grains under every law, a row for each grain and law."""
     exposure = Exposure(
         diameter=grains["diameter"],
         roughness=grains["roughness"],
@@ -114,34 +134,25 @@ def thresholds(
         lift_coefficient=grains["lift_coefficient"],
     )
     inputs = {each.column: grains[name] for name, each in PARAMETERS.items()}
-    # numbers beyond all floats end as laws that do not hold
-    with np.errstate(all="ignore"):
-        by_law = {name: _threshold(name, exposure, grains) for name in LAWS}
-        regimes = regime(by_law["low"], by_law["high"]).astype(object)
-        picked = _picked(asked, regimes, by_law["bridged"].friction_velocity, exposure)
-        hopping = _hopping(grains) if criterion == GOES_ON else None
-        blocks = []
-        for name, at in by_law.items():
-            block = _block(name, at, exposure, grains)
-            kind: Table = {**inputs, "force_law": block["law"]}
-            if hopping is not None:
-                block = _going_on(block, hopping, exposure, grains)
-                kind["criterion"] = np.full(len(block["law"]), GOES_ON, object)
-            block["regime"] = regimes
-            block |= beside({**block, **kind})
-            block["answer"] = np.array([name in laws for laws in picked])
-            blocks.append(block)
+    by_law = {name: _threshold(name, exposure, grains) for name in LAWS}
+    regimes = regime(by_law["low"], by_law["high"]).astype(object)
+    picked = _picked(asked, regimes, by_law["bridged"].friction_velocity, exposure)
+    hopping = _hopping(grains) if criterion == GOES_ON else None
+    blocks = []
+    for name, at in by_law.items():
+        block = _block(name, at, exposure, grains)
+        kind: Table = {**inputs, "force_law": block["law"]}
+        if hopping is not None:
+            block = _going_on(block, hopping, exposure, grains)
+            kind["criterion"] = np.full(len(block["law"]), GOES_ON, object)
+        block["regime"] = regimes
+        block |= beside({**block, **kind})
+        block["answer"] = np.array([name in laws for laws in picked])
+        blocks.append(block)
     table = {name: np.repeat(column, len(LAWS)) for name, column in inputs.items()}
     for name in blocks[0]:
         of_laws = [block[name] for block in blocks]
         table[name] = np.stack(of_laws, axis=1).ravel()
-    if hopping is not None and not np.isfinite(table["shields"]).any():
-        remedy = f"take the criterion {LEAVES}, or a larger grain"
-        raise InputError(NO_START, "threshold: criterion", remedy)
-    if not table["valid"].any():
-        remedy = "are all numbers in SI units?"
-        raise InputError("no force law holds", "threshold", remedy)
-    _mark_laminar(table)
     return table
 
 

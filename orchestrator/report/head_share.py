@@ -1,6 +1,7 @@
 """Pictures of how much of a bed moves: the share of the grains, and each size."""
 
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -22,6 +23,7 @@ from orchestrator.report.drawing import (
 from orchestrator.report.results import Results
 from orchestrator.report.style import Look
 from orchestrator.report.subjects import Quantity
+from orchestrator.types import BoolArray, FloatArray
 
 
 def shares(row: pd.Series, results: Results) -> Head | None:
@@ -106,6 +108,20 @@ def _measured(row: pd.Series, results: Results, told: Quantity) -> Any:
     return in_units(row, ratio(row) * ustar, told)
 
 
+class _Sizes(NamedTuple):
+    """The stresses that move each size of a mixture, Pa, and their names."""
+
+    names: list[str]
+    value: FloatArray
+    low: FloatArray
+    high: FloatArray
+    few: BoolArray
+    """Whether few grains stand for a size."""
+    measured: list[float]
+    together: float
+    """The stress that moves the same part of all sizes together."""
+
+
 def sizes(row: pd.Series, results: Results) -> Head:
     """Draw the stress that moves each size of a mixture, beside the measured hiding.
 
@@ -121,50 +137,62 @@ def sizes(row: pd.Series, results: Results) -> Head:
     Head
         The picture.
     """
-    classes = results.joined("size_class")
-    here = classes[classes["fraction"] == row["fraction"]]
-    here = here[here["scene_id"] == row["scene_id"]].sort_values("size_over_d")
-    density = float(row["rho_f_kg_m3"])
-    excess = (float(row["rho_sol_kg_m3"]) - density) * float(row["g_m_s2"])
-    weight = excess * float(row["d_m"]) * here["size_over_d"].to_numpy(float)
-    value = weight * here["shields_own"].to_numpy(float)
-    low = weight * here["shields_own_low"].to_numpy(float)
-    high = weight * here["shields_own_high"].to_numpy(float)
-    few = here["few"].to_numpy(bool)
-    measured = [answers.measured_of_size(row, size) for size in here["size_over_d"]]
-    names = []
-    for size, count in zip(here["size_over_d"], here["count"], strict=True):
-        grains = f"{count:.0f} grains" if count != 1 else "1 grain"
-        names.append(f"{1e3 * float(row['d_m']) * size:.3g} mm, {grains}")
-    at = density * float(row["ustar0_m_s"]) ** 2
     title = "The stress that moves each size of the mixture"
     caption = (
         "Orange: computed, with the interval that so few grains leave; rings: fewer "
         "than ten grains. Squares: Wilcock and Crowe (2003), at the measured stress of "
         "d50. An interval that reaches the frame is open."
     )
+    found = _stresses_of_sizes(row, results)
+    name = f"Stress that moves {percent(row['fraction'])} of a size, Pa"
+    return Head(partial(_draw_sizes, found, name), title, caption)
 
-    def draw(narrow: bool) -> Canvas:
-        canvas = figure(narrow, 60 + 26 * len(here))
-        ax = canvas.subplots()
-        margins(canvas, 128, 12, 24, 24)
-        top = 1.15 * np.nanmax([*value[np.isfinite(value)], *measured, at])
-        places = np.arange(len(here))[::-1]
-        left = np.nan_to_num(low, nan=0.0)
-        right = np.nan_to_num(high, nan=2 * top)
-        ax.hlines(places, left, right, color=PALE, lw=11, zorder=1)
-        ax.plot(value[~few], places[~few], "o", color=ANSWER, ms=8)
-        ax.plot(value[few], places[few], "o", color=ANSWER, mfc=GROUND, mew=1.6, ms=8)
-        ax.plot(measured, places, "s", color=INK, ms=6)
-        ax.axvline(at, color=ANSWER, lw=1, ls=(0, (2, 2)), zorder=0.5)
-        ax.set_yticks(places, names)
-        ax.set(xlim=(0, top), ylim=(-0.6, len(here) - 0.4))
-        part = percent(row["fraction"])
-        name = f"Stress that moves {part} of a size, Pa"
-        if narrow:
-            ax.set_title(name, x=-0.5)
-        else:
-            ax.set_title(f"{name}; line: all sizes together, {at:.3g}")
-        return canvas
 
-    return Head(draw, title, caption)
+def _stresses_of_sizes(row: pd.Series, results: Results) -> _Sizes:
+    """The stresses of each size at the fraction of the card."""
+    classes = results.joined("size_class")
+    here = classes[classes["fraction"] == row["fraction"]]
+    here = here[here["scene_id"] == row["scene_id"]].sort_values("size_over_d")
+    density = float(row["rho_f_kg_m3"])
+    excess = (float(row["rho_sol_kg_m3"]) - density) * float(row["g_m_s2"])
+    weight = excess * float(row["d_m"]) * here["size_over_d"].to_numpy(float)
+    names = []
+    for size, count in zip(here["size_over_d"], here["count"], strict=True):
+        grains = f"{count:.0f} grains" if count != 1 else "1 grain"
+        names.append(f"{1e3 * float(row['d_m']) * size:.3g} mm, {grains}")
+    return _Sizes(
+        names,
+        value=weight * here["shields_own"].to_numpy(float),
+        low=weight * here["shields_own_low"].to_numpy(float),
+        high=weight * here["shields_own_high"].to_numpy(float),
+        few=here["few"].to_numpy(bool),
+        measured=[answers.measured_of_size(row, size) for size in here["size_over_d"]],
+        together=density * float(row["ustar0_m_s"]) ** 2,
+    )
+
+
+def _draw_sizes(found: _Sizes, name: str, narrow: bool) -> Canvas:
+    """A line for each size: its interval, its stress, and the measured one."""
+    count = len(found.names)
+    canvas = figure(narrow, 60 + 26 * count)
+    ax = canvas.subplots()
+    margins(canvas, 128, 12, 24, 24)
+    value = found.value
+    at = found.together
+    top = 1.15 * np.nanmax([*value[np.isfinite(value)], *found.measured, at])
+    places = np.arange(count)[::-1]
+    left = np.nan_to_num(found.low, nan=0.0)
+    right = np.nan_to_num(found.high, nan=2 * top)
+    ax.hlines(places, left, right, color=PALE, lw=11, zorder=1)
+    few = found.few
+    ax.plot(value[~few], places[~few], "o", color=ANSWER, ms=8)
+    ax.plot(value[few], places[few], "o", color=ANSWER, mfc=GROUND, mew=1.6, ms=8)
+    ax.plot(found.measured, places, "s", color=INK, ms=6)
+    ax.axvline(at, color=ANSWER, lw=1, ls=(0, (2, 2)), zorder=0.5)
+    ax.set_yticks(places, found.names)
+    ax.set(xlim=(0, top), ylim=(-0.6, count - 0.4))
+    if narrow:
+        ax.set_title(name, x=-0.5)
+    else:
+        ax.set_title(f"{name}; line: all sizes together, {at:.3g}")
+    return canvas
