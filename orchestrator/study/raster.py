@@ -94,41 +94,54 @@ def read_surface(path: Path, where: str) -> Surface:
 
 def _of_grid(text: str, name: str, where: str) -> Raster:
     """The raster of an ESRI ASCII grid, whose rows run from north to south."""
-    header: dict[str, float] = {}
     lines = text.splitlines()
-    first = 0
-    for line in lines:
-        words = line.split()
-        if len(words) != 2 or not words[0][0].isalpha():
-            break
-        header[words[0].lower()] = _number(words[1], f"{where}: {words[0]}")
-        first += 1
-    for key in GRID_KEYS:
-        if key not in header:
-            remedy = "its head has ncols, nrows, xllcorner, yllcorner, cellsize"
-            raise InputError(f"{key} is missing", where, remedy)
-    columns, rows = header["ncols"], header["nrows"]
-    values = _numbers(lines[first:], first, where)
+    header = _head_of_grid(lines, where)
+    columns = header["ncols"]
+    rows = header["nrows"]
+    values = _numbers(lines[len(header) :], len(header), where)
     is_whole = columns % 1 == 0 and columns * rows == len(values)
     if not (is_whole and min(columns, rows) >= FEWEST):
         what = f"{len(values)} heights, not {columns:.9g} x {rows:.9g}"
         remedy = f"nrows lines of ncols numbers, {FEWEST} of each at least"
         raise InputError(what, where, remedy)
-    columns, rows = int(columns), int(rows)
-    heights = np.array(values).reshape(rows, columns)[::-1]
+    heights = np.array(values).reshape(int(rows), int(columns))[::-1]
     heights = np.where(heights == header.get("nodata_value", -9999.0), np.nan, heights)
+    x = _axis_of_grid("x", int(columns), header, where)
+    y = _axis_of_grid("y", int(rows), header, where)
+    return Raster(name, x, y, heights)
+
+
+def _head_of_grid(lines: list[str], where: str) -> dict[str, float]:
+    """The numbers at the head of a grid by their keys, a line for each."""
+    header: dict[str, float] = {}
+    for line in lines:
+        words = line.split()
+        if len(words) != 2 or not words[0][0].isalpha():
+            break
+        key = words[0].lower()
+        if key in header:
+            raise InputError(f"{key} stands twice", where, "remove one of the lines")
+        header[key] = _number(words[1], f"{where}: {words[0]}")
+    for key in GRID_KEYS:
+        if key not in header:
+            remedy = "its head has ncols, nrows, xllcorner, yllcorner, cellsize"
+            raise InputError(f"{key} is missing", where, remedy)
+    return header
+
+
+def _axis_of_grid(
+    axis: str, count: int, header: dict[str, float], where: str
+) -> FloatArray:
+    """The centres of the cells of a grid along an axis, m."""
     step = header["cellsize"]
     if not 0 < step < np.inf:
         raise InputError(f"cellsize {step:g}", where, "it is in m, above 0")
-    axes = []
-    for axis, count in (("x", columns), ("y", rows)):
-        start = header.get(f"{axis}llcenter")
-        if start is None:
-            start = header.get(f"{axis}llcorner", 0.0) + step / 2
-        if not np.isfinite(start):
-            raise InputError(f"{axis}llcorner {start:g}", where, "it is in m")
-        axes.append(_steps(start, step, count))
-    return Raster(name, axes[0], axes[1], heights)
+    start = header.get(f"{axis}llcenter")
+    if start is None:
+        start = header.get(f"{axis}llcorner", 0.0) + step / 2
+    if not np.isfinite(start):
+        raise InputError(f"{axis}llcorner {start:g}", where, "it is in m")
+    return _steps(start, step, count)
 
 
 def _numbers(lines: list[str], before: int, where: str) -> list[float]:

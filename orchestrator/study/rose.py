@@ -114,6 +114,21 @@ def read_rose(text: str, name: str, where: str) -> Rose:
     InputError
         With the line and the remedy.
     """
+    rows = _rows(text, where)
+    total = sum(share for _, _, share in rows)
+    whole = 100.0 if total > 50 else 1.0
+    if not abs(total / whole - 1) <= OFF:
+        what = f"its shares add up to {total:.6g}, not to 1 or 100"
+        remedy = "add the calms, with a speed of 0, or divide the shares by their sum"
+        raise InputError(what, where, remedy)
+    normed = tuple(
+        (direction, speed, share / total) for direction, speed, share in rows
+    )
+    return Rose(name, normed, digest_text(repr(normed)))
+
+
+def _rows(text: str, where: str) -> list[tuple[float, float, float]]:
+    """The directions from 0 to 360 degrees, the speeds and the shares of a file."""
     reader = csv.DictReader(io.StringIO(text))
     header = [cell.strip() for cell in reader.fieldnames or ()]
     remedy = f"the first line is {','.join(COLUMNS)}, then numbers"
@@ -130,14 +145,7 @@ def read_rose(text: str, name: str, where: str) -> Rose:
             raise InputError(str(error), place, remedy) from None
         _check(direction, speed, share, place)
         rows.append((direction % 360, speed, share))
-    total = sum(share for _, _, share in rows)
-    whole = 100.0 if total > 50 else 1.0
-    if not abs(total / whole - 1) <= OFF:
-        what = f"its shares add up to {total:.6g}, not to 1 or 100"
-        remedy = "add the calms, with a speed of 0, or divide the shares by their sum"
-        raise InputError(what, where, remedy)
-    normed = tuple((direction, speed, s / total) for direction, speed, s in rows)
-    return Rose(name, normed, digest_text(repr(normed)))
+    return rows
 
 
 def _check(direction: float, speed: float, share: float, place: str) -> None:

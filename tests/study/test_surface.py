@@ -270,6 +270,7 @@ def test_a_form_of_few_cells_is_refused() -> None:
         ("a.asc", WHOLE.format("inf", 0), "cellsize inf"),
         ("a.asc", WHOLE.format(1, "nan"), "xllcorner nan"),
         ("a.asc", "ncols 9\nnrows 9\n1 2\n", "cellsize is missing"),
+        ("a.asc", "ncols 9\nnrows 9\nncols 8\n1 2\n", "ncols stands twice"),
         ("a.asc", "ncols 9\nnrows 9\ncellsize 1\n1 2 x\n", "line 4: 'x' is no number"),
         ("a.asc", "ncols 9\nnrows 9\ncellsize 1\n1 2 3\n", "3 heights, not 9 x 9"),
         ("a.tif", "no picture", "GeoTIFF: it is cut off, or another kind of file"),
