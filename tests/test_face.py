@@ -54,8 +54,8 @@ def test_a_bad_argument_gets_one_clear_error(
 ) -> None:
     with pytest.raises(InputError, match=name):
         orchestrator.threshold(1e-3, **arguments)
-    with pytest.warns(UserWarning, match="did you mean 0.06 mm, diameter 6e-05"):
-        orchestrator.threshold(0.06, fluid="water", density=2650.0)
+    with pytest.warns(UserWarning, match="did you mean 0.1 mm, diameter 0.0001"):
+        orchestrator.threshold(0.1, fluid="water", density=2650.0)
 
 
 def test_a_study_from_its_file_to_a_figure(tmp_path: Path) -> None:
