@@ -25,7 +25,7 @@ test-long: lint  ## run the tests that install, queue, or run whole studies: min
 test-faults: lint  ## kill, harm and starve a small study, and count what it survives: minutes
 	$(PYTHON) -m pytest $(PARALLEL) tests/faults $(ARGS)
 
-calibration: setup  ## measure the fidelity levels and the maps anew, for the package and its docs
+calibration: setup  ## measure known errors, maps and intervals anew, for the package and its docs
 	$(PYTHON) -m orchestrator ladder
 	$(PYTHON) -m orchestrator stability
 	$(PYTHON) -m orchestrator budget
@@ -35,6 +35,7 @@ calibration: setup  ## measure the fidelity levels and the maps anew, for the pa
 	$(PYTHON) tools/tested.py results/validate/tables/measured.csv > tested.csv
 	mv tested.csv orchestrator/physics/tested.csv
 	$(PYTHON) tools/errors.py
+	$(PYTHON) tools/budget.py results/budget/tables/shares.csv
 	cp results/stability/figures/maps.png docs/stability.png
 
 docs:  ## make the site of the documents, site/README.html, which reads offline

@@ -202,9 +202,11 @@ def reopen(space: Workspace) -> tuple[Study, Plan]:
 
 def _command_of(about: Mapping[str, Any], root: Path) -> str:
     """The command of an experiment, with the file that it is on."""
-    command = COMMANDS.get(about["name"], about["name"])
-    file = about.get("source", {}).get("file")
-    return f"{command} {os.path.normpath(root / file)}" if file else command
+    command: str = COMMANDS.get(about["name"], about["name"])
+    source = about.get("source")
+    if not isinstance(source, dict) or "file" not in source:
+        return command
+    return f"{command} {os.path.normpath(root / str(source['file']))}"
 
 
 def redraw(out: Path, *, every: bool = False) -> Finished:
