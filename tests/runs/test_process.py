@@ -32,10 +32,10 @@ def _has_ended(file: Path) -> bool:
     """Whether the process whose number a file holds ends within a moment."""
     pid = int(file.read_text())
     for _ in range(200):
-        if (
-            not psutil.pid_exists(pid)
-            or psutil.Process(pid).status() == psutil.STATUS_ZOMBIE
-        ):
+        try:
+            if psutil.Process(pid).status() == psutil.STATUS_ZOMBIE:
+                return True
+        except psutil.NoSuchProcess:
             return True
         time.sleep(0.05)
     return False
