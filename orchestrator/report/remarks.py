@@ -11,11 +11,12 @@ from orchestrator.fidelity import spread
 from orchestrator.fidelity.limits import FROZEN_BED
 from orchestrator.physics.beside import ROW_HOLD
 from orchestrator.physics.fluids import PAPER
+from orchestrator.physics.velocity import log_law_speed
 from orchestrator.report import labels, sheets, single, theory
 from orchestrator.report.card import Remark
 from orchestrator.report.page import caption
 from orchestrator.report.results import Results
-from orchestrator.report.subjects import is_gas, length, place_of_file
+from orchestrator.report.subjects import WIND, is_gas, length, place_of_file
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 
@@ -26,11 +27,9 @@ PAPER_FLUID = Remark(
     "The gas is that of the paper, 1 kg/m³ and 1e-5 m²/s. For real air write "
     '`fluid.kind = "air"`.',
 )
-BARE_GROUND = Remark(
-    "The wind is that over bare, level ground.",
-    "Ripples, stones and plants slow it near the ground: over them a stronger wind at "
-    "10 m is needed.",
-)
+ROUGHER_M = (1e-4, 1e-3)
+"""Roughness lengths of ground over which the wind is told, too, m: of rippled sand, and
+of stones or low plants."""
 DRY_GRAINS = Remark(
     "Dry, round grains without cohesion.",
     "Moisture, crusts and fine dust between the grains make them harder to move.",
@@ -69,8 +68,45 @@ def remarks(results: Results) -> list[Remark]:
         said.append(PAPER_FLUID)
     usual = [FIRST_MOTION]
     if table["rho_f_kg_m3"].map(is_gas).any():
-        usual = [BARE_GROUND, DRY_GRAINS, FIRST_MOTION]
+        usual = [over_ground(table), DRY_GRAINS, FIRST_MOTION]
     return said + usual[: max(0, MOST - len(said))]
+
+
+def over_ground(rows: pd.DataFrame) -> Remark:
+    """Say which winds have the friction velocity of an answer over rougher ground.
+
+    Parameters
+    ----------
+    rows
+        Thresholds in a gas with the columns of their scenes; the first that is known
+        is told.
+
+    Returns
+    -------
+    Remark
+        The winds 10 m above the ground, by the logarithmic law.
+    """
+    head = "The wind is that over bare, level ground."
+    weaker = (
+        "Ripples, stones and plants make the ground rougher: a weaker wind has the "
+        "same friction velocity over it"
+    )
+    unknown = "Which part of it stones and plants keep from the grains is not computed."
+    known = rows[rows["ustar0_m_s"].notna()]
+    if known.empty:
+        return Remark(head, f"{weaker}. {unknown}")
+    row = known.iloc[0]
+    ustar = float(row["ustar0_m_s"])
+    here = single.in_unit(row, ustar, WIND)
+    winds = []
+    for z0 in ROUGHER_M:
+        wind = float(log_law_speed(ustar, 10, z0))
+        if wind < here:
+            winds.append(f"{wind:#.3g} m/s where z₀ is {length(z0)}")
+    if not winds:
+        return Remark(head, f"{weaker}. {unknown}")
+    told = f"{ustar:#.3g} m/s is a wind of {here:#.3g} m/s at 10 m here"
+    return Remark(head, f"{weaker}. {told}, of {', and of '.join(winds)}. {unknown}")
 
 
 def _of_laws(results: Results) -> Iterator[Remark]:

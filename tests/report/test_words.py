@@ -1,5 +1,6 @@
 """The answer in words and tables: every row has its scene, its interval and its doubts."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from orchestrator.report import answers, bed, labels, remarks, sheets, shields
 from orchestrator.report.results import Results
 from orchestrator.report.shields import LABEL, SHAPE
 from orchestrator.study import fields
+from tests import small_study
 from tests.report.conftest import changed, copies, legend_of, only
 
 SHOWN = ("alpha_deg", "d_m")
@@ -158,6 +160,34 @@ def test_a_threshold_that_is_not_usable_says_so(results: Results) -> None:
     sheet = sheets.short(study)
     assert sheet is not None
     assert "usable: no: Re* 2 is below 30" in sheet.shared
+
+
+def test_over_rougher_ground_a_weaker_wind_has_the_same_friction_velocity(
+    results: Results,
+) -> None:
+    """u = u*/0.41 ln(z/z0): a larger z0 has a larger u* in one wind."""
+    heap = only(results, "pile")
+    said = remarks.over_ground(heap.exemplars).text
+    row = heap.exemplars.iloc[0]
+    ustar = row["ustar0_m_s"]
+    winds = [ustar / 0.41 * np.log(10 / z0) for z0 in (row["z0_m"], 1e-4, 1e-3)]
+    assert winds == sorted(winds, reverse=True)
+    for speed in (ustar, *winds):
+        assert f"{speed:#.3g} m/s" in said
+    # over grains that are as rough as such ground the wind is no weaker
+    said = remarks.over_ground(heap.exemplars.assign(z0_m=2e-4)).text
+    assert "0.1 mm" not in said
+    assert f"{winds[2]:#.3g} m/s" in said
+
+
+def test_a_study_in_wind_says_what_rougher_ground_changes(tmp_path: Path) -> None:
+    text = 'fluid.kind = "air"\n[grain]\ndiameter = 2.5e-4\ndensity = 2650.0\n'
+    asked = remarks.remarks(small_study.run(tmp_path, text))
+    (said,) = [each.text for each in asked if each.head.startswith("The wind is that")]
+    assert "stronger" not in said
+    # in the wind in which u* is 0.256 m/s over this sand, by docs/beach.md
+    assert "0.256 m/s is a wind of 8.38 m/s" in said
+    assert "7.18 m/s where z₀ is 0.1 mm" in said
 
 
 def test_an_interval_without_an_end_is_written_so(results: Results) -> None:
