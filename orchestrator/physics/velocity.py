@@ -6,19 +6,13 @@ together (`bridge`).
 
 Van Driest's profile goes from the sublayer to the logarithm. In wall units
 (y = z ustar/nu): ``U' + l^2 U'^2 = 1``, ``l = 0.41 y (1 - exp(-y/26))``. Roughness
-shifts y by D of Rotta (1962) in the correlation of Cebeci and Chang (1978). The shear
-depends on z + D alone, so that two integrals, tabulated once, serve every grain. The
-form and the constants 0.9 and 6 agree with code_saturne (cs_wall_functions), which
-cites these authors; 26 is the value commonly quoted of van Driest.
+shifts y by D of Rotta (1962) in the correlation of Cebeci and Chang (1978). The form
+and the constants 0.9 and 6 agree with code_saturne (cs_wall_functions), which cites
+these authors; 26 is the value commonly quoted of van Driest.
 """
-
-from dataclasses import dataclass
-from functools import cache
-from typing import Self
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
-from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike
 
 from orchestrator.physics.constants import GAS_BELOW, INVERSE_KARMAN, KARMAN
@@ -45,20 +39,10 @@ DAMPING = 26.0
 """van Driest's A+, wall units."""
 ROUGHEST = 2000.0
 """ks ustar/nu up to which the correlation of the shift is in use."""
-SMOOTHEST = 1e-3
-"""Distance from which the integrals are tabulated, wall units.
-
-Below, the speed is y to 16 digits.
-"""
-TALLEST = 1e9
-"""Distance up to which the integrals are tabulated, wall units.
-
-Above, the shear is that of the log law to 9 digits.
-"""
-STEP = 0.03
-"""Step of the tables in ln y: interpolation errs by less than 1e-12, relative."""
-GAUSS_POINTS = 12
-"""Points of the quadrature within an interval of the tables."""
+BUFFER = 5.0
+"""Distance from the wall at which the stretched coordinate turns to a logarithm."""
+GAUSS_POINTS = 32
+"""Points of the quadrature over a layer."""
 
 
 def log_law_ustar(
@@ -572,6 +556,11 @@ def layer(
 ) -> tuple[FloatArray, FloatArray]:
     """Average van Driest's profile over a layer.
 
+    With the shear S the speed at the base is the integral of S from the wall, and the
+    mean speed over the layer exceeds it by that of ``(top - y) S / (top - base)``. Both
+    are taken by Gauss's quadrature in ``asinh(y/5)``, which is y in the sublayer and
+    its logarithm above: 32 points are right to 1e-11 from the sublayer to y = 1e8.
+
     Parameters
     ----------
     base, top
@@ -590,11 +579,28 @@ def layer(
     >>> print(speed.round(3), shear.round(3))
     [ 0.5   13.434] [1.    0.165]
     """
+    low, high = base + moved, top + moved
+    _, rise_below = _nodes(moved, low)
+    inside, rise = _nodes(low, high)
     depth = top - base
-    rise = _speed_integral(top + moved) - _speed_integral(base + moved)
-    speed = rise / depth - _speed(moved)
-    shear = (_speed(top + moved) - _speed(base + moved)) / depth
-    return speed, shear
+    above = (high[..., None] - inside) / np.asarray(depth)[..., None]
+    at_base = rise_below.sum(axis=-1)
+    speed = at_base + (above * rise).sum(axis=-1)
+    return np.asarray(speed), np.asarray(rise.sum(axis=-1) / depth)
+
+
+def _nodes(start: FloatArray, end: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Points between two distances from the wall, and the rise of the speed at each.
+
+    Both have the points of the quadrature along their last axis.
+    """
+    root, weight = leggauss(GAUSS_POINTS)
+    first = np.arcsinh(start / BUFFER)
+    width = np.arcsinh(end / BUFFER) - first
+    stretched = first[..., None] + width[..., None] * (root + 1) / 2
+    y = BUFFER * np.sinh(stretched)
+    step = width[..., None] * weight / 2 * BUFFER * np.cosh(stretched)
+    return y, step * shear(y)
 
 
 def shear(y: FloatArray) -> FloatArray:
@@ -621,101 +627,3 @@ def shear(y: FloatArray) -> FloatArray:
 def _mixing_length(y: FloatArray) -> FloatArray:
     """Mixing length of van Driest, l = 0.41 y (1 - exp(-y/26)), wall units."""
     return -KARMAN * y * np.expm1(-y / DAMPING)
-
-
-def _log_above(y: FloatArray) -> FloatArray:
-    """Speed of the log law over that at the end of the table."""
-    return np.log(np.maximum(y / TALLEST, 1)) / KARMAN
-
-
-def _speed(y: FloatArray) -> FloatArray:
-    """Integral of the shear from the shifted wall."""
-    table, _ = _tables()
-    return np.where(y < SMOOTHEST, y, table.read(y) + _log_above(y))
-
-
-def _speed_integral(y: FloatArray) -> FloatArray:
-    """Integral of the speed from the shifted wall."""
-    speed_table, table = _tables()
-    speed_at_end = speed_table.read(np.asarray(TALLEST))
-    above = np.maximum(y - TALLEST, 0) * (speed_at_end - 1 / KARMAN)
-    whole = table.read(y) + above + y * _log_above(y)
-    return np.where(y < SMOOTHEST, y**2 / 2, whole)
-
-
-@dataclass(frozen=True)
-class _Table:
-    """A function of y as polynomials between nodes at equal steps of ln y.
-
-    `coefficients`, of shape (6, intervals), are those of 1, x, ... x^5, with x from 0
-    to 1 in each interval.
-    """
-
-    coefficients: FloatArray
-
-    @classmethod
-    def through(cls, value: FloatArray, slope: FloatArray, bend: FloatArray) -> Self:
-        """Interpolate by the quintic Hermite polynomials.
-
-        They have the given value, first and second derivative by ln y at both nodes of
-        an interval; all three are arrays of shape (nodes,). scipy's `BPoly` does the
-        same, after an import of 0.3 s.
-        """
-        c0 = value
-        c1 = slope * STEP
-        c2 = bend * STEP**2 / 2
-        # what the first three terms leave of each derivative at the next node
-        value_left = c0[1:] - (c0 + c1 + c2)[:-1]
-        slope_left = c1[1:] - (c1 + 2 * c2)[:-1]
-        bend_left = (c2[1:] - c2[:-1]) * 2
-        c3 = 10 * value_left - 4 * slope_left + bend_left / 2
-        c4 = -15 * value_left + 7 * slope_left - bend_left
-        c5 = 6 * value_left - 3 * slope_left + bend_left / 2
-        return cls(np.array([c0[:-1], c1[:-1], c2[:-1], c3, c4, c5]))
-
-    def read(self, y: FloatArray) -> FloatArray:
-        """The function at y, which is moved to the nearest end of the table.
-
-        It is NaN where y is.
-        """
-        place = np.log(np.clip(y, SMOOTHEST, TALLEST) / SMOOTHEST) / STEP
-        # NaN is no index: any interval does, since the place inside it stays NaN
-        interval = np.nan_to_num(np.floor(place)).astype(int)
-        inside = place - interval
-        return np.asarray(polyval(inside, self.coefficients[:, interval], tensor=False))
-
-
-@cache
-def _tables() -> tuple[_Table, _Table]:
-    """Tables of the speed and of its integral over the distance y from the wall."""
-    ln_y = np.arange(np.log(SMOOTHEST), np.log(TALLEST) + 2 * STEP, STEP)
-    y = np.exp(ln_y)
-    speed, integral = _integrals(y)
-    # derivatives by ln y: y d/dy, and y d/dy of that
-    shear_y = y * shear(y)
-    of_speed = _Table.through(speed, shear_y, shear_y + y**2 * _shear_gradient(y))
-    speed_y = y * speed
-    of_integral = _Table.through(integral, speed_y, speed_y + y**2 * shear(y))
-    return of_speed, of_integral
-
-
-def _integrals(y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Speed and its integral at nodes, by Gauss's quadrature of the shear between."""
-    root, weight = leggauss(GAUSS_POINTS)
-    width = np.diff(y)[:, None]
-    inside = y[:-1, None] + width * (root + 1) / 2
-    area = weight * width / 2 * shear(inside)
-    speed = SMOOTHEST + np.concatenate([[0], np.cumsum(area.sum(axis=1))])
-    # by parts: the shear within an interval adds to the integral of the speed
-    from_inside = (area * (y[1:, None] - inside)).sum(axis=1)
-    rise = speed[:-1] * width[:, 0] + from_inside
-    integral = SMOOTHEST**2 / 2 + np.concatenate([[0], np.cumsum(rise)])
-    return speed, integral
-
-
-def _shear_gradient(y: FloatArray) -> FloatArray:
-    """Derivative of the shear by y."""
-    length = _mixing_length(y)
-    less_damped = KARMAN * y / DAMPING * np.exp(-y / DAMPING)
-    slope = -KARMAN * np.expm1(-y / DAMPING) + less_damped
-    return -2 * length * slope * shear(y) ** 2 / np.sqrt(1 + 4 * length**2)
