@@ -14,7 +14,7 @@ from orchestrator import __version__, examples
 from orchestrator.benchmark import cli as benchmark
 from orchestrator.calculator import cli as calculator
 from orchestrator.errors import Fault, InputError, of_exception, suggestion
-from orchestrator.runs import terminal
+from orchestrator.runs import processors, terminal
 from orchestrator.runs.cluster import SYSTEMS, Queue
 from orchestrator.study.units import number, whole_number
 
@@ -191,9 +191,9 @@ def _add_run_options(command: argparse.ArgumentParser, preset: str) -> None:
     of_what = "file" if preset == "first-look" else "command"
     text = f"directory of the results; default: results/ and the name of the {of_what}"
     add("--out", type=Path, metavar="DIR", help=text)
-    count = os.cpu_count() or 1
-    text = "number of cases at a time; default: one for each processor"
-    add("--workers", type=whole_number, default=count, metavar="N", help=text)
+    text = "number of cases at a time; default: one for each processor that it may use"
+    workers = processors.count()
+    add("--workers", type=whole_number, default=workers, metavar="N", help=text)
     text = "list what would run, with time and disk, and end"
     add("--plan", action="store_true", help=text)
 

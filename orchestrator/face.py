@@ -1,6 +1,5 @@
 """The public Python face: `threshold`, `run` and `open`."""
 
-import os
 import warnings
 from html import escape
 from pathlib import Path
@@ -15,6 +14,7 @@ from orchestrator.calculator.asked import thresholds_and_questions
 from orchestrator.calculator.cli import OPTIONS
 from orchestrator.errors import InputError, OrchestratorError, SolverError
 from orchestrator.report.results import Results
+from orchestrator.runs import processors
 from orchestrator.runs.workspace import Workspace
 from orchestrator.study import study
 from orchestrator.study.units import meant
@@ -187,7 +187,8 @@ def run(
     out
         The directory, by default ``results/NAME``.
     workers
-        Number of cases at a time, by default one for each processor.
+        Number of cases at a time, by default one for each processor that the process
+        may use.
     tolerance
         Relative error that thresholds may have.
 
@@ -205,7 +206,7 @@ def run(
         goes on.
     """
     if workers is None:
-        workers = os.cpu_count() or 1
+        workers = processors.count()
     if workers < 1:
         raise InputError(f"{workers} is below 1", where="workers")
     asked = study.load(source, tolerance)

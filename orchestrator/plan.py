@@ -4,7 +4,7 @@ import time
 import timeit
 import warnings
 from collections import Counter
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Collection, Container, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
@@ -18,7 +18,7 @@ from orchestrator.fidelity import decision, limits, smoothing
 from orchestrator.fidelity.decision import Decision, decide
 from orchestrator.grains.cells import SingleGrainCase, batches
 from orchestrator.grains.pile import Pile
-from orchestrator.runs import reuse
+from orchestrator.runs import processors, reuse
 from orchestrator.runs.case import Case, done_state, is_whole
 from orchestrator.runs.engine import human
 from orchestrator.study.closed_form import law_holds, regime_of
@@ -120,7 +120,9 @@ class Plan:
         """
         names = [name for name in self.cases if name not in but]
         cases = [self.cases[name] for name in names]
-        with ThreadPoolExecutor() as pool:  # gigabytes of results are read
+        with ThreadPoolExecutor(
+            processors.count()
+        ) as pool:  # gigabytes of results are read
             states = pool.map(partial(done_state, cases=directory), cases)
         done: dict[str, dict[str, Any]] = {}
         outdated: set[str] = set()
@@ -133,9 +135,19 @@ class Plan:
             else:
                 done[case.name] = state
         if outdated:
-            what = f"{len(outdated)} cases were made by other code of this program"
-            warnings.warn(f"{what}, which now makes them otherwise", stacklevel=2)
+            warnings.warn(self._outdated(outdated, directory), stacklevel=2)
         return done
+
+    def _outdated(self, names: Collection[str], directory: Path) -> str:
+        """Say why some finished cases do not count as done."""
+        pruned = [name for name in names if not is_whole(self.cases[name], directory)]
+        what = f"{len(names)} cases were made by other code of this program"
+        if len(pruned) < len(names):
+            what += ", which now makes them otherwise"
+        if pruned:
+            why = "so that nothing is left to compare"
+            what += f"; {len(pruned)} of them were pruned, {why}"
+        return what
 
     def missing(self, directory: Path, done: Container[str]) -> dict[str, Case]:
         """List the cases to be run.

@@ -21,7 +21,7 @@ import pandas as pd
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from orchestrator.errors import InputError
-from orchestrator.runs import workspace
+from orchestrator.runs import processors, workspace
 from orchestrator.runs.files import (
     beside,
     canonical_json,
@@ -502,7 +502,7 @@ def write(
             "schema": SCHEMA,
             "scenes": scene_names,
             "programs": dict(programs),
-            "machine": {"processor": _processor(), "cores": os.cpu_count()},
+            "machine": {"processor": _processor(), "cores": processors.count()},
             "sha256": digest_files([*paths, *scenes.glob("*/*")], root=root),
         }
         folder.note(MANIFEST, text_of(about | manifest))

@@ -22,7 +22,19 @@ from orchestrator.runs.files import (
     read_json,
 )
 
-MAKERS = ("bed", "flow", "grains", "physics", "runs", "solvers", "study")
+MAKERS = (
+    "bed",
+    "digits.py",
+    "errors.py",
+    "experiments/surface_truth.py",
+    "flow",
+    "grains",
+    "physics",
+    "runs",
+    "solvers",
+    "study",
+    "types.py",
+)
 """Parts of the package that make cases; the others only read them."""
 NAME = re.compile(r"[a-z]+-[0-9a-f]{12}")
 """Name of a case's directory."""
@@ -109,11 +121,14 @@ def code_digest() -> str:
     Returns
     -------
     str
-        SHA-256 of the names and contents of the Python files of `MAKERS`.
+        SHA-256 of the names and contents of all files of `MAKERS`: of the code, and of
+        the numbers that it reads.
     """
-    paths: list[Path] = []
+    paths = []
     for part in MAKERS:
-        paths += (PACKAGE / part).rglob("*.py")
+        place = PACKAGE / part
+        inside = place.rglob("*") if place.is_dir() else [place]
+        paths += [path for path in inside if path.is_file() and path.suffix != ".pyc"]
     digests = files.digest_files(paths, root=PACKAGE)
     return digest_text(canonical_json(digests))
 
@@ -136,7 +151,8 @@ class Case(ABC):
     derived: ClassVar[tuple[str, ...]] = ()
     """Tables that `collect` makes of the results; not the solver's own."""
     bulky: ClassVar[tuple[str, ...]] = ()
-    """Large files that the run leaves and no table is made of: `prune` drops them.
+    """Large files that the run leaves, and that nothing reads when the tables are made:
+    `prune` drops them.
 
     Those that are no results may differ in their last digits from processor to
     processor.
@@ -386,7 +402,7 @@ def done_state(case: Case, cases: Path) -> dict[str, Any] | None:
 def marker_of(directory: Path, identity: str) -> dict[str, Any] | None:
     """The marker of the finished case of an id.
 
-    A bulky file may be missing: `prune` drops it, and no table is made of it.
+    A bulky file may be missing: `prune` drops it when the tables are made.
 
     Parameters
     ----------

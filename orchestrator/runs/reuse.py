@@ -21,7 +21,6 @@ from orchestrator.runs.case import (
     Case,
     code_digest,
     inputs_written,
-    is_whole,
 )
 from orchestrator.runs.files import read_json
 
@@ -41,7 +40,8 @@ def is_as_made_now(case: Case, cases: Path) -> bool:
     bool
         True if the same code made it, or if the inputs that this code writes, and the
         tables that it makes of the results, are the same byte for byte. That is noted
-        in the case.
+        in the case. False also where it is not known: what the tables were made of was
+        pruned.
     """
     directory = cases / case.name
     about = read_json(directory / IDENTITY)
@@ -70,8 +70,6 @@ def _is_made_alike(case: Case, cases: Path, beside: Path) -> bool:
     inputs = inputs_written(case, folder, cases)
     if inputs != read_json(directory / IDENTITY).get("inputs_sha256"):
         return False
-    if not is_whole(case, cases):
-        return True  # what its tables are made of was pruned
     tables = read_json(directory / DONE).get("derived_sha256", {})
     for path in directory.rglob("*"):
         name = path.relative_to(directory).as_posix()
