@@ -5,7 +5,6 @@ import io
 import json
 import math
 import os
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -20,6 +19,7 @@ from numpy.typing import ArrayLike
 from orchestrator.digits import on_grid, rounded
 from orchestrator.errors import InputError
 from orchestrator.runs.files import digest_text
+from orchestrator.study.heads import ALONG, HEIGHT, in_metres, more_cells, name_of
 from orchestrator.study.noise import needed_smoothing
 from orchestrator.study.shapes import SHAPES
 from orchestrator.study.source import decoded, read_bytes
@@ -29,10 +29,7 @@ from orchestrator.types import FloatArray
 LARGEST, LARGEST_NUMBER = 20 * 2**20, 1e5  # bytes of a file, and largest number, m
 LARGEST_X = 1e7
 """Largest x of a profile, m: eastings and northings of maps."""
-ALSO = {
-    "x_m": ("x", "easting", "northing", "chainage", "distance", "station"),
-    "z_m": ("z", "elevation", "height", "level", "altitude"),
-}
+ALSO = {"x_m": ALONG, "z_m": HEIGHT}
 """What surveyors call the columns of a profile, with or without the unit m."""
 CLASSES = ("diameter_m", "fraction")
 """Columns of a sieve table of classes."""
@@ -404,10 +401,8 @@ def read_columns(
         for row in reader:
             pair = [_cell(row, column) for column in columns]
             if None in row:
-                count = len(reader.fieldnames)
-                more = len(row[None])
-                what = f"{count + more} cells, the header has {count}"
-                raise ValueError(f"{what}: a decimal comma? Write a decimal point")
+                cells = len(reader.fieldnames) + len(row[None])
+                raise ValueError(more_cells(reader.fieldnames, cells))
             lines.append(reader.line_num)
             values.append(pair)
     except (ValueError, csv.Error) as error:
@@ -426,7 +421,7 @@ def _column(header: Sequence[str], name: str, names: tuple[str, str]) -> str:
     """
     if header.count(name) == 1:
         return name
-    meant = [cell for cell in header if _plain(cell) in ALSO.get(name, ())]
+    meant = [cell for cell in header if _is_called(cell, ALSO.get(name, ()))]
     if name not in header and len(meant) == 1:
         return meant[0]
     if name not in header and len(meant) > 1:
@@ -435,18 +430,22 @@ def _column(header: Sequence[str], name: str, names: tuple[str, str]) -> str:
     what = f"not one column {names[0]} and one {names[1]} in {','.join(header)!r}"
     if len(header) == 1 and ";" in header[0]:
         what = f"{what}: commas between the cells, no semicolons"
+    in_another_unit = in_metres(header)
+    if in_another_unit:
+        what = f"{what}: {in_another_unit}"
     raise ValueError(what)
 
 
-def _plain(cell: str) -> str:
-    """The name of a column without its unit, if that is m, in small letters."""
-    return re.sub(r"[ _,]*(\(m\)|\[m\]|(?<=[ _,])m)$", "", cell.lower())
+def _is_called(cell: str, names: Sequence[str]) -> bool:
+    """Whether a column has one of some names, and no other unit than m."""
+    name = name_of(cell)
+    return name.plain in names and name.is_in_metres
 
 
 def _cell(row: Mapping[str | None, Any], name: str) -> float:
     """The number in a cell; a ValueError for any other text."""
     largest = LARGEST_NUMBER
-    if name == "x_m" or _plain(name) in ALSO["x_m"]:
+    if name == "x_m" or _is_called(name, ALSO["x_m"]):
         largest = LARGEST_X
     text = row[name]
     if text is None or not text.strip():

@@ -10,7 +10,9 @@ import pandas as pd
 
 from orchestrator.errors import InputError
 from orchestrator.runs.files import digest_text
+from orchestrator.study.heads import more_cells
 from orchestrator.study.units import number
+from orchestrator.types import BoolArray, FloatArray
 
 COLUMNS = ("from_deg", "speed_m_s", "share")
 OFF = 0.01
@@ -21,7 +23,14 @@ WINDIEST = 20.0
 """Mean speed above which it is likelier in another unit, m/s: Cape Denison, of the
 windiest places, has 19."""
 FURTHEST_DEG = 30.0
-"""Largest angle between a direction of a rose and the flow that answers it."""
+"""Largest angle between a direction of a rose and the nearest flow."""
+SECTORS = (4, 8, 12, 16, 24, 32, 36, 72, 360)
+"""Numbers of sectors of a rose, the widest sectors first."""
+SURELY = 12
+"""From so many sectors on, a rose may leave sectors out: these are narrow."""
+ROUNDED_DEG = 0.5 + 1e-6
+"""Largest angle between a direction as it is written and the middle of its sector:
+compass points are written in whole degrees."""
 
 
 @dataclass(frozen=True)
@@ -56,19 +65,24 @@ class Rose:
         return f"{what}: did you mean km/h, {mean / 3.6:.3g} m/s?"
 
     def table(self, solved: Sequence[float], where: str) -> pd.DataFrame:
-        """List the rose with the direction of the flow that answers each row.
+        """List the rose with the directions of the flows that answer each row.
+
+        A direction stands for its sector of the rose, and a flow for all directions to
+        which it is the nearest. A row is shared by the flows in the parts of its sector
+        that are theirs.
 
         Parameters
         ----------
         solved
-            Directions of the flows, degrees.
+            Directions of the flows, degrees, in any order.
         where
             The field that names the rose, for messages.
 
         Returns
         -------
         DataFrame
-            The columns `COLUMNS` and `solved_deg`.
+            The columns `COLUMNS` and `solved_deg`; a row of the rose that several flows
+            answer has a row for each, with a part of its share.
 
         Raises
         ------
@@ -77,18 +91,67 @@ class Rose:
         """
         table = pd.DataFrame(self.rows, columns=[*COLUMNS])
         directions = table["from_deg"].to_numpy(float)
-        flows = np.asarray(solved, float)
-        off = np.abs((directions[:, None] - flows + 180) % 360 - 180)
-        nearest = off.argmin(axis=1)
-        table["solved_deg"] = flows[nearest]
+        flows = np.sort(np.asarray(solved, float))
         blows = (table["share"] > 0) & (table["speed_m_s"] > 0)
-        off_deg = np.where(blows, off.min(axis=1), 0.0)
-        worst = int(off_deg.argmax())
-        if off_deg[worst] > FURTHEST_DEG:
-            what = f"no flow is within {FURTHEST_DEG:g} deg of {directions[worst]:g}"
-            remedy = 'list more directions: "flow.from_deg" = [0, 45, 90, ...]'
-            raise InputError(what, where, remedy)
-        return table
+        _check_flows(np.where(blows, _off(directions, flows), 0.0), directions, where)
+        middles, width = _sectors(directions, table["speed_m_s"].to_numpy(float) > 0)
+        parts = _parts(middles, width, flows)
+        of_row, of_flow = np.nonzero(parts)
+        listed = table.iloc[of_row].reset_index(drop=True)
+        listed["share"] *= parts[of_row, of_flow]
+        listed["solved_deg"] = flows[of_flow]
+        return listed
+
+
+def _turned(angles: FloatArray, turn: float) -> FloatArray:
+    """Angles less whole turns, from -turn/2 to turn/2."""
+    return np.asarray((angles + turn / 2) % turn - turn / 2)
+
+
+def _off(directions: FloatArray, flows: FloatArray) -> FloatArray:
+    """Angle between each direction and the nearest flow, degrees."""
+    return np.asarray(np.abs(_turned(directions[:, None] - flows, 360)).min(axis=1))
+
+
+def _check_flows(off_deg: FloatArray, directions: FloatArray, where: str) -> None:
+    """Refuse a rose with a direction that is far off all flows."""
+    worst = int(off_deg.argmax())
+    if off_deg[worst] > FURTHEST_DEG:
+        what = f"no flow is within {FURTHEST_DEG:g} deg of {directions[worst]:g}"
+        remedy = 'list more directions: "flow.from_deg" = [0, 45, 90, ...]'
+        raise InputError(what, where, remedy)
+
+
+def _sectors(directions: FloatArray, blows: BoolArray) -> tuple[FloatArray, float]:
+    """The middle of the sector of each direction, and the width of all, degrees.
+
+    The sectors are the widest in whose middles all directions lie. Calms have none.
+    """
+    written = directions[blows]
+    for count in SECTORS:
+        width = 360 / count
+        # the first sector may begin anywhere
+        residuals = np.radians(written * count)
+        turn = np.angle(np.exp(1j * residuals).sum())
+        first = float(np.degrees(turn)) / count
+        number = np.round((directions - first) / width)
+        middles = first + width * number
+        is_near = np.abs(written - middles[blows]) <= ROUNDED_DEG
+        is_whole = len(np.unique(number[blows] % count)) == count
+        if is_near.all() and (is_whole or count >= SURELY):
+            break
+    return np.asarray(middles), width
+
+
+def _parts(middles: FloatArray, width: float, flows: FloatArray) -> FloatArray:
+    """The part of each sector that is nearest to each flow, of shape (rows, flows)."""
+    turns = 360 * np.arange(-2, 3)
+    around = np.concatenate([flows[-1:] - 360, flows, flows[:1] + 360])
+    ends = (around[1:] + around[:-1]) / 2
+    last = np.minimum(middles[:, None, None] + width / 2, ends[1:, None] + turns)
+    first = np.maximum(middles[:, None, None] - width / 2, ends[:-1, None] + turns)
+    overlap = np.maximum(last - first, 0.0).sum(axis=2)
+    return np.asarray(overlap / overlap.sum(axis=1, keepdims=True))
 
 
 def read_rose(text: str, name: str, where: str) -> Rose:
@@ -139,6 +202,9 @@ def _rows(text: str, where: str) -> list[tuple[float, float, float]]:
     rows = []
     for row in reader:
         place = f"{where}: line {reader.line_num}"
+        if None in row:
+            cells = len(header) + len(row[None])
+            raise InputError(more_cells(header, cells), place, remedy)
         try:
             direction, speed, share = [number(row[name] or "") for name in COLUMNS]
         except ValueError as error:

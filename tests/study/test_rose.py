@@ -1,5 +1,6 @@
 """Tests of wind roses: what is read and what is refused."""
 
+import numpy as np
 import pytest
 
 from orchestrator.errors import InputError
@@ -21,6 +22,86 @@ def test_each_row_is_answered_by_the_nearest_flow() -> None:
     table = rose.table([0.0, 90.0, 180.0, 270.0], WHERE)
     assert table["solved_deg"].tolist() == [0.0, 90.0]
     assert table["share"].sum() == pytest.approx(1.0)
+
+
+def shares(directions: list[float], of: list[float], flows: list[float]) -> list[float]:
+    """The share of time that each flow answers, of winds of 5 m/s."""
+    lines = [f"{a!r},5,{b!r}" for a, b in zip(directions, of, strict=True)]
+    rose = read_rose(HEAD + "\n".join(lines) + "\n", "a.csv", WHERE)
+    table = rose.table(flows, WHERE)
+    assert table["share"].sum() == pytest.approx(1.0, rel=1e-12)
+    answered = table.groupby("solved_deg")["share"].sum()
+    return [float(answered.get(flow, 0.0)) for flow in flows]
+
+
+@pytest.mark.parametrize("sectors", [4, 8, 12, 16, 32, 36, 72])
+@pytest.mark.parametrize("flows", [8, 12, 16])
+@pytest.mark.parametrize("begin", [0.0, 5.0])
+def test_a_uniform_wind_gives_each_flow_one_share(
+    sectors: int, flows: int, begin: float
+) -> None:
+    directions = (begin + np.arange(sectors) * 360 / sectors).tolist()
+    found = shares(
+        directions, [1 / sectors] * sectors, np.arange(0, 360, 360 / flows).tolist()
+    )
+    assert found == pytest.approx([1 / flows] * flows, rel=1e-9)
+
+
+def test_compass_points_in_whole_degrees_are_sectors() -> None:
+    # 22.5 degrees is written as 22 or 23
+    directions = [
+        0.0,
+        23,
+        45,
+        68,
+        90,
+        113,
+        135,
+        158,
+        180,
+        203,
+        225,
+        248,
+        270,
+        293,
+        315,
+        338,
+    ]
+    found = shares(directions, [1 / 16] * 16, [45.0 * k for k in range(8)])
+    assert found == pytest.approx([1 / 8] * 8, rel=1e-9)
+
+
+def test_a_sector_is_shared_by_the_flows_that_it_overlaps() -> None:
+    # sectors of 10 degrees: a quarter of that about 20 lies beyond 22.5
+    found = shares([0.0, 20, 130], [0.2, 0.4, 0.4], [45.0 * k for k in range(8)])
+    assert found == pytest.approx([0.5, 0.1, 0, 0.4, 0, 0, 0, 0], abs=1e-9)
+
+
+@pytest.mark.parametrize(("wind", "flows"), [(30.0, [0.0, 60.0]), (15.0, [0.0, 30.0])])
+def test_the_order_of_the_flows_does_not_matter(
+    wind: float, flows: list[float]
+) -> None:
+    assert shares([wind], [1.0], flows) == pytest.approx([0.5, 0.5])
+    assert shares([wind], [1.0], flows[::-1]) == pytest.approx([0.5, 0.5])
+    # nor with flows on one side and many winds
+    some = [0.0, 30, 50, 110, 200, 350]
+    winds = [5.0 * k for k in range(72)]
+    of = [float(k % 7 + 1) for k in range(72)]
+    near = [share if min(abs((a - b + 180) % 360 - 180) for b in some) <= 30 else 0.0
+            for a, share in zip(winds, of, strict=True)]  # fmt: skip
+    parts = [share / sum(near) for share in near]
+    one = dict(zip(some, shares(winds, parts, some), strict=True))
+    for order in (some[::-1], some[3:] + some[:3]):
+        other = dict(zip(order, shares(winds, parts, order), strict=True))
+        assert {flow: other[flow] for flow in some} == pytest.approx(one, rel=1e-12)
+
+
+def test_a_line_with_more_cells_than_the_head_is_refused() -> None:
+    # 8,5 m/s in a German table: the share would be 5, of which the rest makes 1
+    with pytest.raises(
+        InputError, match=r"line 2: 4 cells, the head has 3.*decimal comma"
+    ):
+        read_rose(HEAD + "270,8,1,0\n", "a.csv", WHERE)
 
 
 def test_wind_from_where_no_flow_is_is_refused() -> None:

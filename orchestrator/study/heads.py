@@ -1,0 +1,119 @@
+"""Heads of the tables that users give: what surveyors call the columns."""
+
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+EAST = ("x", "easting", "east", "rechtswert", "ostwert")
+NORTH = ("y", "northing", "north", "hochwert", "nordwert")
+HEIGHT = (
+    "z",
+    "elevation",
+    "height",
+    "level",
+    "altitude",
+    "höhe",
+    "hoehe",
+)
+DEGREES = ("longitude", "long", "lon", "lng", "latitude", "lat")
+"""Columns of angles on the Earth."""
+ALONG = (*EAST, *NORTH[1:], "chainage", "distance", "station")
+"""Columns of the places along a profile, which goes any way over the ground."""
+METRE = ("m", "metre", "metres", "meter", "meters")
+UNITS = {
+    **dict.fromkeys(METRE, 1.0),
+    **dict.fromkeys(("ft", "foot", "feet", "ift"), 0.3048),
+    **dict.fromkeys(("usft", "ftus", "us-ft", "us_ft", "sft"), 1200 / 3937),
+    "mm": 1e-3,
+    "cm": 1e-2,
+    "dm": 0.1,
+    "km": 1e3,
+}
+"""Units that a name may end with, m."""
+UNIT = re.compile(
+    rf"[ _,]*[(\[] *({'|'.join(UNITS)}) *[)\]]$|[ _,]+({'|'.join(UNITS)})$"
+)
+
+
+class Name(NamedTuple):
+    """The name of a column.
+
+    Attributes
+    ----------
+    plain
+        The name in small letters, without its unit.
+    unit
+        The unit that it has, as it stands there; empty without one.
+    """
+
+    plain: str
+    unit: str
+
+    @property
+    def is_in_metres(self) -> bool:
+        """Whether no other unit than the metre stands there."""
+        return not self.unit or self.unit in METRE
+
+
+def name_of(cell: str) -> Name:
+    """Read the name of a column.
+
+    Parameters
+    ----------
+    cell
+        A cell of the head of a table.
+
+    Returns
+    -------
+    Name
+        The name and its unit.
+
+    Examples
+    --------
+    >>> name_of("Easting (m)"), name_of("z_ft")
+    (Name(plain='easting', unit='m'), Name(plain='z', unit='ft'))
+    """
+    name = cell.strip().lower()
+    unit = UNIT.search(name)
+    if unit is None:
+        return Name(name, "")
+    return Name(name[: unit.start()], unit[1] or unit[2])
+
+
+def in_metres(names: Sequence[str]) -> str:
+    """Say how columns in another unit are to be given.
+
+    Parameters
+    ----------
+    names
+        Cells of a head.
+
+    Returns
+    -------
+    str
+        The advice; empty where no column has another unit.
+    """
+    for cell in names:
+        unit = name_of(cell).unit
+        if unit and unit not in METRE:
+            return f"multiply {cell.strip()} by {UNITS[unit]:.7g}: lengths are in m"
+    return ""
+
+
+def more_cells(header: Sequence[str], cells: int) -> str:
+    """Say that a line has more cells than the head of its table.
+
+    Parameters
+    ----------
+    header
+        The names of the columns.
+    cells
+        How many cells the line has.
+
+    Returns
+    -------
+    str
+        What is wrong with the line.
+    """
+    what = f"{cells} cells, the head has {len(header)}"
+    return f"{what}: a decimal comma? Write a decimal point"
