@@ -44,6 +44,8 @@ COARSE_STEP = 0.05
 CLOSE_PACKED_DEG = (
     59.0  # entrainment angle from which the grains of a row hold each other
 )
+TINY = 1e-9
+"""Part of the length of a bed by which a place beyond its end is at its end."""
 ANGLES = "min(friction angle, 90 deg - entrainment angle)"
 
 
@@ -201,6 +203,10 @@ def largest_timestep(damping: float) -> float:
 def _pile(scene: Scene, bed: PileBed) -> Iterator[Limit]:
     """Limits of the grains of a pile."""
     try:
+        misplaced = [*_misplaced(bed)]
+        if misplaced:  # no grains can be laid there
+            yield from misplaced
+            return
         count = Geometry(scene).length
         if count > MOST_GRAINS:
             what = f"{count * scene.grain.diameter:g} m of bed are {count:.0f} grains"
@@ -227,6 +233,30 @@ def _pile(scene: Scene, bed: PileBed) -> Iterator[Limit]:
     if loaded != "exposed":
         what = f"{loaded}: a grain without its force blocks those behind it"
         yield Limit("forced", "forces.loaded_grains", what, "exposed", refused=False)
+
+
+def _misplaced(bed: PileBed) -> Iterator[Limit]:
+    """Fields that name places where there is no bed; x is that of the user."""
+    ends = bed.profile.x if bed.profile else of_bed(bed).x[1:-1]
+    length = ends[-1] - ends[0]
+    first, last = sorted(bed.place([ends[0], ends[-1]]).tolist())
+    is_on_it = f"not on the bed, which is from x = {first:.9g} to {last:.9g} m"
+    counts = bed.counts
+    named: list[tuple[str, float]] = []
+    if not isinstance(counts, str):
+        named = [("bed.counted", end) for end in counts]
+        if counts[0] >= counts[1]:
+            start, end = bed.place(counts).tolist()
+            if bed.profile:
+                start, end = (start, end)[:: bed.profile.sign]
+            what = f"from x = {start:.9g} to {end:.9g} m there is no bed"
+            yield Limit("", "bed.counted", what, "write the smaller x first")
+    if bed.profile:
+        named += [("bed.obstacles", one.x) for one in bed.obstacles]
+    for field, x in named:
+        if not ends[0] - TINY * length <= x <= ends[-1] + TINY * length:
+            what = f"{float(bed.place(x)):.9g} m is {is_on_it}"
+            yield Limit("", field, what, "choose a place on it")
 
 
 def _for_long(scene: Scene) -> str:

@@ -13,7 +13,7 @@ from orchestrator.grains.pile import Pile
 from orchestrator.physics.constants import GRAIN_COLUMNS
 from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.measured import MEASURED_SOURCE, wilcock_crowe_hiding
-from orchestrator.report import labels, sheets, single, theory
+from orchestrator.report import counted, labels, sheets, single, theory
 from orchestrator.report.card import Card, Mark, Number, Worth
 from orchestrator.report.results import (
     Results,
@@ -142,7 +142,7 @@ def _of_bed(row: pd.Series, results: Results) -> Card:
     told = single.quantity(row)
     return Card(
         _question(row, pile, told),
-        _scene(row, pile),
+        _scene(row, pile, results),
         tuple(_numbers_of_bed(row, pile, results, told)),
         single.source(row, told, single.known(row["first_ustar0_m_s"])),
         single.worth(row),
@@ -162,8 +162,8 @@ def _question(row: pd.Series, pile: Pile, told: Quantity) -> str:
     return f"At which {told.flow} does a {shape} of {grains} start to move?"
 
 
-def _scene(row: pd.Series, pile: Pile) -> str:
-    """One line on shape, size, grains and fluid."""
+def _scene(row: pd.Series, pile: Pile, results: Results) -> str:
+    """One line on shape, size, grains, what of it is counted, and fluid."""
     bed = pile.bed
     line = pile.model.line
     first = float(line.x[1])
@@ -180,6 +180,10 @@ def _scene(row: pd.Series, pile: Pile) -> str:
     count = f"{row['count']:.0f} counted grains"
     if row["method"] == "local":
         count = "too many grains to follow each"
+    if bed.profile or bed.counted:
+        grains_ = results.tables["pile_grain"]
+        of_bed = grains_["scene_id"] == row["scene_id"]
+        count += f"; counted: {counted.metres(grains_.loc[of_bed, 'x_m'], bed)}"
     obstacles = pile.scene.obstacles
     if obstacles:
         shape += f", behind {', '.join(map(str, obstacles))}"
@@ -492,7 +496,7 @@ def _of_mixture(row: pd.Series, results: Results) -> Card:
     name = kind_of_grain(float(row["d_m"]))
     return Card(
         f"Which flow starts to move this {name}, and which sizes go first?",
-        _scene(row, pile),
+        _scene(row, pile, results),
         (all_sizes, spread, flow),
         single.source(row, told),
         single.worth(row, few=bool(here["few"].any())),

@@ -12,7 +12,7 @@ from orchestrator.fidelity.limits import FROZEN_BED
 from orchestrator.physics.beside import ROW_HOLD
 from orchestrator.physics.fluids import PAPER
 from orchestrator.physics.velocity import log_law_speed
-from orchestrator.report import labels, sheets, single, theory
+from orchestrator.report import counted, labels, sheets, single, theory
 from orchestrator.report.card import Remark
 from orchestrator.report.page import caption
 from orchestrator.report.results import Results
@@ -176,7 +176,9 @@ def _of_piles(results: Results, piles: pd.DataFrame) -> Iterator[Remark]:
     for _, row in results.exemplars.head(1).iterrows():
         pile = results.plan.piles[str(row["scene_id"])]
         yield from _smoothing(row, pile.bed)
-        yield from _counted(pile.scene, pile.bed)
+        grains = results.tables["pile_grain"]
+        x = grains.loc[grains["scene_id"] == row["scene_id"], "x_m"]
+        yield from _counted(pile.scene, pile.bed, x)
         yield from _closed_form(row, pile.bed)
         yield from _model(row, results)
     beyond = piles[piles["frozen_bed"] > FROZEN_BED]
@@ -197,26 +199,33 @@ def _smoothing(row: pd.Series, bed: PileBed) -> Iterator[Remark]:
         yield Remark("Smoothing moves the answer.", text)
 
 
-def _counted(scene: Scene, bed: PileBed) -> Iterator[Remark]:
-    """Which part of a bed is counted, where that is not plain from its shape."""
+def _counted(scene: Scene, bed: PileBed, x: pd.Series) -> Iterator[Remark]:
+    """Which part of a bed is counted, where that is not plain from its shape.
+
+    Its grains or places lie at x, m.
+    """
     if not (bed.profile or bed.counted):
         return
     counts = scene.counts
-    rest = 'another part: `bed.counted = "all"`'
+    where = "All of the bed is counted"
     if isinstance(counts, tuple):
-        start, end = counts
-        where = f"The bed between x = {start:g} and {end:g} m is counted."
-        rest = "shares are parts of the grains between them"
+        where = "A range of the bed is counted"
+        rest = "shares are parts of the grains in it"
     elif counts == "windward":
-        where = "The sides that rise in the wind are counted."
-        rest = (
-            "ripples and noise of level ground beside the form are counted, too; to "
-            "count the form alone, write its range: `bed.counted = [5.0, 34.0]`"
-        )
+        where = "The sides that rise in the wind are counted"
+        rest = "so are ripples and noise of level ground beside the form"
+        alone = bed.profile and counted.way_up(bed.profile)
+        if alone:
+            rest += (
+                "; to count the form alone from its foot to its top, write "
+                f"`bed.counted = [{', '.join(alone)}]`"
+            )
     else:
-        where = "All of the bed is counted."
         rest = 'the windward sides alone: `bed.counted = "windward"`'
-    yield Remark(where, f"{rest[0].upper()}{rest[1:]}.")
+    metres = counted.metres(x, bed)
+    if metres:
+        where += f": {metres}"
+    yield Remark(f"{where}.", f"{rest[0].upper()}{rest[1:]}.")
 
 
 def _closed_form(row: pd.Series, bed: PileBed) -> Iterator[Remark]:

@@ -2,6 +2,7 @@
 
 import math
 import os
+import re
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 
 from orchestrator.bed.line import of_bed
 from orchestrator.errors import InputError
+from orchestrator.fidelity import limits
 from orchestrator.study import profile, study
 from orchestrator.study.fields import asked
 from orchestrator.study.parts import PileBed
@@ -348,3 +350,68 @@ def test_a_profile_that_is_level_but_for_round_off_is_refused_for_its_height(
 ) -> None:
     with pytest.raises(InputError, match=r"bed\.height: 0\.0 is not accepted"):
         scene_of(tmp_path, points("0,0", "0.05,1e-13", "0.1,0"))
+
+
+AWAY = points(
+    *(f"{112.4 + 0.1 * i:.2f},{0.1 * np.sin(i / 6.4):.5f}" for i in range(21))
+)
+"""A form of 2 m whose x begins at 112.4 m."""
+
+
+@pytest.mark.parametrize("towards", ["+x", "-x"])
+@pytest.mark.parametrize("method", ["auto", "local", "pivot", "dem"])
+@pytest.mark.parametrize(
+    ("field", "message"),
+    [
+        (
+            "counted = [5.0, 34.0]",
+            "m is not on the bed, which is from x = 112.4 to 114.4 m (choose a place",
+        ),
+        (
+            "counted = [113.0, 120.0]",
+            "bed.counted: 120 m is not on the bed, which is from x = 112.4 to 114.4 m",
+        ),
+        (
+            "counted = [114.0, 113.0]",
+            "bed.counted: from x = 114 to 113 m there is no bed",
+        ),
+        (
+            "counted = [113.0, 113.0]",
+            "bed.counted: from x = 113 to 113 m there is no bed",
+        ),
+        (
+            'obstacles = [{ kind = "fence", x = 50.0, height = 0.01 }]',
+            "bed.obstacles: 50 m is not on the bed, which is from x = 112.4 to 114.4 m",
+        ),
+    ],
+)
+def test_what_is_not_on_a_profile_is_refused_in_one_line(
+    field: str, message: str, method: str, towards: str, tmp_path: Path
+) -> None:
+    text = STUDY.replace('"scan.csv"', f'"scan.csv", {field}')
+    text += f'method.kind = "{method}"\nflow.towards = "{towards}"\n'
+    scene = scene_of(tmp_path, AWAY, text)
+    with pytest.raises(InputError, match=re.escape(message)):
+        limits.check(scene, "study.toml")
+
+
+@pytest.mark.parametrize("packing", ["aligned", "horizontal", "disordered", "poured"])
+@pytest.mark.parametrize(
+    ("counted", "message"),
+    [
+        ((5.0, 34.0), "5 m is not on the bed, which is from x = 0 to 0.08959"),
+        ((0.01, 34.0), "34 m is not on the bed, which is from x = 0 to 0.08959"),
+        ((-0.1, 0.01), "-0.1 m is not on the bed"),
+        ((0.03, 0.01), "from x = 0.03 to 0.01 m there is no bed"),
+    ],
+)
+def test_what_is_not_on_a_shape_is_refused_alike(
+    packing: str, counted: tuple[float, float], message: str
+) -> None:
+    text = f"""
+    grain = {{ diameter = 1e-3 }}
+    bed = {{ kind = "dune", slope_deg = 20.0, height = 0.02, packing = "{packing}", counted = {[*counted]} }}
+    """
+    scene = study.parse(text, name="dune", where="dune.toml").scenes[0]
+    with pytest.raises(InputError, match=f"bed.counted: {re.escape(message)}"):
+        limits.check(scene, "dune.toml")

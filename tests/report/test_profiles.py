@@ -1,0 +1,74 @@
+"""What the page of a measured profile says in the x of its file."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator.fidelity import limits
+from orchestrator.report import answers, remarks
+from orchestrator.report.results import Results
+from orchestrator.study import study
+from tests import small_study
+
+BEACH = [(112.4, 0.0), (162.4, 1.25), (187.4, 7.25), (198.4, 1.25), (232.4, 1.25)]
+"""A beach of 1:40, a dune of 6 m on it, x and z in m."""
+TEXT = """
+fluid.kind = "air"
+grain = {{ diameter = 2.5e-4, density = 2650.0 }}
+bed = {{ kind = "pile", profile = "own.csv"{more} }}
+flow.towards = "{towards}"
+method.flow.model = "flat"
+[profiles]
+"own.csv" = '''
+x_m,z_m
+{points}
+'''
+"""
+
+
+def _text(towards: str = "+x", start: float = 0.0, more: str = "") -> str:
+    x, z = np.transpose(BEACH)
+    places = np.arange(112.4, 232.41, 0.4)
+    heights = np.interp(places, x, z)
+    if towards == "-x":
+        places = 344.8 - places[::-1]
+        heights = heights[::-1]
+    rows = [f"{a + start:.1f},{b:.4f}" for a, b in zip(places, heights, strict=True)]
+    return TEXT.format(towards=towards, more=more, points="\n".join(rows))
+
+
+def _advised(results: Results) -> list[float]:
+    """The range that the remark on what is counted advises."""
+    told = [each.text for each in remarks.remarks(results) if "counted" in each.head]
+    (pair,) = re.findall(r"`bed\.counted = \[([-.\d]+), ([-.\d]+)\]`", " ".join(told))
+    return [float(end) for end in pair]
+
+
+@pytest.mark.parametrize("start", [0.0, 5.6e6])
+@pytest.mark.parametrize(
+    ("towards", "form"), [("+x", (162.4, 187.4)), ("-x", (157.4, 182.4))]
+)
+def test_the_range_that_a_card_advises_is_the_form_in_the_x_of_the_file(
+    towards: str, form: tuple[float, float], start: float, tmp_path: Path
+) -> None:
+    results = small_study.run(tmp_path, _text(towards, start))
+    advised = _advised(results)
+    assert np.subtract(advised, start) == pytest.approx(form, abs=1.0)
+    # it can be written into the file as it stands
+    followed = _text(towards, start, f", counted = {advised}")
+    scene = study.parse(followed, name="own", where="own.toml").scenes[0]
+    limits.check(scene, "own.toml")
+    assert isinstance(scene.counts, tuple)
+
+
+def test_a_card_says_which_metres_are_counted(tmp_path: Path) -> None:
+    results = small_study.run(tmp_path / "windward", _text())
+    windward = answers.card(results).scene
+    assert "counted: x = 112 to 187 m" in windward
+    more = ", counted = [164.0, 186.0]"
+    results = small_study.run(tmp_path / "range", _text(more=more))
+    assert "counted: x = 164 to 186 m" in answers.card(results).scene
+    heads = [remark.head for remark in remarks.remarks(results)]
+    assert "A range of the bed is counted: x = 164 to 186 m." in heads
