@@ -215,9 +215,9 @@ def _answer(
     directions = []
     for scene in scenes:
         stress = SurfaceStress.from_csv(cases / flows[scene].name / SURFACE_STRESS)
-        from_deg = scene.flow.from_deg
-        faces = ground.faces(stress, from_deg)
-        directions.append(Direction(from_deg, faces, first.heights.relief))
+        directions.append(
+            Direction.of(ground, stress, scene.flow.from_deg, first.heights)
+        )
     cell = flows[first].cell_m
     return Answer(first.name, first.heights, ground, directions, cell, rose)
 
@@ -289,7 +289,8 @@ def _vtk(answer: Answer) -> bytes:
 
     grid = answer.grid
     x, y = np.meshgrid(grid.x, grid.y)
-    body: Any = pyvista.StructuredGrid(x, y, grid.height + answer.surface.level)
+    height = grid.height + answer.surface.ground.at(x, y)
+    body: Any = pyvista.StructuredGrid(x, y, height)
     for name, values in answer.maps.items():
         body[name] = values.ravel(order="F")
     body["height_m"] = grid.height.ravel(order="F")
@@ -318,12 +319,23 @@ def sections(found: Sequence[Answer], source: str) -> list[Section]:
     listed: list[Section] = []
     for number, answer in enumerate(found, 1):
         listed += _sections(answer, f"-{number}" if len(found) > 1 else "", source)
-    table = tables(found)["directions"].rename(columns=HEADINGS)
+    table = pd.concat(map(_directions, found))
     if len(found) == 1:
         table = table.drop(columns="surface")  # the card names it
     card = surface_card.card(found, source)
     listed[0] = replace(listed[0], tables=[table], card=card)
     return [*listed, Section("How sure it is", words["sure"])]
+
+
+def _directions(answer: Answer) -> pd.DataFrame:
+    """The table of directions for people: a place has the digits that its axes need."""
+    rows = []
+    for each in answer.directions:
+        row = each.row()
+        for name in ("x_m", "y_m"):
+            row[name] = surface_card.in_axes(row[name], answer.cell_m)
+        rows.append({"surface": answer.name, **row})
+    return pd.DataFrame(rows).rename(columns=HEADINGS)
 
 
 def _sections(answer: Answer, end: str, source: str) -> Iterator[Section]:

@@ -14,13 +14,15 @@ from orchestrator.grains import onset
 from orchestrator.grains.onset import Shares
 from orchestrator.physics.threshold import SingleGrain
 from orchestrator.report.maps import Grid
-from orchestrator.study.surface import OF_GROUND, Surface
+from orchestrator.study.surface import Plane, Surface
 from orchestrator.types import FloatArray
 
 MOVES = "wind_m_s"
 LEAVES, GOES_ON = "wind_leaves_m_s", "wind_goes_on_m_s"
 """Columns of faces: winds in which a grain moves, leaves its pocket, and goes on."""
 RATIO = "ustar_over_ustar0"
+HEAP = "heap"
+"""Column of faces: the number of the heap that a face is on, 0 for the ground."""
 LEAST, HOURS = "least_wind_m_s", "hours_a_year"
 """Maps of the least wind of all directions, and of the hours a year."""
 STARTS = "starts, m/s"
@@ -87,7 +89,9 @@ class Ground:
         """Wind at 10 m at which the grain moves on flat ground, m/s."""
         return float(onset.wind_of(self.level_ustar, self.roughness))
 
-    def faces(self, stress: SurfaceStress, from_deg: float) -> pd.DataFrame:
+    def faces(
+        self, stress: SurfaceStress, from_deg: float, plane: Plane
+    ) -> pd.DataFrame:
         """List the faces of a bed with the wind at which each moves.
 
         Parameters
@@ -96,6 +100,8 @@ class Ground:
             The stress on them by the flow of one direction.
         from_deg
             Where the wind comes from, degrees.
+        plane
+            The ground; its fall is not in the flow, but grains feel it.
 
         Returns
         -------
@@ -104,8 +110,11 @@ class Ground:
             stress to the way up the slope, u*/u*_0, and the wind `MOVES`; with the
             closed form also `LEAVES` and `GOES_ON`, NaN where grains lie loose.
         """
-        slope = onset.slopes_deg(stress.normal)
-        heading = onset.headings_deg(stress.normal, stress.tau)
+        normal, tau = onset.with_fall(
+            stress.normal, stress.tau, plane.east, plane.north
+        )
+        slope = onset.slopes_deg(normal)
+        heading = onset.headings_deg(normal, tau)
         ratio = stress.ustar_over_ustar0
         columns = {
             "x_m": stress.x_m,
@@ -150,33 +159,65 @@ class Direction:
         Where the wind comes from, degrees.
     every
         All faces, also those of the flat ground.
-    relief
-        Height of the form, m.
     """
 
     from_deg: float
     every: pd.DataFrame
-    relief: float
+
+    @classmethod
+    def of(
+        cls,
+        ground: Ground,
+        stress: SurfaceStress,
+        from_deg: float,
+        surface: Surface,
+    ) -> "Direction":
+        """Put the faces of a flow on the heaps of its surface.
+
+        Parameters
+        ----------
+        ground
+            What lies on the surface.
+        stress
+            The stress on the faces.
+        from_deg
+            Where the wind comes from, degrees.
+        surface
+            The surface as it was read.
+
+        Returns
+        -------
+        Direction
+            The direction, each face with its heap.
+        """
+        every = ground.faces(stress, from_deg, surface.ground)
+        every[HEAP] = surface.heap_at(stress.x_m, stress.y_m)
+        return cls(from_deg, every)
 
     @cached_property
     def form(self) -> pd.DataFrame:
-        """The faces of the form."""
-        return self.every[self.every["z_m"].abs() > OF_GROUND * self.relief]
+        """The faces of all heaps."""
+        return self.every[self.every[HEAP] > 0]
+
+    @property
+    def area(self) -> float:
+        """Area of all heaps as it lies, m2."""
+        return float(self.form["area_m2"].sum())
 
     @cached_property
     def faces(self) -> pd.DataFrame:
-        """The faces of the form on which grains lie."""
+        """The faces of the heaps on which grains lie."""
         return self.form[self.form[MOVES].notna()]
 
     @property
     def loose(self) -> float:
-        """Share of the form on which grains roll without a flow."""
+        """Share of the heaps on which grains roll without a flow."""
         is_loose = self.form[MOVES].isna()
         area = self.form["area_m2"]
         return float(area[is_loose].sum() / area.sum())
 
     def shares(self, column: str = MOVES) -> Shares:
-        """Give the share of the form that moves, against the wind.
+        """Give the share of the heaps that moves, against the wind.
 
         Parameters
         ----------
@@ -249,6 +290,7 @@ class Direction:
         row["mean u*/u*₀"] = float(np.average(ratio, weights=area))
         row["largest u*/u*₀"] = float(ratio.max())
         row["loose, %"] = 100 * self.loose
+        row["area, m²"] = self.area
         return row
 
 
@@ -294,8 +336,8 @@ class Answer:
             axes.append(axis[::every])
         x, y = axes
         height = self.smooth.at(x, y[:, None])
-        is_form = np.abs(height) > OF_GROUND * self.smooth.relief
-        return Grid(x, y, height, is_form)
+        east, north = np.broadcast_arrays(x, y[:, None])
+        return Grid(x, y, height, self.surface.heap_at(east, north) > 0)
 
     @cached_property
     def easiest(self) -> Direction:

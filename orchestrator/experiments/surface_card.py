@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from orchestrator.digits import number
 from orchestrator.experiments.surface_answer import Answer, Direction
 from orchestrator.grains import onset
 from orchestrator.report.card import Card, Number, Worth
@@ -14,6 +15,8 @@ from orchestrator.report.subjects import length
 
 SURFACES = Path(__file__).with_name("measured") / "surfaces.csv"
 """Flows over surfaces beside others: `orchestrator validate --surfaces all`."""
+MOST_TIED = 3
+"""Most directions that a tie names."""
 HALF, TENTH = 0.5, 0.1
 """Shares of the surface whose hours or winds the answer has."""
 EXCEEDED = {
@@ -63,11 +66,28 @@ def card(found: Sequence[Answer], source: str) -> Card:
         winds = f"wind from {len(directions)} directions"
     return Card(
         "In which wind does this surface start to move, and how much of it moves?",
-        f"{first.name}; {_grain(first, source)}; {winds}{others}.",
+        f"{first.name}; {heaps(first)}; {_grain(first, source)}; {winds}{others}.",
         tuple(_numbers(first)),
         NOT_MEASURED.format(*_ends_at_masts()),
         WORTH,
     )
+
+
+def heaps(answer: Answer) -> str:
+    """Say how many heaps a surface has, and their area, in words.
+
+    Parameters
+    ----------
+    answer
+        The answer on it.
+
+    Returns
+    -------
+    str
+        The words.
+    """
+    counted = number(len(answer.surface.heaps), "heap")
+    return f"{counted} of {answer.easiest.area:.3g} m²"
 
 
 def _grain(answer: Answer, source: str) -> str:
@@ -82,11 +102,17 @@ def _numbers(answer: Answer) -> Iterator[Number]:
     """The figures of the card."""
     first = answer.easiest
     flat = answer.ground.flat
+    notes = [f"first at {_place(answer)}", f"on flat ground in {flat:.3g} m/s"]
+    high = factors_of_wind(onset.STARTS)[1] * first.starts
+    alike = [each for each in answer.directions if each.starts <= high]
+    tied = tie(
+        [each.from_deg for each in alike], first.from_deg, len(answer.directions)
+    )
     yield _wind(
         first,
         onset.STARTS,
         f"wind at 10 m from {first.from_deg:g}° in which motion starts",
-        f"first at {_place(answer)}; on flat ground in {flat:.3g} m/s",
+        "; ".join(filter(None, [*notes, tied])),
     )
     if isfinite(first.shares().wind_for(HALF)):
         what = f"wind at 10 m from {first.from_deg:g}° in which half of it moves"
@@ -129,6 +155,34 @@ def _wind(direction: Direction, share: float, meaning: str, note: str = "") -> N
     )
 
 
+def tie(alike: Sequence[float], first: float, count: int) -> str:
+    """Say which directions are no better known apart from the first than its interval.
+
+    Parameters
+    ----------
+    alike
+        Directions within the interval of the first, degrees.
+    first
+        The first of all, degrees.
+    count
+        Number of all directions.
+
+    Returns
+    -------
+    str
+        The words; empty where there is none but the first.
+    """
+    others = [f"{each:g}°" for each in alike if each != first]
+    if not others:
+        return ""
+    if len(others) == count - 1 and count > 2:
+        return "no direction is told from another within the interval"
+    if len(others) > MOST_TIED:
+        return f"{len(others)} others are not told from it within the interval"
+    verb = "is" if len(others) == 1 else "are"
+    return f"{' and '.join(others)} {verb} not told from it within the interval"
+
+
 @cache
 def factors_of_wind(share: float) -> tuple[float, float]:
     """Find how far other flows move the wind in which a share of a surface moves.
@@ -161,10 +215,26 @@ def _ends_at_masts() -> tuple[float, float]:
 def _place(answer: Answer) -> str:
     """Where motion starts, in the axes of the file."""
     row = answer.easiest.first
-    digits = max(0, ceil(1 - log10(answer.cell_m)))
-    x = f"x = {row['x_m']:.{digits}f} m"
-    y = f"y = {row['y_m']:.{digits}f} m"
-    return f"{x}, {y}, {row['z_m']:.3g} m high"
+    x, y = (in_axes(float(row[name]), answer.cell_m) for name in ("x_m", "y_m"))
+    return f"x = {x} m, y = {y} m, {row['z_m']:.3g} m high"
+
+
+def in_axes(place: float, cell_m: float) -> str:
+    """Write a place on an axis of a file, whose zero may be far away.
+
+    Parameters
+    ----------
+    place
+        The place, m.
+    cell_m
+        Length of the flow's cells, m: a place is known to a tenth of it.
+
+    Returns
+    -------
+    str
+        The place, m.
+    """
+    return f"{place:.{max(0, ceil(1 - log10(cell_m)))}f}"
 
 
 def sentences(answer: Answer, source: str) -> Iterator[str]:
@@ -191,9 +261,11 @@ def sentences(answer: Answer, source: str) -> Iterator[str]:
     )
     if len(answer.directions) > 1:
         last = max(answer.directions, key=lambda each: each.starts)
+        high = factors_of_wind(onset.STARTS)[1] * first.starts
+        tied = ", which is within the interval" if last.starts <= high else ""
         yield (
             f"From {last.from_deg:g}° motion starts at {last.starts:.3g} m/s, "
-            f"of the {len(answer.directions)} directions the highest."
+            f"of the {len(answer.directions)} directions the highest{tied}."
         )
     leaves = first.leaves
     if leaves is not None:

@@ -147,9 +147,8 @@ def piles(
         for scene in members:
             ground = surface.ground_of(scene, least)
             stress = SurfaceStress.from_csv(cases / flows[scene].name / SURFACE_STRESS)
-            faces = ground.faces(stress, scene.flow.from_deg)
-            direction = surface_answer.Direction(
-                scene.flow.from_deg, faces, scene.heights.relief
+            direction = surface_answer.Direction.of(
+                ground, stress, scene.flow.from_deg, scene.heights
             )
             surfaces.append(surface_of(scene, direction.form, ground.level_ustar))
         base = 2 * bare.heights.radius

@@ -34,7 +34,14 @@ from orchestrator.physics.velocity import log_law_speed
 from orchestrator.report.page import Section
 from orchestrator.runs.case import Case
 from orchestrator.study.method import FlowMethod
-from orchestrator.study.surface import SPREAD_OF_SHAPE, Surface, cone, oval, surface_of
+from orchestrator.study.surface import (
+    SPREAD_OF_SHAPE,
+    Plane,
+    Surface,
+    cone,
+    oval,
+    surface_of,
+)
 from orchestrator.types import BoolArray, FloatArray
 
 MEASURED = Path(__file__).with_name("measured")
@@ -360,7 +367,7 @@ def _askervein_hill() -> Surface:
     inside = np.minimum(to_x, to_y[:, None]) / TAPERED
     weight = (1 - np.cos(np.pi * np.clip(inside, 0.0, 1.0))) / 2
     tapered = level + (z - level) * weight
-    return surface_of("Askervein", x, y, tapered, level, SPREAD_OF_SHAPE)
+    return surface_of("Askervein", x, y, tapered, Plane(level), SPREAD_OF_SHAPE)
 
 
 def _at_places(

@@ -75,6 +75,41 @@ def headings_deg(normal: FloatArray, tau: FloatArray) -> FloatArray:
     return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
 
 
+def with_fall(
+    normal: FloatArray, tau: FloatArray, east: float, north: float
+) -> tuple[FloatArray, FloatArray]:
+    """Put faces over level ground on ground that rises, each upright as it is.
+
+    Parameters
+    ----------
+    normal
+        Unit vectors upwards, shape (F, 3).
+    tau
+        Stress, which lies in the face, of any unit, shape (F, 3).
+    east, north
+        Rise of the ground to the east and to the north, m/m.
+
+    Returns
+    -------
+    normal, tau
+        Unit vectors of the faces on this ground, and stresses that lie in them with the
+        same horizontal parts, shape (F, 3).
+
+    Examples
+    --------
+    >>> normal, tau = np.array([[0.0, 0.0, 1.0]]), np.array([[1.0, 0.0, 0.0]])
+    >>> turned, lifted = with_fall(normal, tau, 0.75, 0.0)
+    >>> turned.tolist(), lifted.tolist()
+    ([[-0.6, 0.0, 0.8]], [[1.0, 0.0, 0.75]])
+    """
+    rise = np.array([east, north])
+    turned = normal.copy()
+    turned[:, :2] -= rise * normal[:, 2:]
+    lifted = tau.copy()
+    lifted[:, 2] += tau[:, :2] @ rise
+    return turned / np.linalg.norm(turned, axis=1)[:, None], lifted
+
+
 def leaves(
     grain: SingleGrain, law: str, slope_deg: FloatArray, heading_deg: FloatArray
 ) -> FloatArray:

@@ -1,21 +1,24 @@
 """A bed in three dimensions: heights on a raster, as a file has them or by a shape.
 
 The axes are those of the file, x to the east and y to the north. Heights are counted
-from the level ground around the form.
+from the ground around the form: a plane, level or with a gentle fall. A heap is what
+rises above it.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
-from math import pi, radians, tan
+from math import atan2, degrees, hypot, pi, radians, tan
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from orchestrator.digits import on_grid
 from orchestrator.errors import InputError
-from orchestrator.types import BoolArray, FloatArray
+from orchestrator.study.noise import MEDIAN
+from orchestrator.types import BoolArray, FloatArray, IntArray
 
 Tags = Mapping[int, tuple[float, ...] | str]
 """Tags of a GeoTIFF by their numbers."""
@@ -47,13 +50,92 @@ OF_GROUND = 0.01
 """Height over that of the form from which a place is a part of it, not of the
 ground."""
 NOISE = 4.0
-"""Standard deviations of the rim's heights within which a place is ground, too."""
+"""Standard deviations of the rim's heights off its plane within which a place is
+ground, too."""
+HEAP = 0.1
+"""Height over that of the highest heap from which a rise is a heap, too: twice that of
+a bad cell."""
+STEEPEST_GROUND_DEG = 5.0
+"""Slope of the ground beyond which a heap on it is no heap on level ground."""
+HALVINGS = 60
+"""Steps in which the plane of a rim is found: all digits."""
+TOUCHING = np.ones((3, 3), bool)
+"""Nodes that touch one, also at a corner."""
 STEPS_OF_SHAPE = 160
 """Steps of the raster of a shape over the width of its base."""
 SLIP_DEG = 33.0
 """Slope of a barchan's slip face."""
 HORNS = 0.8
 """Length of a barchan's horns beyond its brink, over that of its windward side."""
+
+
+@dataclass(frozen=True)
+class Plane:
+    """The ground around a form: a plane.
+
+    Attributes
+    ----------
+    height
+        Its height at a place, m.
+    east, north
+        Its rise to the east and to the north, m/m.
+    x, y
+        The place, m.
+    """
+
+    height: float = 0.0
+    east: float = 0.0
+    north: float = 0.0
+    x: float = 0.0
+    y: float = 0.0
+
+    def at(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Give its heights.
+
+        Parameters
+        ----------
+        x, y
+            Places, m, which broadcast.
+
+        Returns
+        -------
+        FloatArray
+            Heights, m, of the broadcast shape.
+        """
+        rise = self.east * (x - self.x) + self.north * (y - self.y)
+        return np.asarray(self.height + rise)
+
+    @property
+    def fall(self) -> float:
+        """Its fall along the steepest way down, m/m."""
+        return hypot(self.east, self.north)
+
+    @property
+    def towards_deg(self) -> float:
+        """Where it falls to, degrees from north (+y) over east (+x)."""
+        return degrees(atan2(-self.east, -self.north)) % 360
+
+    def __str__(self) -> str:
+        return f"{100 * self.fall:.2g} % towards {self.towards_deg:.0f}°"
+
+
+class Heap(NamedTuple):
+    """A part of a surface that rises from the ground, apart from all others.
+
+    Attributes
+    ----------
+    x, y
+        The middle of its extent, m.
+    height
+        Height of its highest place above the ground, m.
+    radius
+        Distance from the middle within which the whole heap lies, m.
+    """
+
+    x: float
+    y: float
+    height: float
+    radius: float
 
 
 @dataclass(frozen=True)
@@ -70,8 +152,8 @@ class Surface:
         Axes of the raster, m, rising, of shapes (nx,) and (ny,): east and north.
     z
         Heights as the file has them, m, of shape (ny, nx).
-    level
-        Height of the ground around the form, m.
+    ground
+        The ground around the form.
     spread
         Standard deviation of the smoothing, in cells of the flow's mesh.
     said
@@ -79,7 +161,7 @@ class Surface:
     tags
         Tags of the GeoTIFF that say where on the Earth it is; empty without any.
     noise
-        Standard deviation of the heights of the rim, m.
+        Standard deviation of the heights of the rim off the ground, m.
     digest
         SHA-256 of the axes, of the heights above the ground and of the smoothing.
     """
@@ -88,7 +170,7 @@ class Surface:
     x: FloatArray = field(compare=False, repr=False)
     y: FloatArray = field(compare=False, repr=False)
     z: FloatArray = field(compare=False, repr=False)
-    level: float = field(compare=False)
+    ground: Plane = field(compare=False)
     spread: float = field(compare=False)
     said: tuple[str, ...] = field(compare=False)
     tags: Tags = field(compare=False, repr=False)
@@ -110,55 +192,120 @@ class Surface:
         """Lengths of the raster along x and along y, m."""
         return float(np.ptp(self.x)), float(np.ptp(self.y))
 
+    @cached_property
+    def above(self) -> FloatArray:
+        """Heights above the ground, m, of shape (ny, nx)."""
+        return self.z - self.ground.at(self.x, self.y[:, None])
+
     @property
     def relief(self) -> float:
         """Height of the highest place above the ground, m."""
-        return float(self.z.max() - self.level)
+        return float(self.above.max())
+
+    @property
+    def foot(self) -> float:
+        """Height above the ground from which a place is a part of the form, m."""
+        return max(OF_GROUND * self.relief, NOISE * self.noise)
 
     @cached_property
     def is_form(self) -> BoolArray:
-        """Whether each node is a part of the form, of shape (ny, nx).
+        """Whether each node is off the ground, of shape (ny, nx).
 
-        All others are of the ground.
+        These are heaps, low rises beside them, and pits.
         """
+        return self._opened(np.abs(self.above) > self.foot)
+
+    def _opened(self, is_off: BoolArray) -> BoolArray:
+        """Nodes off the ground without single ones, which are beyond any noise."""
         from scipy.ndimage import binary_opening
 
-        off = np.abs(self.z - self.level)
-        is_form = off > max(OF_GROUND * self.relief, NOISE * self.noise)
         if not self.noise:
-            return np.asarray(is_form)
-        # single nodes of the ground are beyond any noise
-        return np.asarray(binary_opening(is_form, np.ones((3, 3), bool)))
+            return is_off
+        return np.asarray(binary_opening(is_off, TOUCHING))
+
+    @cached_property
+    def heap_numbers(self) -> IntArray:
+        """Number of the heap of each node, from 1, of shape (ny, nx); 0 on the ground.
+
+        A heap is a connected part of the form that rises high enough; the highest is
+        the first.
+        """
+        from scipy.ndimage import label, maximum
+
+        parts, count = label(self._opened(self.above > self.foot), TOUCHING)
+        tops = np.asarray(maximum(self.above, parts, range(1, count + 1)), float)
+        order = np.argsort(-tops, kind="stable")
+        highest = order[tops[order] >= HEAP * self.relief]
+        numbers = np.zeros(count + 1, int)
+        numbers[1 + highest] = np.arange(1, len(highest) + 1)
+        return np.asarray(numbers[parts])
+
+    @cached_property
+    def heaps(self) -> tuple[Heap, ...]:
+        """The heaps in the order of their numbers."""
+        found = []
+        for number in range(1, int(self.heap_numbers.max()) + 1):
+            is_heap = self.heap_numbers == number
+            x, y = self._middle(is_heap)
+            height = float(self.above[is_heap].max())
+            found.append(Heap(x, y, height, self._radius(is_heap, x, y)))
+        return tuple(found)
+
+    def heap_at(self, x: FloatArray, y: FloatArray) -> IntArray:
+        """Find the heaps on which places lie, by the nodes nearest to them.
+
+        Parameters
+        ----------
+        x, y
+            Places in the axes of the file, m, of one shape.
+
+        Returns
+        -------
+        IntArray
+            Number of the heap of each place; 0 on the ground.
+        """
+        along_x, along_y = self.steps
+        column = np.rint((x - self.x[0]) / along_x).astype(int)
+        row = np.rint((y - self.y[0]) / along_y).astype(int)
+        rows, columns = self.z.shape
+        is_inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+        found = np.zeros(np.shape(x), int)
+        found[is_inside] = self.heap_numbers[row[is_inside], column[is_inside]]
+        return found
 
     @cached_property
     def centre(self) -> tuple[float, float]:
         """The middle of the form's extent along x and along y, m."""
-        of_x = self.x[self.is_form.any(axis=0)]
-        of_y = self.y[self.is_form.any(axis=1)]
-        middle_x = float(of_x[0] + of_x[-1]) / 2
-        middle_y = float(of_y[0] + of_y[-1]) / 2
-        return middle_x, middle_y
+        return self._middle(self.is_form)
 
     @cached_property
     def radius(self) -> float:
         """Distance from the centre within which the whole form lies, m."""
-        rows, columns = np.nonzero(self.is_form)
-        east = self.x[columns] - self.centre[0]
-        north = self.y[rows] - self.centre[1]
-        return float(np.hypot(east, north).max())
+        return self._radius(self.is_form, *self.centre)
+
+    def _middle(self, is_part: BoolArray) -> tuple[float, float]:
+        """The middle of the extent of some nodes along x and along y, m."""
+        of_x = self.x[is_part.any(axis=0)]
+        of_y = self.y[is_part.any(axis=1)]
+        return float(of_x[0] + of_x[-1]) / 2, float(of_y[0] + of_y[-1]) / 2
+
+    def _radius(self, is_part: BoolArray, x: float, y: float) -> float:
+        """Distance from a place within which some nodes lie, m."""
+        rows, columns = np.nonzero(is_part)
+        return float(np.hypot(self.x[columns] - x, self.y[rows] - y).max())
 
     @property
     def volume(self) -> float:
         """Volume above the ground, m3."""
         along_x, along_y = self.steps
-        return float((self.z - self.level).sum()) * along_x * along_y
+        return float(self.above.sum()) * along_x * along_y
 
     @cached_property
     def _coefficients(self) -> FloatArray:
         """Coefficients of the cubic splines through the heights above the ground."""
         from scipy.ndimage import spline_filter
 
-        return np.asarray(spline_filter(self.z - self.level, order=3))
+        return np.asarray(spline_filter(self.above, order=3))
 
     def at(self, x: ArrayLike, y: ArrayLike) -> FloatArray:
         """Interpolate heights by cubic splines.
@@ -202,7 +349,7 @@ class Surface:
             self.x,
             self.y,
             self.z,
-            self.level,
+            self.ground,
             cells,
             self.said,
             self.tags,
@@ -229,17 +376,17 @@ class Surface:
 
         deviation = self.spread * cell_m
         sigmas = deviation / np.array(self.steps[::-1])
-        # the weights reach beyond the raster, over the level ground
+        # the weights reach beyond the raster, over the ground
         rows, columns = np.ceil(TRUNCATED * sigmas).astype(int)
-        wide = np.pad(self.z - self.level, ((rows, rows), (columns, columns)))
+        wide = np.pad(self.above, ((rows, rows), (columns, columns)))
         smooth = gaussian_filter(wide, sigmas, truncate=TRUNCATED, mode="constant")
         y = _beyond(self.y, rows)[:: _thinning(sigmas[0])]
         x = _beyond(self.x, columns)[:: _thinning(sigmas[1])]
         thin = smooth[:: _thinning(sigmas[0]), :: _thinning(sigmas[1])]
         said = (*self.said, f"smoothed over {2 * deviation:.3g} m, to the cells")
-        heights = thin + self.level
+        heights = thin + self.ground.at(x, y[:, None])
         return surface_of(
-            self.name, x, y, heights, self.level, self.spread, said, self.tags
+            self.name, x, y, heights, self.ground, self.spread, said, self.tags
         )
 
 
@@ -261,7 +408,7 @@ def surface_of(
     x: FloatArray,
     y: FloatArray,
     z: FloatArray,
-    level: float,
+    ground: Plane,
     spread: float,
     said: tuple[str, ...] = (),
     tags: Tags | None = None,
@@ -277,8 +424,8 @@ def surface_of(
         Axes of the raster to the east and to the north, m, shapes (nx,) and (ny,).
     z
         Heights as the file has them, m, shape (ny, nx).
-    level
-        Height of the ground around the form, m.
+    ground
+        The ground around the form.
     spread
         Standard deviation of the smoothing, in cells of the flow's mesh.
     said
@@ -286,20 +433,21 @@ def surface_of(
     tags
         Tags of the GeoTIFF that say where on the Earth it is.
     noise
-        Standard deviation of the heights of the rim, m.
+        Standard deviation of the heights of the rim off the ground, m.
 
     Returns
     -------
     Surface
         The surface.
     """
-    relief = float(z.max() - level)
+    above = z - ground.at(x, y[:, None])
+    relief = float(above.max())
     of_rim = float(on_grid(noise, relief, 6))
     digest = sha256(f"{spread:g} {of_rim!r}".encode())
-    for part in (x - x[0], y - y[0], z - level):
+    for part in (x - x[0], y - y[0], above):
         digest.update(on_grid(part, relief).astype("<f8").tobytes())
     return Surface(
-        name, x, y, z, level, spread, said, tags or {}, noise, digest.hexdigest()
+        name, x, y, z, ground, spread, said, tags or {}, noise, digest.hexdigest()
     )
 
 
@@ -329,8 +477,9 @@ class Raster:
 def checked(raster: Raster, where: str) -> Surface:
     """Make a surface of the raster of a file.
 
-    The rim of what the file covers is the ground. A rim that is nearly level is tapered
-    to it; cells without a height beyond the rim are ground.
+    The rim of what the file covers is the ground, a plane with a gentle fall at most. A
+    rim that is nearly plane is tapered to it; cells without a height beyond the rim are
+    ground.
 
     Parameters
     ----------
@@ -352,14 +501,21 @@ def checked(raster: Raster, where: str) -> Surface:
     _check_size(raster, where)
     is_outside = _outside(raster, where)
     is_rim = _rim(is_outside)
-    level = float(np.median(raster.z[is_rim]))
-    above = np.where(is_outside, 0.0, raster.z - level)
+    ground = _ground(raster, is_rim)
+    _check_fall(ground, where)
+    heights = ground.at(raster.x, raster.y[:, None])
+    above = np.where(is_outside, 0.0, raster.z - heights)
     relief = float(above.max())
     _check_relief(relief, -float(above.min()), where)
     _check_units(raster, above, where)
     _check_cells(raster, above, where)
     rim = np.where(is_rim, above, 0.0)
-    said = _check_rim(raster, rim, relief, where)
+    noise = _noise(above[is_rim])
+    said = (
+        *_said_of_fall(raster, ground, relief),
+        *_check_noise(noise, relief, where),
+        *_check_rim(raster, rim, relief, where),
+    )
     if is_outside.any():
         count = int(is_outside.sum())
         said = (
@@ -372,23 +528,89 @@ def checked(raster: Raster, where: str) -> Surface:
         raster.name,
         raster.x,
         raster.y,
-        tapered + level,
-        level,
+        tapered + heights,
+        ground,
         SPREAD_OF_RASTER,
         said,
         raster.tags,
-        _noise(raster.z[is_rim] - level),
+        noise,
     )
     _check_slopes(surface, where)
     return surface
 
 
+def _ground(raster: Raster, is_rim: BoolArray) -> Plane:
+    """The plane from which the heights of a rim are least off, in the sum of sizes.
+
+    As their median would, it leaves out what a part of the rim is off: the foot of a
+    form, a ramp to its side.
+    """
+    rows, columns = np.nonzero(is_rim)
+    middle_x = float(raster.x[0] + raster.x[-1]) / 2
+    middle_y = float(raster.y[0] + raster.y[-1]) / 2
+    length = max(float(np.ptp(raster.x)), float(np.ptp(raster.y)))
+    east = (raster.x[columns] - middle_x) / length
+    north = (raster.y[rows] - middle_y) / length
+    terms = np.column_stack([np.ones_like(east), east, north])
+    level, by_x, by_y = _fit(terms, raster.z[is_rim])
+    return Plane(level, by_x / length, by_y / length, middle_x, middle_y)
+
+
+def _fit(terms: FloatArray, values: FloatArray) -> list[float]:
+    """Factors of terms, shape (n, k), whose sum is least off the values, shape (n,)."""
+    whole = float(np.ptp(values))
+    least = whole
+    found = np.array([np.median(values), *np.zeros(terms.shape[1] - 1)])
+    for _ in range(HALVINGS if whole else 0):
+        # squares over sizes are sizes; the sizes that count as 0 shrink to all digits
+        off = np.abs(values - terms @ found)
+        root = 1 / np.sqrt(np.maximum(off, least))
+        found = np.linalg.lstsq(terms * root[:, None], values * root)[0]
+        least = max(least / 2, 1e-12 * whole)
+    return [float(factor) for factor in found]
+
+
+def _check_fall(ground: Plane, where: str) -> None:
+    """Refuse ground so steep that a heap on it is no heap on level ground."""
+    steepest = tan(radians(STEEPEST_GROUND_DEG))
+    if ground.fall > steepest:
+        what = f"its ground falls by {ground}, by more than {100 * steepest:.1f} %"
+        remedy = (
+            "is the rim of the raster ground? Heaps on steeper slopes are not solved"
+        )
+        raise InputError(what, where, remedy)
+
+
+def _said_of_fall(raster: Raster, ground: Plane, relief: float) -> tuple[str, ...]:
+    """What is said of the fall of the ground, if it is worth a word."""
+    drop = abs(ground.east) * np.ptp(raster.x) + abs(ground.north) * np.ptp(raster.y)
+    if drop <= OF_GROUND * relief:
+        return ()
+    what = f"put on level ground: its own falls by {ground}, {drop:.3g} m in all"
+    return (f"{what}, and was taken off",)
+
+
+def _check_noise(noise: float, relief: float, where: str) -> tuple[str, ...]:
+    """Refuse ground too rough to tell a form from it; what is said of other ground."""
+    foot = NOISE * noise
+    if foot > TAPERED_RIM * relief:
+        what = f"its rim is off a plane by {noise:.3g} m in standard deviation"
+        what = (
+            f"{what}, the form is {relief:.3g} m high: it is not told from the ground"
+        )
+        remedy = "crop the raster to the form with even ground around it"
+        raise InputError(what, where, remedy)
+    if foot > OF_GROUND * relief:
+        return (f"taken for ground below {foot:.2g} m, by the noise of its rim",)
+    return ()
+
+
 def _noise(rim: FloatArray) -> float:
-    """Standard deviation of the heights of a rim, by their median size, m.
+    """Standard deviation of the heights of a rim off the ground, by their median size.
 
     Ramps to the form's sides, which a rim may have, do not count in it.
     """
-    return float(np.median(np.abs(rim))) / 0.6745
+    return float(np.median(np.abs(rim))) / MEDIAN
 
 
 def _place(raster: Raster, row: int, column: int) -> str:
@@ -442,7 +664,7 @@ def _rim(is_outside: BoolArray) -> BoolArray:
     from scipy.ndimage import binary_erosion
 
     is_inside = ~is_outside
-    return np.asarray(is_inside & ~binary_erosion(is_inside, np.ones((3, 3), bool)))
+    return np.asarray(is_inside & ~binary_erosion(is_inside, TOUCHING))
 
 
 def _check_relief(relief: float, depth: float, where: str) -> None:
@@ -487,18 +709,18 @@ def _check_cells(raster: Raster, above: FloatArray, where: str) -> None:
 def _check_rim(
     raster: Raster, rim: FloatArray, relief: float, where: str
 ) -> tuple[str, ...]:
-    """Refuse a rim that is not level; what is said of one that is nearly so."""
+    """Refuse a rim that is no plane; what is said of one that is nearly so."""
     worst = int(np.abs(rim).argmax())
     row, column = np.unravel_index(worst, rim.shape)
     off = abs(float(rim[row, column]))
     if off > TAPERED_RIM * relief:
         place = _place(raster, int(row), int(column))
-        what = f"its rim is not level: at {place} it is {off:.3g} m off"
+        what = f"its rim is not even: at {place} it is {off:.3g} m off its plane"
         what = f"{what}, the form is {relief:.3g} m high"
-        remedy = "take more of the level ground around the form, or subtract its tilt"
+        remedy = "take more of the even ground around the form"
         raise InputError(what, where, remedy)
     if off > FLAT_RIM * relief:
-        return (f"tapered to level ground at its rim, which is up to {off:.3g} m off",)
+        return (f"tapered to even ground at its rim, which is up to {off:.3g} m off",)
     return ()
 
 
@@ -527,7 +749,7 @@ def _check_slopes(surface: Surface, where: str) -> None:
     along_x, along_y = surface.steps
     deviation = 0.1 * min(surface.relief, surface.radius)
     sigmas = deviation / np.array([along_y, along_x])
-    smooth = gaussian_filter(surface.z, sigmas, mode="nearest")
+    smooth = gaussian_filter(surface.above, sigmas, mode="nearest")
     by_y, by_x = np.gradient(smooth, along_y, along_x)
     slopes = np.degrees(np.arctan(np.hypot(by_x, by_y)))
     row, column = np.unravel_index(int(slopes.argmax()), slopes.shape)
@@ -564,7 +786,7 @@ def cone(height: float, slope_deg: float) -> Surface:
     x, y = _axes(radius, radius)
     distance = np.hypot(x, y[:, None])
     z = np.maximum(height - distance * tan(radians(slope_deg)), 0.0)
-    return surface_of("cone", x, y, z, 0.0, SPREAD_OF_SHAPE)
+    return surface_of("cone", x, y, z, Plane(), SPREAD_OF_SHAPE)
 
 
 def oval(height: float, slope_deg: float, length: float, width: float) -> Surface:
@@ -596,7 +818,8 @@ def oval(height: float, slope_deg: float, length: float, width: float) -> Surfac
     beyond = np.maximum(np.abs(y) - half, 0.0)
     distance = np.hypot(x, beyond[:, None])
     rise = (foot - distance) * tan(radians(slope_deg))
-    return surface_of("oval", x, y, np.clip(rise, 0.0, height), 0.0, SPREAD_OF_SHAPE)
+    z = np.clip(rise, 0.0, height)
+    return surface_of("oval", x, y, z, Plane(), SPREAD_OF_SHAPE)
 
 
 def barchan(height: float, slope_deg: float) -> Surface:
@@ -636,7 +859,7 @@ def barchan(height: float, slope_deg: float) -> Surface:
     behind = x - brink[:, None]
     slip = height_there[:, None] - fall[:, None] * behind
     z = np.where(behind > 0, np.minimum(windward, slip), windward)
-    return surface_of("barchan", x, y, np.maximum(z, 0.0), 0.0, SPREAD_OF_SHAPE)
+    return surface_of("barchan", x, y, np.maximum(z, 0.0), Plane(), SPREAD_OF_SHAPE)
 
 
 def _axes(half_x: float, half_y: float) -> tuple[FloatArray, FloatArray]:

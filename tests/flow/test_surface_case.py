@@ -22,7 +22,7 @@ from orchestrator.flow.surface_case import (
 from orchestrator.flow.surface_stress import SurfaceStress
 from orchestrator.runs import case
 from orchestrator.runs.case import templates
-from orchestrator.study.surface import Surface, cone, surface_of
+from orchestrator.study.surface import Plane, Surface, cone, surface_of
 from orchestrator.types import FloatArray
 from tests.conftest import Shared
 from tests.flow.conftest import allrun, edit
@@ -39,13 +39,13 @@ def hill(stretch: float = 1.0, height: float = HEIGHT) -> Surface:
     east, north = np.meshgrid(x, y)
     away = np.minimum(np.hypot(east / stretch, north) / RADIUS, 1.0)
     z = height * np.cos(np.pi / 2 * away) ** 2
-    return surface_of("hill", x, y, z, 0.0, spread=0.5)
+    return surface_of("hill", x, y, z, Plane(), spread=0.5)
 
 
 def turned(surface: Surface) -> Surface:
     """The surface turned by a quarter against the clock: its east is now north."""
     z = surface.z.T[:, ::-1]
-    return surface_of("turned", surface.y, surface.x, z, 0.0, surface.spread)
+    return surface_of("turned", surface.y, surface.x, z, Plane(), surface.spread)
 
 
 class Flat(Surface):

@@ -205,13 +205,115 @@ def test_cells_without_a_height_around_the_form_are_ground() -> None:
     assert "continued as level ground over" in found.said[-1]
 
 
-def test_a_rim_that_is_nearly_level_is_tapered_and_said() -> None:
+def test_a_rim_that_is_nearly_even_is_tapered_and_said() -> None:
     of = hill()
-    tilt = 0.6 * (of.x - of.x.mean()) / np.ptp(of.x)
-    found = checked(with_heights(of, of.z + tilt), WHERE)
-    assert "tapered to level ground at its rim" in found.said[0]
-    edges = [found.z[0], found.z[-1], found.z[:, 0], found.z[:, -1]]
-    assert np.concatenate(edges) == pytest.approx(found.level, abs=1e-9)
+    bend = 1.6 * ((of.x - of.x.mean()) / np.ptp(of.x)) ** 2
+    found = checked(with_heights(of, of.z + bend), WHERE)
+    assert "tapered to even ground at its rim" in found.said[-1]
+    for edge in (found.above[0], found.above[-1], found.above.T[0], found.above.T[-1]):
+        assert edge == pytest.approx(0.0, abs=1e-9)
+
+
+def heaps(fall: float = 0.0, north: float = 0.0, noise: float = 0.0) -> Raster:
+    """Cones of 6 and 4 m, apart from each other, on ground that falls."""
+    x, y = np.arange(41.0), np.arange(49.0)
+    z = np.zeros((49, 41))
+    for east, along, height in ((14.0, 18.0, 6.0), (28.0, 34.0, 4.0)):
+        distance = np.hypot(x - east, (y - along)[:, None])
+        z = np.maximum(z, height - distance * tan(radians(30.0)))
+    z += np.random.default_rng(1).normal(0.0, noise, z.shape)
+    z += fall * x + north * y[:, None]
+    # a file has millimetres
+    return Raster("heaps.xyz", x, y, z.round(3))
+
+
+def cells(surface: Surface) -> int:
+    return int(surface.is_form.sum())
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02, 0.05])
+@pytest.mark.parametrize("fall", [0.005, 0.01, 0.02, 0.04, 0.05, -0.03])
+def test_ground_that_falls_takes_nothing_of_a_heap(fall: float, noise: float) -> None:
+    level = checked(heaps(noise=noise), WHERE)
+    along_x = checked(heaps(fall, noise=noise), WHERE)
+    across = checked(heaps(fall / 2, -fall, noise), WHERE)
+    for found in (along_x, across):
+        # the plane that fits a rim follows its fall to the millimetres of the file: at
+        # the foot of 30 deg these are 0.01 cells, on each of some 100 cells around it
+        assert cells(found) == pytest.approx(cells(level), abs=2)
+        # as far as a heap of 880 m3 on 480 m2 is higher by 1 mm
+        assert found.volume == pytest.approx(level.volume, rel=2e-3)
+        assert found.relief == pytest.approx(level.relief, abs=2e-3)
+    size = f"{100 * abs(fall):.1f}".removesuffix("0").removesuffix(".")
+    if not noise:
+        towards = 270 if fall > 0 else 90
+        said = f"put on level ground: its own falls by {size} % towards {towards}°, "
+        assert (
+            along_x.said[0] == f"{said}{abs(40 * fall):.3g} m in all, and was taken off"
+        )
+        assert across.ground.towards_deg == pytest.approx(
+            (270 if fall > 0 else 90) + np.degrees(np.arctan(2)), abs=0.1
+        )
+
+
+def test_noise_of_the_ground_takes_the_lowest_ring_of_a_heap_alone() -> None:
+    even = checked(heaps(), WHERE)
+    rough = checked(heaps(fall=0.03, noise=0.05), WHERE)
+    # four standard deviations, 0.2 m, are 0.35 m of a foot of 30 deg, and the lowest
+    # hundredth of an even heap is ground, too
+    lost = (
+        (rough.foot - even.foot)
+        / tan(radians(30.0))
+        * 2
+        * pi
+        * (6 + 4)
+        / tan(radians(30.0))
+    )
+    assert cells(even) - cells(rough) == pytest.approx(lost, abs=0.03 * cells(even))
+    assert rough.volume == pytest.approx(even.volume, rel=5e-3)
+    assert f"taken for ground below {rough.foot:.2g} m" in "; ".join(rough.said)
+    assert rough.noise == pytest.approx(0.05, rel=0.2)
+
+
+def test_a_ramp_at_the_rim_does_not_tilt_the_ground() -> None:
+    of = heaps(fall=0.02)
+    ramp = 0.8 * np.exp(-(((of.y - 30.0) / 6.0) ** 2))
+    of.z[:, 0] += ramp
+    of.z[:, 1] += 0.5 * ramp
+    found = checked(of, WHERE)
+    assert found.ground.east == pytest.approx(0.02, rel=1e-3)
+    assert found.ground.north == pytest.approx(0.0, abs=2e-5)
+
+
+def test_each_heap_has_its_own_height_and_base() -> None:
+    first, second = checked(heaps(fall=0.02), WHERE).heaps
+    foot = 0.06 / tan(radians(30.0))
+    for heap, place, height in ((first, (14, 18), 6.0), (second, (28, 34), 4.0)):
+        assert (heap.x, heap.y) == pytest.approx(place, abs=0.5)
+        assert heap.height == pytest.approx(height, abs=2e-3)
+        assert heap.radius == pytest.approx(height / tan(radians(30)) - foot, abs=1.0)
+
+
+def test_heaps_that_touch_are_one_and_low_rises_are_none() -> None:
+    of = heaps()
+    # a saddle of 1 m between the two, and a rise of 0.5 m far from them
+    along = np.clip(((of.x - 14) * 14 + (of.y[:, None] - 18) * 16) / 452, 0, 1)
+    off = np.hypot(of.x - 14 - 14 * along, of.y[:, None] - 18 - 16 * along)
+    saddle = np.maximum(of.z, 1.0 - 0.5 * off)
+    assert len(checked(with_heights(of, saddle), WHERE).heaps) == 1
+    off = np.hypot(of.x - 34, of.y[:, None] - 10)
+    rise = np.maximum(of.z, 0.5 - 0.2 * off)
+    found = checked(with_heights(of, rise), WHERE)
+    assert len(found.heaps) == 2
+    assert cells(found) > int((found.heap_numbers > 0).sum())
+
+
+def test_places_belong_to_the_heap_below_them() -> None:
+    found = checked(heaps(), WHERE)
+    edge = 14.0 + 6 / tan(radians(30.0))
+    x = np.array([14.2, 28.0, edge - 0.6, edge + 0.6, 90.0])
+    y = np.array([18.0, 34.3, 18.0, 18.0, -5.0])
+    assert found.heap_at(x, y).tolist() == [1, 2, 1, 0, 0]
 
 
 def wall(z: FloatArray) -> FloatArray:
@@ -224,7 +326,20 @@ def wall(z: FloatArray) -> FloatArray:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda z: z + np.linspace(-3, 3, 80), "its rim is not level: at x = 5120"),
+        (
+            lambda z: z + 2 * np.outer(*(np.linspace(0, 1, n) ** 4 for n in z.shape)),
+            "its rim is not even: at x = 5120",
+        ),
+        (
+            lambda z: z + np.linspace(-3, 3, 80),
+            "its ground falls by 15 % towards 270°, by more than 8.7 %",
+        ),
+        (
+            lambda z: (
+                z + 0.45 * np.add.outer(*(np.sin(np.arange(n) / 3) for n in z.shape))
+            ),
+            "its rim is off a plane by 0.* it is not told from the ground",
+        ),
         (lambda z: 1000 * z, "its slopes are 90 deg in the median, above 60"),
         (lambda z: 20 * (z - 100), "its slopes are 87 deg .*x, y and z all in m?"),
         (wall, "a slope of 7. deg at x = 5120.* A wall or an overhang is no bed"),
@@ -336,7 +451,7 @@ def test_the_sides_and_the_bottom_of_a_closed_body_are_no_bed(
     body.extract_surface(algorithm="dataset_surface").triangulate().save(path)
     found = read_surface(path, WHERE)
     assert found.volume == pytest.approx(checked(of, WHERE).volume, rel=5e-3)
-    assert found.level == pytest.approx(100.0, abs=0.1)
+    assert found.ground.height == pytest.approx(100.0, abs=0.1)
 
 
 def test_points_off_the_grid_are_refused_with_their_line(tmp_path: Path) -> None:

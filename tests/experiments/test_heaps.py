@@ -1,0 +1,182 @@
+"""Heaps on a surface: what is counted of them, by made-up stresses in place of a solver."""
+
+from collections.abc import Callable, Sequence
+from math import cos, pi, radians, tan
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator.experiments import surface, surface_card
+from orchestrator.experiments.experiment import Experiment, Results, Runs
+from orchestrator.flow.surface_case import SURFACE_STRESS
+from orchestrator.flow.surface_stress import SurfaceStress, faces_of
+from orchestrator.study import surface_study
+from orchestrator.study.raster import geotiff
+from orchestrator.study.surface_study import SurfaceStudy
+
+EAST, NORTH = 431_200.0, 5_571_000.0
+SLOPE = 36.0
+ONE = ((24.0, 26.0, 7.0),)
+TWO = (*ONE, (54.0, 32.0, 5.5))
+FILE = """
+[fluid]
+kind = "air"
+[grain]
+diameter = 1e-3
+density = 2650.0
+[bed]
+kind = "surface"
+surface = "heaps.tif"
+entrainment_angle_deg = 50.0
+[method.flow]
+roughness = 0.005
+[axes]
+"flow.from_deg" = {}
+[erosion]
+"""
+
+
+def study_of(
+    folder: Path,
+    cones: Sequence[tuple[float, float, float]] = TWO,
+    *,
+    fall: float = 0.0,
+    noise: float = 0.01,
+    directions: Sequence[float] = (270.0,),
+    more: str = "",
+) -> SurfaceStudy:
+    """A study of cones, m, on ground that falls to the east."""
+    folder.mkdir(exist_ok=True)
+    x, y = np.arange(0, 80.1, 0.5), np.arange(0, 60.1, 0.5)
+    z = np.zeros((len(y), len(x)))
+    for east, north, height in cones:
+        distance = np.hypot(x - east, (y - north)[:, None])
+        z = np.maximum(z, height - distance * tan(radians(SLOPE)))
+    z += 100 - fall * x + np.random.default_rng(3).normal(0, noise, z.shape)
+    (folder / "heaps.tif").write_bytes(geotiff(EAST + x, NORTH + y, z, {}))
+    path = folder / "heaps.toml"
+    path.write_text(FILE.format([*directions]) + more)
+    found = surface_study.load(path)
+    assert found is not None
+    return found
+
+
+def answered(
+    study: SurfaceStudy,
+    experiment: Experiment,
+    folder: Path,
+    strength: Callable[[float], float] = lambda from_deg: 1.0,
+) -> Results:
+    """The results of an experiment over flows of which u*/u*_0 rises with the height."""
+    for scene in study.scenes:
+        flow = surface.flow_of(scene)
+        middles, normals, _ = faces_of(flow.mesh)
+        along = np.array([1.0, 0.0, 0.0]) - normals[:, :1] * normals
+        along /= np.linalg.norm(along, axis=1)[:, None]
+        ratio = strength(scene.flow.from_deg) * (1 + middles[:, 2] / flow.height_m)
+        on_slab = np.zeros((flow.mesh.shape[1], 3))
+        tau = np.concatenate([on_slab, ratio[:, None] ** 2 * along])
+        centre = np.array(scene.heights.centre)
+        directory = folder / flow.name
+        directory.mkdir(parents=True, exist_ok=True)
+        stress = SurfaceStress.of_faces(flow.mesh, tau, flow.axes, centre)
+        stress.to_csv(directory / SURFACE_STRESS)
+    names = {name: {"id": name} for name in experiment.planned.cases}
+    return experiment.results(Runs(experiment.planned, folder, names))
+
+
+def lateral(cones: Sequence[tuple[float, float, float]]) -> float:
+    """Area of the sides of cones, m2."""
+    return sum(
+        pi * (height / tan(radians(SLOPE))) ** 2 / cos(radians(SLOPE))
+        for *_, height in cones
+    )
+
+
+@pytest.mark.parametrize("fall", [0.0, 0.015, 0.05])
+def test_areas_and_shares_are_of_the_heaps_alone(tmp_path: Path, fall: float) -> None:
+    study = study_of(tmp_path, fall=fall)
+    made, _ = answered(study, surface.experiment(study, tmp_path), tmp_path / "cases")
+    faces = made["faces-1-270"]
+    on_heaps = faces[faces["heap"] > 0]
+    # a face counts whose middle is on a heap: of the 200 at the edge half do. The lowest
+    # hundredth of the highest heap is ground
+    foot = 0.07 / tan(radians(SLOPE))
+    plan = sum(pi * (h / tan(radians(SLOPE)) - foot) ** 2 for *_, h in TWO)
+    upright = on_heaps["area_m2"] * np.cos(np.radians(on_heaps["slope_deg"]))
+    assert upright.sum() == pytest.approx(plan, rel=0.03)
+    # smoothing makes the foot and the top less steep
+    assert 0.9 < on_heaps["area_m2"].sum() / lateral(TWO) < 1.0
+    first = on_heaps[on_heaps["heap"] == 1]
+    assert 0.9 < first["area_m2"].sum() / lateral(ONE) < 1.0
+    assert np.hypot(first["x_m"] - EAST - 24, first["y_m"] - NORTH - 26).max() < 10
+    (row,) = made["directions"].to_dict("records")
+    assert row["area, m²"] == pytest.approx(on_heaps["area_m2"].sum())
+
+
+def test_grains_feel_the_fall_that_the_flow_does_not(tmp_path: Path) -> None:
+    level, falls = (
+        answered(
+            study, surface.experiment(study, tmp_path), tmp_path / f"{fall}" / "cases"
+        )[0]
+        for fall in (0.0, 0.05)
+        for study in [study_of(tmp_path / f"{fall}", fall=fall)]
+    )
+    one, other = level["faces-1-270"], falls["faces-1-270"]
+    assert other["z_m"].to_numpy() == pytest.approx(one["z_m"].to_numpy(), abs=2e-3)
+    # ground that falls with the wind: grains of its flat part move in less of it
+    is_flat = (one["heap"] == 0) & (one["slope_deg"] < 0.1)
+    slopes = other["slope_deg"][is_flat]
+    assert slopes.to_numpy() == pytest.approx(np.degrees(np.arctan(0.05)), abs=0.1)
+    assert other["heading_deg"][is_flat].to_numpy() == pytest.approx(180.0, abs=3)
+    ratio = other["wind_leaves_m_s"][is_flat] / one["wind_leaves_m_s"][is_flat]
+    # straight down a slope b: sqrt(sin(p - b) / sin p), with p of 40 deg
+    by_hand = np.sqrt(np.sin(radians(40) - np.arctan(0.05)) / np.sin(radians(40)))
+    assert ratio.to_numpy() == pytest.approx(by_hand, abs=0.01)
+
+
+def test_directions_that_the_interval_does_not_tell_apart_are_a_tie(
+    tmp_path: Path,
+) -> None:
+    study = study_of(tmp_path, directions=[0.0, 90.0, 180.0])
+    # stresses 3 % and 30 % below those of the worst direction
+    strengths = {0.0: 0.97, 90.0: 1.0, 180.0: 0.7}
+    experiment = surface.experiment(study, tmp_path)
+    _, sections = answered(study, experiment, tmp_path / "cases", strengths.__getitem__)
+    card = sections[0].card
+    assert card is not None
+    assert "2 heaps of " in card.scene
+    first = card.numbers[0]
+    assert first.meaning.startswith("wind at 10 m from 90° in which motion starts")
+    assert "0° is not told from it within the interval" in first.note
+    assert "180°" not in first.note
+    assert "From 180° motion starts at" in sections[0].text
+    assert "within the interval" not in sections[0].text
+
+
+def test_a_tie_of_all_directions_has_no_worst() -> None:
+    every = [0.0, 90.0, 180.0, 270.0]
+    assert surface_card.tie(every, 90.0, 4) == (
+        "no direction is told from another within the interval"
+    )
+    assert surface_card.tie([90.0], 90.0, 4) == ""
+    assert surface_card.tie([0.0, 90.0, 180.0], 90.0, 4) == (
+        "0° and 180° are not told from it within the interval"
+    )
+    many = [float(angle) for angle in range(0, 330, 30)]
+    assert surface_card.tie(many, 0.0, 12).startswith("10 others are not told")
+
+
+def test_the_page_has_places_to_a_part_of_a_cell(tmp_path: Path) -> None:
+    study = study_of(tmp_path, directions=[0.0, 90.0])
+    experiment = surface.experiment(study, tmp_path)
+    made, sections = answered(study, experiment, tmp_path / "cases")
+    (shown,) = sections[0].tables
+    for place, exact in zip(
+        shown["first at x, m"], made["directions"]["x_m"], strict=True
+    ):
+        assert place == f"{exact:.1f}"
+    card = sections[0].card
+    assert card is not None
+    assert card.numbers[0].note.startswith("first at x = 4312")
