@@ -408,7 +408,8 @@ def checks(answers: Iterable[Decision]) -> dict[str, Decision]:
     """Choose the piles by DEM that check answers without it.
 
     Of each group it is the pile that DEM, as the scene is written, answers in the least
-    time.
+    time. A check is the answer of the same scene with ``method.kind = "dem"``, by the
+    same criterion of motion.
 
     Parameters
     ----------
@@ -431,4 +432,7 @@ def checks(answers: Iterable[Decision]) -> dict[str, Decision]:
             cheapest.get(group, member), member, key=lambda one: one[:2]
         )
     why = "it checks an answer without DEM"
-    return {asked: as_written(dem, why) for _, asked, dem in cheapest.values()}
+    return {
+        asked: replace(decide(dem, None), why=why)
+        for _, asked, dem in cheapest.values()
+    }

@@ -68,10 +68,12 @@ def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame
         lifted=thresholds["share_carried_off"] > 0,
         replicas=ids.map(replicas),
     )
-    groups = table.dropna(subset=["shields"]).groupby([*SIMILAR, "replicas"])["shields"]
+    reached = table.dropna(subset=["shields"])
+    groups = reached.groupby([*SIMILAR, "replicas"], dropna=False)["shields"]
     spread = (groups.max() - groups.min()) / 2 / groups.mean()
     # one seed has no range
-    largest = spread[groups.count() > 1].rename("scatter").groupby(level=SIMILAR).max()
+    several = spread[groups.count() > 1].rename("scatter")
+    largest = several.groupby(level=SIMILAR, dropna=False).max()
     table = table.merge(
         largest.reset_index(), on=SIMILAR, how="left", validate="many_to_one"
     )
@@ -82,13 +84,12 @@ def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame
     return table.drop(columns=["layout", "lifted", "replicas"])
 
 
-def _layouts(scenes: pd.DataFrame) -> "pd.Series[str]":
-    """How the grains of each scene lie, by its id: a text that alike scenes share."""
-    layout = scenes["packing"].replace(LAYOUTS)
-    for column in POURED:
-        if column in scenes:
-            layout = layout + ", " + scenes[column].astype(object).astype(str)
-    return layout
+def _layouts(scenes: pd.DataFrame) -> "pd.Series[int]":
+    """How the grains of each scene lie, by its id: a number that alike scenes share."""
+    of_poured = [column for column in POURED if column in scenes]
+    columns = scenes[["packing", *of_poured]].replace({"packing": LAYOUTS})
+    # a lattice has no width, sizes or depth, and equal spheres have no sizes
+    return columns.groupby([*columns], dropna=False).ngroup()
 
 
 def with_usable(

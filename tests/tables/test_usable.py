@@ -11,7 +11,7 @@ from orchestrator import plan, tables
 from orchestrator.physics.beside import interval
 from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.study import study
-from orchestrator.tables.usable import with_scatter, with_usable
+from orchestrator.tables.usable import POURED, with_scatter, with_usable
 from tests import small_study
 
 NAN = float("nan")
@@ -196,6 +196,7 @@ def scattered(
 ) -> pd.DataFrame:
     """Three seeds of one pile, one regular pile of its slope, one of another, two of level rows."""
     names, slope = list("abcdefg"), [15.0, 15.0, 15.0, 15.0, 30.0, 15.0, 15.0]
+    of_poured = {name: [None] * len(names) for name in POURED}
     columns = {
         **{"scene_id": names, "alpha_deg": slope, "force_law": "high", "fraction": 0.5},
         "share_carried_off": changes.pop("share_carried_off", 0.0),
@@ -204,7 +205,7 @@ def scattered(
         "shields_high": np.multiply(shields, 1.02),
     }
     scenes = {
-        **{"scene_id": names, "alpha_deg": slope, "stiffness": 1e3},
+        **{"scene_id": names, "alpha_deg": slope, "stiffness": 1e3, **of_poured},
         "packing": [
             *["disordered"] * 3,
             "aligned",
@@ -268,14 +269,50 @@ def test_the_scatter_of_poured_beds_is_of_beds_that_are_poured_alike() -> None:
             "packing": [*["poured"] * 5, "aligned", "horizontal"],
             "width": [6.0, 6.0, 0.0, 0.0, 0.0, None, None],
             "sizes": [*["log-normal, sigma_g 1.3"] * 4, "10 mm 100 %", None, None],
+            "poured_depth": [*[5.0] * 5, None, None],
             "seed": [0.0, 1.0, 0.0, 1.0, 0.0, NAN, NAN],
             "asked": "auto",
         }
     )
+    expected = [0.1, 0.1, 0.5, 0.5, NAN, NAN, NAN]
     scatter = with_scatter(thresholds, scenes)["scatter"]
-    assert scatter.tolist() == pytest.approx(
-        [0.1, 0.1, 0.5, 0.5, NAN, NAN, NAN], nan_ok=True
-    )
+    assert scatter.tolist() == pytest.approx(expected, nan_ok=True)
+    # equal spheres have no sizes
+    equal = scenes.assign(sizes=scenes["sizes"].mask(scenes.index < 4))
+    scatter = with_scatter(thresholds, equal)["scatter"]
+    assert scatter.tolist() == pytest.approx(expected, nan_ok=True)
+
+
+SEEDS = """
+grain = {{ diameter = 1e-3 }}
+bed = {{ kind = "pile", slope_deg = 15.0, height = 0.02, packing = "{}" }}
+threshold.fractions = [0.1, 0.5]
+axes = {{ "bed.seed" = {} }}
+"""
+
+
+@pytest.mark.parametrize(
+    ("packing", "seeds"), [("disordered", [1, 2, 3]), ("horizontal", [0, 1, 2])]
+)
+def test_the_intervals_of_a_study_with_seeds_hold_their_scatter(
+    tmp_path: Path, packing: str, seeds: list[int]
+) -> None:
+    """Columns of a lattice are empty where only poured beds have values."""
+    results = small_study.run(tmp_path, SEEDS.format(packing, seeds))
+    table = results.tables["pile_threshold"]
+    assert results.scenes[["sizes", "poured_depth"]].isna().all(axis=None)
+    alone = small_study.run(tmp_path, SEEDS.format(packing, seeds[:1]))
+    without = alone.tables["pile_threshold"].set_index("fraction")
+    assert without["scatter"].isna().all()
+    for fraction, rows in table.groupby("fraction"):
+        values = rows["shields"]
+        half_range = (values.max() - values.min()) / 2 / values.mean()
+        assert half_range > 0
+        assert rows["scatter"].tolist() == pytest.approx([half_range] * 3)
+        first, before = rows.iloc[0], without.loc[fraction]
+        wider = [before["shields_low"] / (1 + half_range)]
+        wider += [before["shields_high"] / (1 - half_range)]
+        assert first[["shields_low", "shields_high"]].tolist() == pytest.approx(wider)
 
 
 RIPPLE = """

@@ -1,0 +1,52 @@
+"""The check of answers without DEM: it is the answer of the same scene by DEM."""
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from orchestrator.tables.check import KEYS
+from tests import small_study
+
+PILE = """
+tolerance = 0.2
+grain = {{ diameter = 1e-3, density = 2650.0 }}
+bed = {{ kind = "pile", slope_deg = 15.0, height = 0.01 }}
+method.grains = {{ load_increment = 0.03, waiting_time = 6.0 }}
+{}
+"""
+FLUIDS = {
+    "the paper's": "",
+    "water": 'fluid.kind = "water"',
+    "air": 'fluid.kind = "air"',
+    "water, grains that leave": """
+fluid.kind = "water"
+threshold.criterion = "leaves"
+""",
+}
+
+
+@pytest.mark.parametrize("fluid", FLUIDS.values(), ids=FLUIDS)
+def test_the_check_is_the_answer_of_the_same_scene_by_dem(
+    tmp_path: Path, fluid: str
+) -> None:
+    """To the digit: it has the same criterion, and is read from the same case."""
+    text = PILE.format(fluid)
+    checked = small_study.run(tmp_path, text).tables
+    check = checked["check"].set_index("fraction")
+    assert check["scene_id"].nunique() == 1
+    asked = text.replace("tolerance = 0.2", 'method.kind = "dem"')
+    by_dem = small_study.run(tmp_path, asked).tables["pile_threshold"]
+    by_dem = by_dem.set_index("fraction")
+    same = {"shields_dem": "shields", "case": "case"}
+    for name, of_answer in same.items():
+        pd.testing.assert_series_equal(
+            check[name], by_dem[of_answer], check_exact=True, check_names=False
+        )
+    # what is checked is the answer of the study, and both agree on such a pile
+    answers = checked["pile_threshold"]
+    pd.testing.assert_frame_equal(
+        check.reset_index()[[*KEYS, "shields"]], answers[[*KEYS, "shields"]]
+    )
+    assert check["agree"].all()
+    assert answers["usable"].all()
