@@ -70,8 +70,8 @@ def threshold(
         A force law, ``auto`` for `bridged`, or `bridged-gravel` where its drag law
         ends, ``paper`` for the paper's rule, or None for every law.
     fluid
-        "water", "seawater" or "air", in place of density and viscosity; the default is
-        the paper's fluid.
+        "water", "seawater" or "air", in place of density and viscosity, or "paper",
+        the paper's gas, which is the default where neither is given.
     temperature
         Of that fluid, deg C, by default 15.
     criterion
@@ -79,7 +79,7 @@ def threshold(
         in a gust and to hop on after it. The threshold is then the larger of both mean
         stresses, and there are columns of both, of the upper end by the weakest
         rebounds, of the stress at which motion ceases, and of which decides. "auto" is
-        "leaves" in the paper's fluid and by its rule, "goes on" in all others.
+        "leaves" in the paper's gas and by its laws, "goes on" in all others.
     **parameters
         Any of those below, by their names.
     density, fluid_density
@@ -116,7 +116,7 @@ def threshold(
 
     Examples
     --------
-    Two sizes of grains on a level bed in the paper's fluid:
+    Two sizes of grains on a level bed in the paper's gas:
 
     >>> rows = threshold([2e-4, 1e-3])
     >>> rows["law"].tolist()

@@ -11,6 +11,7 @@ TITLE = """<script>alert(1)</script> & "sand" d'été"""
 TEXT = f"""title = '''{TITLE}'''
 method.grains = {{ load_increment = 0.02, waiting_time = 6.0 }}
 forces = {{ law = "paper" }}
+fluid = {{ kind = "paper" }}
 
 [[group]]
 name = "horizontal"

@@ -50,14 +50,14 @@ PARAMETERS = {
         GRAIN_COLUMNS["fluid_density"],
         "rho_f, kg/m3",
         (1e-6, 2e4),
-        fluids.PAPER[0],
+        fluids.NUMBERS_OF_PAPER[0],
     ),
     "viscosity": Parameter(
         "fluid.viscosity",
         GRAIN_COLUMNS["viscosity"],
         "nu, m2/s",
         (1e-8, 1e3),
-        fluids.PAPER[1],
+        fluids.NUMBERS_OF_PAPER[1],
     ),
     "slope_deg": Parameter(
         "bed.slope_deg",
@@ -109,6 +109,8 @@ PARAMETERS = {
     ),
 }
 """By keyword, which is also the name in JSON. The paper's values are the defaults."""
+OF_FLUID = {"fluid_density": "density", "viscosity": "viscosity"}
+"""Parameters that a fluid has by its name, as a table ``[fluid]`` calls them."""
 GEOMETRIC = ("diameter", "viscosity", "roughness", "depth")
 """Parameters whose ranges are geometric; all others are spaced evenly."""
 QUANTITIES = {
@@ -128,8 +130,8 @@ LEAVES, GOES_ON = "leaves", "goes on"
 CRITERIA = (LEAVES, GOES_ON)
 """What a grain must do to count: leave its pocket, or also go on after the gust."""
 BY_FLUID = "auto"
-"""The criterion that fluid and law decide: `GOES_ON` in natural fluids, `LEAVES` in the
-paper's fluid and under the paper's rule."""
+"""The criterion that fluid and law decide: `LEAVES` in the paper's gas and under its
+laws, `GOES_ON` in all other fluids."""
 OF_CRITERION = {
     "shields_leaves": "leaves",
     "shields_goes_on": "goes on",

@@ -4,9 +4,9 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.calculator import BY_FLUID, PARAMETERS
+from orchestrator.calculator import BY_FLUID, LEAVES, OF_FLUID, PARAMETERS
 from orchestrator.errors import InputError
-from orchestrator.physics.fluids import TEMPERATURE, numbers_of
+from orchestrator.physics.fluids import PAPER, TEMPERATURE, numbers_of
 from orchestrator.study.units import first, questions
 
 if TYPE_CHECKING:  # this loads numpy
@@ -14,8 +14,6 @@ if TYPE_CHECKING:  # this loads numpy
 
 Value = float | str
 """A number, or a part of the diameter such as ``d/30``."""
-OF_FLUID = {"fluid_density": "density", "viscosity": "viscosity"}
-"""Parameters that a fluid has by its name, as a table ``[fluid]`` calls them."""
 FIELD = re.compile(r"\b([a-z]+\.[a-z_]+|(?<=threshold: )(depth|law|criterion))\b")
 """A field of a study file in a message, or what else is refused."""
 
@@ -38,7 +36,8 @@ def thresholds_and_questions(
     law
         The force law that is asked for, ``auto`` or ``paper``.
     fluid
-        Name of the fluid in place of density and viscosity.
+        Name of the fluid in place of density and viscosity; the paper's gas may have
+        numbers of its own.
     temperature
         Temperature of that fluid, deg C.
     names
@@ -71,6 +70,8 @@ def thresholds_and_questions(
     asked: list[str] = []
     try:
         points = _of_fluid(points, fluid, temperature)
+        if fluid == PAPER and criterion == BY_FLUID:
+            criterion = LEAVES  # also where the points have numbers of their own
         asked = questions(_by_field(points), fields, form)
         return thresholds(points, law, criterion), asked
     except InputError as error:
@@ -101,7 +102,7 @@ def _of_fluid(
         return points
     count = len(points["diameter"])
     columns = {name: [of_fluid[field]] * count for name, field in OF_FLUID.items()}
-    return {**points, **columns}
+    return {**columns, **points}
 
 
 def _by_field(points: Mapping[str, Sequence[Value]]) -> dict[str, list[float]]:

@@ -6,11 +6,17 @@ import math
 import sys
 from typing import Any
 
-from orchestrator.calculator import BY_FLUID, GEOMETRIC, MOST_POINTS, PARAMETERS
-from orchestrator.calculator.asked import OF_FLUID, Value, thresholds_and_questions
+from orchestrator.calculator import (
+    BY_FLUID,
+    GEOMETRIC,
+    MOST_POINTS,
+    OF_FLUID,
+    PARAMETERS,
+)
+from orchestrator.calculator.asked import Value, thresholds_and_questions
 from orchestrator.calculator.printed import as_json, as_text, print_csv
 from orchestrator.errors import InputError
-from orchestrator.physics.fluids import FLUIDS, STANDARD_DEG_C
+from orchestrator.physics.fluids import KINDS, PAPER, STANDARD_DEG_C
 from orchestrator.study.units import meant, number
 
 OPTIONS = {
@@ -34,8 +40,8 @@ LAW_HELP = (
 )
 CRITERION_HELP = (
     "what a grain must do: goes on, which is to leave its pocket in a gust and to hop "
-    "on after it; leaves, its pocket; default: leaves in the paper's fluid and by the "
-    "law paper, goes on in all others"
+    "on after it; leaves, its pocket; default: leaves in the fluid paper and by the "
+    "laws paper, low and high, goes on in all others"
 )
 
 
@@ -63,8 +69,9 @@ def add(commands: Any) -> None:
             required=name == "diameter",
             metavar="X",
         )
-    names = ", ".join(FLUIDS)
-    text = f"{names}: its density and viscosity at --temperature; default the paper's"
+    names = ", ".join(KINDS)
+    text = f"{names}: its density and viscosity at --temperature; without any of "
+    text += f"these: {PAPER}"
     command.add_argument("--fluid", metavar="NAME", help=text)
     text = f"of that fluid, deg C, one number; default {STANDARD_DEG_C:g}"
     command.add_argument("--temperature", type=number, metavar="T", help=text)
@@ -91,7 +98,7 @@ def _help(name: str) -> str:
     if isinstance(default, float):
         default = f"{default:g}"
     if default is not None:
-        of_paper = ", that of the paper's fluid" if name in OF_FLUID else ""
+        of_paper = ", that of the paper's gas" if name in OF_FLUID else ""
         parts.append(f"default {default}{of_paper}")
     return "; ".join(parts)
 
@@ -137,7 +144,10 @@ def _run(options: argparse.Namespace) -> int:
         print(as_json(rows))
     else:
         varied = [name for name, axis in axes.items() if len(axis) > 1]
-        print("\n".join(as_text(rows, options.law, varied, options.fluid)))
+        fluid = options.fluid
+        if not OF_FLUID.keys() & axes.keys():
+            fluid = fluid or PAPER
+        print("\n".join(as_text(rows, options.law, varied, fluid)))
     return 0
 
 

@@ -123,7 +123,7 @@ def as_text(
     varied
         The parameters that are ranges, keys of `PARAMETERS`.
     fluid
-        Name of the fluid, if one was given.
+        Name of the fluid; None of one by its numbers.
 
     Yields
     ------
@@ -135,9 +135,9 @@ def as_text(
     else:
         yield from _of_one(rows)
     fluids = {(row["rho_f_kg_m3"], row["nu_m2_s"]) for row in rows}
-    if fluid or fluids == {PAPER}:
+    if fluid and len(fluids) == 1:
         ((density, viscosity),) = fluids
-        name = fluid or "the paper's fluid (real air: --fluid air)"
+        name = "the paper's gas (real air: --fluid air)" if fluid == PAPER else fluid
         yield f"{name}: {density:g} kg/m3, {viscosity:.5g} m2/s"
     liquid = [row for row in rows if row["rho_f_kg_m3"] >= GAS_BELOW]
     if any(_is_nan(row["depth_m"]) for row in liquid):

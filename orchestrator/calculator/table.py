@@ -14,6 +14,7 @@ from orchestrator.calculator import (
     CRITERIA,
     GOES_ON,
     LEAVES,
+    OF_FLUID,
     PARAMETERS,
     QUANTITIES,
 )
@@ -21,7 +22,6 @@ from orchestrator.errors import InputError
 from orchestrator.physics import saltation
 from orchestrator.physics.beside import beside
 from orchestrator.physics.constants import GAS_BELOW, GRAIN_COLUMNS
-from orchestrator.physics.fluids import PAPER as PAPER_FLUID
 from orchestrator.physics.laws import LAWS, Exposure, law
 from orchestrator.physics.threshold import (
     AUTO,
@@ -44,6 +44,8 @@ from orchestrator.types import BoolArray, FloatArray, Row
 
 Table = dict[str, NDArray[Any]]
 """Columns of equal length by their names."""
+OF_PAPER = (PAPER, *LAWS_OF["transition"])
+"""Laws of the paper, which are of grains that leave their pockets."""
 NO_START = f"not reached: no flow up to a Shields number of {saltation.MOST:g} does it"
 NO_END = "not reached: hops have no end, or go on without a flow"
 """Why a grain has no threshold of going on."""
@@ -60,7 +62,8 @@ def thresholds(
     ----------
     points
         Sequences of equal length by keys of `PARAMETERS`. A parameter that is left out
-        has its default, and the depth none.
+        has its default, and the depth none. Without a number of the fluid it is the
+        paper's gas.
     asked
         The law that is asked for, ``auto`` for the default law, or ``paper`` for the
         paper's rule.
@@ -96,9 +99,9 @@ def thresholds(
     _check_criterion(criterion)
     grains = _grains(points)
     if criterion == BY_FLUID:
-        criterion = _criterion(grains, asked)
-    if criterion == GOES_ON and asked == PAPER:
-        what = "the paper's rule is one of grains that leave their pockets"
+        criterion = _criterion(points, asked)
+    if criterion == GOES_ON and asked in OF_PAPER:
+        what = f"the law {asked} is of grains that leave their pockets"
         remedy = f"take the criterion {LEAVES}, or another law"
         raise InputError(what, "threshold: criterion", remedy)
     if "depth" in points:
@@ -241,11 +244,13 @@ def _block(name: str, at: Threshold, exposure: Exposure, grains: Table) -> Table
     return block
 
 
-def _criterion(grains: Table, asked: str) -> str:
-    """The criterion of grains for which none is asked."""
-    is_paper = grains["fluid_density"] == PAPER_FLUID[0]
-    is_paper &= grains["viscosity"] == PAPER_FLUID[1]
-    return LEAVES if asked == PAPER or is_paper.all() else GOES_ON
+def _criterion(points: Mapping[str, Any], asked: str) -> str:
+    """The criterion of grains for which none is asked.
+
+    A fluid of which a number is given is none of the paper's, whatever the number is.
+    """
+    is_paper = not OF_FLUID.keys() & points.keys()
+    return LEAVES if is_paper or asked in OF_PAPER else GOES_ON
 
 
 class _Hopping(NamedTuple):

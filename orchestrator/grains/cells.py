@@ -23,7 +23,7 @@ from orchestrator.runs.files import canonical_json
 from orchestrator.solvers import liggghts
 from orchestrator.study.closed_form import closed_form
 from orchestrator.study.parts import Grain
-from orchestrator.study.scene import Scene
+from orchestrator.study.scene import READ_LATER, Scene
 from orchestrator.types import FloatArray
 
 LAST = 1.2
@@ -33,7 +33,7 @@ SPACING = 3.0
 """Spacing of the cells across the flow, in diameters of the largest grain: grains of
 two cells never meet."""
 UNUSED: dict[str, Any] = {
-    "threshold": {"fractions", "criterion"},
+    **READ_LATER,
     "method": {"grains": {"final_fraction"}},
 }
 """Fields of the protocol that mean nothing to one grain."""
@@ -294,6 +294,6 @@ def batches(scenes: Iterable[Scene]) -> Iterator[SingleGrainCase]:
         )
         groups.setdefault(canonical_json(alike), []).append(scene)
     for _, group in sorted(groups.items()):
-        members = sorted(group, key=lambda scene: scene.id)
+        members = sorted(group, key=lambda scene: scene.digest)
         for start in range(0, len(members), BLOCK):
             yield SingleGrainCase(tuple(members[start : start + BLOCK]))

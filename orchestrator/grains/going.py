@@ -137,7 +137,8 @@ class GoingCase(Case):
     @property
     def parameters(self) -> dict[str, Any]:
         """The scene, but for what only the reading of the results depends on."""
-        return self.scene.model_dump(mode="json", exclude={"threshold": {"fractions"}})
+        unused = {"fluid": {"kind"}, "threshold": {"fractions"}}
+        return self.scene.model_dump(mode="json", exclude=unused)
 
     @property
     def cost_s(self) -> float:

@@ -37,7 +37,7 @@ from orchestrator.runs.case import Case
 from orchestrator.solvers import liggghts
 from orchestrator.study.criterion import GOES_ON
 from orchestrator.study.parts import Gusts
-from orchestrator.study.scene import BEYOND_ASKED, Scene
+from orchestrator.study.scene import BEYOND_ASKED, READ_LATER, Scene
 from orchestrator.types import BoolArray, FloatArray
 
 MARGIN = 3.0
@@ -184,9 +184,7 @@ class WornFlow(Case):
     @property
     def parameters(self) -> dict[str, Any]:
         """The scene, but for what only the reading of the results depends on."""
-        return self.scene.model_dump(
-            mode="json", exclude={"threshold": {"fractions", "criterion"}}
-        )
+        return self.scene.model_dump(mode="json", exclude=READ_LATER)
 
     @property
     def cost_s(self) -> float:
@@ -481,9 +479,7 @@ class PileCase(GrainCase):
     @property
     def parameters(self) -> dict[str, Any]:
         """The scene, but for what only the reading of the results depends on."""
-        asked = self.scene.model_dump(
-            mode="json", exclude={"threshold": {"fractions", "criterion"}}
-        )
+        asked = self.scene.model_dump(mode="json", exclude=READ_LATER)
         asked["method"]["grains"]["final_fraction"] = self.scene.last_fraction
         if self.scene.threshold.update:
             asked["threshold"]["goal"] = goal_part(self.scene, self.flow)

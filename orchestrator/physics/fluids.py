@@ -6,15 +6,21 @@ Sharqawy et al., Desalin. Water Treat. 16, 354 (2010), Eq. 22; U.S. Standard Atm
 (1976).
 """
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 from orchestrator.errors import InputError, suggestion
 
-PAPER = (1.0, 1e-5)
-"""The paper's fluid, the default: density, kg/m3, and viscosity, m2/s.
+PAPER = "paper"
+"""The paper's gas, by its name: in it a grain has moved when it has left its pocket.
 
-It is no air of 15 deg C."""
+The word decides that, and no number does."""
+NUMBERS_OF_PAPER = (1.0, 1e-5)
+"""Density, kg/m3, and viscosity, m2/s, of the paper's gas, which is no air of 15 deg
+C. They are the defaults of a fluid of which one number is given, too."""
+ALIKE = 0.005
+"""Relative difference up to which two numbers are told with the same three digits."""
 STANDARD_DEG_C = 15.0
 """Temperature of a fluid that is named without one, as in the standard atmosphere."""
 SALINITY = 35.0
@@ -119,6 +125,34 @@ FLUIDS = {
     "air": (air, -80, 100),
 }
 """By name the properties, and the temperatures, deg C, where the formulas hold."""
+KINDS = (*FLUIDS, PAPER)
+"""Fluids that have a name."""
+
+
+def is_like_paper(density: float, viscosity: float) -> bool:
+    """Say whether the numbers of a fluid are told like those of the paper's gas.
+
+    Only words may depend on it.
+
+    Parameters
+    ----------
+    density
+        Density, kg/m3.
+    viscosity
+        Kinematic viscosity, m2/s.
+
+    Returns
+    -------
+    bool
+        Whether they differ by less than the digits that are told.
+
+    Examples
+    --------
+    >>> is_like_paper(1.0, 1e-5), is_like_paper(1.0, 1.00001e-5)
+    (True, True)
+    """
+    pairs = zip((density, viscosity), NUMBERS_OF_PAPER, strict=True)
+    return all(math.isclose(one, other, rel_tol=ALIKE) for one, other in pairs)
 
 
 def numbers_of(table: Mapping[str, Any]) -> dict[str, Any]:
@@ -128,13 +162,14 @@ def numbers_of(table: Mapping[str, Any]) -> dict[str, Any]:
     ----------
     table
         A `kind` with its temperature, deg C, or a density (kg/m3) and a viscosity
-        (m2/s).
+        (m2/s). The paper's gas may have other numbers than its own.
 
     Returns
     -------
     dict
         The table with density and viscosity. Those of a kind have five digits, so that
-        who writes them by hand asks for the same scene.
+        who writes them by hand asks for the same scene. The word of the paper's gas
+        stays, since it decides what counts as motion.
 
     Raises
     ------
@@ -146,14 +181,21 @@ def numbers_of(table: Mapping[str, Any]) -> dict[str, Any]:
     --------
     >>> numbers_of({"kind": "water"})
     {'density': 999.1, 'viscosity': 1.1386e-06}
+    >>> numbers_of({"kind": "paper", "viscosity": 1e-3})
+    {'density': 1.0, 'viscosity': 0.001, 'kind': 'paper'}
     """
     rest = dict(table)
-    rest.pop("kind", None)
-    rest.pop(TEMPERATURE, None)
-    if len(rest) == len(table):
+    kind = rest.pop("kind", None)
+    is_warm = rest.pop(TEMPERATURE, None) is not None
+    if kind is None and not is_warm:
         return rest
-    kind = table.get("kind")
     _check_kind(kind)
+    if kind == PAPER:
+        if is_warm:
+            what = "the paper's gas has none"
+            raise InputError(what, f"fluid.{TEMPERATURE}", "leave it out")
+        own = dict(zip(("density", "viscosity"), NUMBERS_OF_PAPER, strict=True))
+        return {**own, **rest, "kind": PAPER}
     temperature = table.get(TEMPERATURE, STANDARD_DEG_C)
     _check_temperature(temperature, str(kind))
     for name in ("density", "viscosity"):
@@ -169,12 +211,12 @@ def numbers_of(table: Mapping[str, Any]) -> dict[str, Any]:
 
 def _check_kind(kind: object) -> None:
     """Refuse a fluid that has no formulas."""
-    if kind in [*FLUIDS]:
+    if kind in [*KINDS]:
         return
     what = f"no formulas of {kind!r} are here"
     if kind is None:
         what = "a temperature needs it"
-    names = suggestion(str(kind), FLUIDS) or f"choose {', '.join(FLUIDS)}"
+    names = suggestion(str(kind), KINDS) or f"choose {', '.join(KINDS)}"
     remedy = f"{names}; of others give density and viscosity"
     raise InputError(what, "fluid.kind", remedy)
 

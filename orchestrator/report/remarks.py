@@ -10,7 +10,6 @@ from orchestrator.digits import percent
 from orchestrator.fidelity import spread
 from orchestrator.fidelity.limits import FROZEN_BED
 from orchestrator.physics.beside import ROW_HOLD
-from orchestrator.physics.fluids import PAPER
 from orchestrator.physics.velocity import log_law_speed
 from orchestrator.report import counted, labels, sheets, single, theory
 from orchestrator.report.card import Remark
@@ -24,8 +23,8 @@ MOST = 6
 """Remarks up to which those are added that are true of every study of a kind."""
 PAPER_FLUID = Remark(
     "The gas is not quite air.",
-    "The gas is that of the paper, 1 kg/m³ and 1e-5 m²/s. For real air write "
-    '`fluid.kind = "air"`.',
+    "The gas is that of the paper, of 1 kg/m³, in which a grain has moved when it has "
+    'left its pocket. For real air write `fluid.kind = "air"`.',
 )
 ROUGHER_M = (1e-4, 1e-3)
 """Roughness lengths of ground over which the wind is told, too, m: of rippled sand, and
@@ -63,8 +62,7 @@ def remarks(results: Results) -> list[Remark]:
     said += _usable(table)
     if len(piles):
         said += _of_piles(results, piles)
-    scenes = results.scenes
-    if PAPER in zip(scenes["rho_f_kg_m3"], scenes["nu_m2_s"], strict=True):
+    if any(scene.fluid.is_paper for scene in results.study.scenes):
         said.append(PAPER_FLUID)
     usual = [FIRST_MOTION]
     if table["rho_f_kg_m3"].map(is_gas).any():

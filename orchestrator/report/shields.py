@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 
 from orchestrator.physics import curves
 from orchestrator.physics.beside import FIELD
-from orchestrator.physics.fluids import PAPER
+from orchestrator.physics.fluids import ALIKE, NUMBERS_OF_PAPER
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import MEASURED_SOURCE
 from orchestrator.report import labels, style, theory
@@ -442,7 +442,8 @@ def draw_published(
             look: Look = {"color": colour, "ls": AIR_STYLES[name], "lw": 0.8}
             ax.plot(*points, label=label, zorder=1.5, **look)
     is_air = theory.in_gas(scenes).all()
-    is_of_paper = (scenes["rho_f_kg_m3"] == PAPER[0]).any()
+    densities = scenes["rho_f_kg_m3"]
+    is_of_paper = np.isclose(densities, NUMBERS_OF_PAPER[0], rtol=ALIKE, atol=0).any()
     if is_air and not is_sloped:
         _draw_field(ax, xlim)
     # the paper sets its own gas beside water

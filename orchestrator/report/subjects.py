@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 from orchestrator.physics.constants import GAS_BELOW
-from orchestrator.physics.fluids import PAPER
+from orchestrator.physics.fluids import is_like_paper
 from orchestrator.study.profile import Profile
 
 SIZES = (
@@ -112,11 +112,11 @@ def fluid(density: float, viscosity: float) -> str:
     Examples
     --------
     >>> fluid(1.225, 1.46e-5), fluid(1000.0, 1e-6), fluid(1.0, 1e-5)
-    ('air', 'water', "the paper's gas (1 kg/m³, 1e-05 m²/s), close to air")
+    ('air', 'water', "a gas like the paper's (1 kg/m³, 1e-05 m²/s), close to air")
     """
     numbers = f"{density:g} kg/m³, {viscosity:.3g} m²/s"
-    if (density, viscosity) == PAPER:
-        return f"the paper's gas ({numbers}), close to air"
+    if is_like_paper(density, viscosity):
+        return f"a gas like the paper's ({numbers}), close to air"
     for name, (densities, viscosities) in (("air", AIR), ("water", WATER)):
         is_dense = densities[0] <= density <= densities[1]
         is_viscous = viscosities[0] <= viscosity <= viscosities[1]

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orchestrator.physics import saltation
-from orchestrator.physics.fluids import PAPER
 from orchestrator.study.closed_form import closed_form
 from orchestrator.study.parts import GrainBed
 from orchestrator.study.question import why_not_going_on
@@ -35,18 +34,18 @@ def goes_on(scene: Scene) -> bool:
     -------
     bool
         Whether it asks for that, or leaves the criterion open in a fluid that is not
-        the paper's, with equal grains and forces of which going on is known.
+        the paper's by its name, without a mixture, and with forces of which going on is
+        known. No number decides it: thresholds do not jump along an axis.
     """
     criterion = scene.threshold.criterion
     if criterion != AUTO:
         return criterion == GOES_ON
     if scene.flow.gusts is not None or _is_followed(scene):
         return False
-    if (scene.fluid.density, scene.fluid.viscosity) == PAPER:
+    if scene.fluid.is_paper or scene.grain.sizes is not None:
         return False
-    is_of_its_like = scene.grain.sizes is None and scene.bed.relative_size == 1
     is_alone = scene.forces.sheltering != "balanced"
-    return is_of_its_like and is_alone and not why_not_going_on(scene)
+    return is_alone and not why_not_going_on(scene)
 
 
 def _is_followed(scene: Scene) -> bool:

@@ -7,15 +7,16 @@ Every part is frozen and validated. How the question is answered is in `method`.
 
 from functools import partial
 from math import log, radians, tan
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 import pydantic
 from numpy.typing import ArrayLike
-from pydantic import Field, InstanceOf, PlainSerializer
+from pydantic import Field, InstanceOf, PlainSerializer, model_validator
 
 from orchestrator.digits import rounded
 from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
+from orchestrator.physics.fluids import PAPER
 from orchestrator.physics.laws import LAWS
 from orchestrator.study.declare import (
     Fraction,
@@ -109,11 +110,17 @@ _poured = partial(field, scope="poured beds", since=True)
 class Fluid(Part):
     """A kind of fluid, or its numbers.
 
-    The kinds are "water", "seawater" and "air", with `temperature_deg_c` (15).
+    The kinds are "water", "seawater" and "air", with `temperature_deg_c` (15), and
+    "paper", the paper's gas of 1 kg/m³ and 1e-5 m²/s, which is no air of 15 °C.
 
-    The default is the paper's fluid, which is no air of 15 °C.
+    In the paper's gas a grain has moved when it has left its pocket; in all other
+    fluids, whatever their numbers, when it also goes on (`threshold.criterion`). A file
+    that gives neither a kind nor a density nor a viscosity is of the paper's gas. One
+    that gives a number has a fluid by its numbers, unless it writes "paper" as well.
     """
 
+    kind: Literal["paper"] | None = field(None, column="fluid", since=True)
+    """"paper" for the paper's gas; the other kinds stand for their numbers"""
     # from the vapour that ripples a comet to mercury, 13,500, and melts of metals
     density: float = field(
         1.0,
@@ -131,6 +138,20 @@ class Fluid(Part):
         GRAVITY, symbol="g", unit="m/s²", column="g_m_s2", ge=1e-6, le=1e4
     )
     """acceleration of gravity"""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _is_of_paper(cls, given: Any) -> Any:
+        """Take the paper's gas where nothing is said of the fluid."""
+        told = {"kind", "density", "viscosity"}
+        if isinstance(given, dict) and not told & given.keys():
+            return {**given, "kind": PAPER}
+        return given
+
+    @property
+    def is_paper(self) -> bool:
+        """Whether it is the paper's gas, by its name."""
+        return self.kind == PAPER
 
 
 class Sphere(Part):
@@ -541,9 +562,9 @@ class Threshold(Part):
     """displacement along the bed from which a grain counts as moved"""
     criterion: Literal["auto", "leaves", "goes on"] = field("auto", since=True)
     """what a grain must do
-    - auto: goes on in every fluid but the paper's; leaves where a field of the scene
-      rules hops out: unlike grains, gusts, shared stress, a bed that changes, the laws
-      of the paper, a single grain by DEM
+    - auto: leaves in the paper's gas (`fluid.kind`); in every other fluid goes on, or
+      leaves where a field of the scene rules hops out: a mixture, gusts, shared stress,
+      a bed that changes, the laws of the paper, a single grain by DEM
     - leaves: leave its pocket in the flow, as in the paper
     - goes on: leave it in a gust of 2.28 times the mean stress, and hop on after it"""
     fractions: Annotated[tuple[Fraction, ...], List] = _pile(

@@ -2,7 +2,7 @@
 
 import re
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -34,6 +34,11 @@ to 2 %, at 0.0002 by half."""
 BEYOND_ASKED = 0.05
 """Part of the grains beyond the largest fraction asked for that a run of DEM goes on:
 half a grain of ten."""
+READ_LATER: dict[str, Any] = {
+    "fluid": {"kind"},
+    "threshold": {"fractions", "criterion"},
+}
+"""Fields that no run of a solver depends on, only the reading of its results."""
 LEFT_OPEN_METHOD = 'leave it out, or method.kind = "pivot"'
 CLOSED = ("pivot", "local")
 """Methods without contacts: nothing that moves changes the bed."""
@@ -52,6 +57,12 @@ class Scene(Question):
     def _method_fits(self) -> Self:
         _check(self)
         return self
+
+    @cached_property
+    def digest(self) -> str:
+        """Digest of all that a run may depend on: of the fluid its numbers alone."""
+        asked = self.model_dump(mode="json", exclude={"fluid": {"kind"}})
+        return digest_text(canonical_json(asked))[:12]
 
     @cached_property
     def id(self) -> str:

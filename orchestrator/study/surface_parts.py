@@ -9,7 +9,6 @@ from typing import Annotated, Literal, Self, get_args
 
 from pydantic import Field, InstanceOf, model_validator
 
-from orchestrator.physics.fluids import PAPER as PAPER_FLUID
 from orchestrator.physics.threshold import AUTO, PAPER, SingleGrain, usual_law
 from orchestrator.study.declare import Height, Part, Roughness, UnfitError, Viscosity
 from orchestrator.study.declare import field as declared
@@ -201,8 +200,8 @@ class SurfaceScene(Part):
 
     @property
     def is_natural(self) -> bool:
-        """Whether its fluid is not the paper's, in which nothing is measured."""
-        return (self.fluid.density, self.fluid.viscosity) != PAPER_FLUID[:2]
+        """Whether its fluid is not the paper's gas, in which nothing is measured."""
+        return not self.fluid.is_paper
 
     @property
     def grain_in_pocket(self) -> SingleGrain:

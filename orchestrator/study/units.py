@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from orchestrator.errors import InputError
 from orchestrator.physics.constants import GAS_BELOW
-from orchestrator.physics.fluids import PAPER
+from orchestrator.physics.fluids import ALIKE, NUMBERS_OF_PAPER
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?|[+-]?inf|nan", re.ASCII | re.I)
 DECIMAL_COMMA = re.compile(r"([+-]?\d+),(\d+(?:e[+-]?\d+)?)", re.ASCII | re.I)
@@ -256,7 +256,8 @@ def _of_fluid(
     pairs = zip(densities, values.get("fluid.viscosity", ()), strict=False)
     for density, viscosity in dict.fromkeys(pairs):
         low, high = USUAL_PA_S[density < GAS_BELOW]
-        is_of_air = density >= GAS_BELOW and viscosity == PAPER[1]
+        like_gas = math.isclose(viscosity, NUMBERS_OF_PAPER[1], rel_tol=ALIKE)
+        is_of_air = density >= GAS_BELOW and like_gas
         is_usual = low <= density * viscosity <= high and not is_of_air
         if density > 0 and viscosity > 0 and not is_usual:
             dynamic = f"{viscosity:g} m2/s, or {density * viscosity:.3g} Pa s"

@@ -328,7 +328,7 @@ def test_a_grain_that_cannot_hop_is_turned_over_by_the_mean_stress(run: Run) -> 
 def test_the_papers_rule_has_no_grains_that_go_on(run: Run) -> None:
     code, _, err = run(*D, "--law", "paper", "--criterion", "goes on")
     assert code == 2
-    assert "--criterion: the paper's rule is one of grains that leave" in err
+    assert "--criterion: the law paper is of grains that leave" in err
 
 
 def test_the_forces_on_a_grain_that_goes_on_are_those_of_the_gust(run: Run) -> None:

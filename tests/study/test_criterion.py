@@ -52,8 +52,8 @@ def _scene(text: str) -> Scene:
         (SAND + WATER + '[forces]\nlaw = "paper"\n', False),
         # as `threshold` does: cohesion holds a grain in its pocket, not in its hops
         (SAND + "cohesion = 1e-5\n" + WATER, True),
-        # unlike grains, and those that share the stress, by request alone
-        (SAND + WATER + "[bed]\nrelative_size = 2.0\n", False),
+        # mixtures, and grains that share the stress, by request alone
+        (SAND + WATER + "[bed]\nrelative_size = 2.0\n", True),
         (SAND + WATER + MIXTURE, False),
         (SAND + WATER + STRIP, True),
         (SAND + WATER + STRIP + SHARING, False),
@@ -217,3 +217,92 @@ def test_a_criterion_that_is_written_is_answered_as_where_it_is_left_open(
     left, written = answers
     assert written.scene == left.scene
     assert (written.fidelity, written.why) == (left.fidelity, left.why)
+
+
+BY_NUMBERS = (9.9e-6, 1e-5, 1.00001e-5, 1.01e-5)
+"""Viscosities around that of the paper's gas, m2/s."""
+
+
+def _shields_over(axis: str, values: tuple[float, ...], text: str = "") -> np.ndarray:
+    """Thresholds of single grains along an axis, as a study answers them."""
+    listed = f'[method]\nkind = "pivot"\n[axes]\n"{axis}" = {[*values]}\n'
+    made = study.parse(SAND + text + listed, name="one", where="one")
+    found = []
+    for scene in made.scenes:
+        answer = decide(scene, None).scene
+        assert answer.threshold.criterion == "goes on"
+        found.append(float(of_single_grain(answer).shields[0]))
+    return np.array(found)
+
+
+def test_no_number_of_the_fluid_switches_the_criterion() -> None:
+    shields = _shields_over("fluid.viscosity", BY_NUMBERS)
+    assert shields[2] == pytest.approx(shields[1], rel=1e-4)
+    # 1 % of viscosity moves the threshold by no more
+    assert np.abs(np.diff(np.log(shields))).max() < 0.01
+    # and so says `threshold`, row by row
+    for criterion in ("auto", "goes on"):
+        rows = orchestrator.threshold(
+            3.5e-4, density=2650.0, viscosity=BY_NUMBERS, criterion=criterion
+        )
+        assert rows["shields"].to_numpy() == pytest.approx(shields, rel=1e-6)
+    alone = orchestrator.threshold(3.5e-4, density=2650.0, viscosity=1e-5)
+    assert alone["shields"][0] == pytest.approx(shields[1], rel=1e-6)
+
+
+def test_no_size_switches_the_criterion() -> None:
+    sizes = (0.99, 1.0, 1.01)
+    shields = _shields_over("bed.relative_size", sizes, WATER)
+    assert np.abs(np.diff(np.log(shields))).max() < 0.05
+
+
+PAPER_GAS = '[fluid]\nkind = "paper"\n'
+
+
+@pytest.mark.filterwarnings("ignore:.*is unusual for")
+@pytest.mark.parametrize(
+    ("fluid", "criterion"),
+    [
+        ("", "leaves"),
+        (PAPER_GAS, "leaves"),
+        (PAPER_GAS + "viscosity = 1e-3\n", "leaves"),
+        ("[fluid]\ngravity = 3.71\n", "leaves"),
+        ("[fluid]\nviscosity = 1e-5\n", "goes on"),
+        ("[fluid]\ndensity = 1.0\n", "goes on"),
+        ("[fluid]\ndensity = 1.0\nviscosity = 1e-5\n", "goes on"),
+    ],
+)
+def test_the_word_of_the_fluid_decides(fluid: str, criterion: str) -> None:
+    scene = _scene(SAND + fluid)
+    assert goes_on(scene) is (criterion == "goes on")
+    # a field that is changed leaves the fluid what it is
+    other = changed(scene, {"fluid.viscosity": 2e-5})
+    assert goes_on(other) is goes_on(scene)
+    table = dict(scene.fluid)
+    rows = orchestrator.threshold(
+        3.5e-4,
+        density=2650.0,
+        fluid=scene.fluid.kind,
+        fluid_density=table["density"],
+        viscosity=table["viscosity"],
+        gravity=table["gravity"],
+    )
+    assert ("decides" in rows) is (criterion == "goes on")
+
+
+def test_the_papers_gas_by_its_word_is_that_without_a_fluid() -> None:
+    by_word = _scene(SAND + PAPER_GAS)
+    assert by_word == _scene(SAND)
+    by_numbers = _scene(SAND + "[fluid]\ndensity = 1.0\nviscosity = 1e-5\n")
+    # another answer, of the same run
+    assert by_word.id != by_numbers.id
+    assert by_word.digest == by_numbers.digest
+    rows = orchestrator.threshold([2e-4, 1e-3], fluid="paper")
+    assert rows.equals(orchestrator.threshold([2e-4, 1e-3]))
+
+
+@pytest.mark.parametrize("law", ["bridged", "profile", "low", "high", "paper"])
+def test_a_law_has_one_criterion_in_a_study_and_in_threshold(law: str) -> None:
+    scene = _scene(f'{SAND}{WATER}[forces]\nlaw = "{law}"\n')
+    rows = orchestrator.threshold(3.5e-4, density=2650.0, fluid="water", law=law)
+    assert ("decides" in rows) is goes_on(scene)

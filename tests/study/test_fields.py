@@ -72,6 +72,8 @@ def other_value(quantity: Quantity, scene: Scene) -> Any:
         return LogNormal(sigma_g=1.3)
     if quantity.name == "flow.gusts":
         return Gusts(intensity=0.4, events=100)
+    if quantity.name == "fluid.kind":
+        return None  # a fluid by its numbers
     if isinstance(value, str):
         words = quantity.info.choices or get_args(declaration(quantity).annotation)
         return next(word for word in words if word not in (value, "paper"))
