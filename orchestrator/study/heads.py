@@ -100,20 +100,20 @@ def in_metres(names: Sequence[str]) -> str:
     return ""
 
 
-def more_cells(header: Sequence[str], cells: int) -> str:
+def more_cells(cells: int, of_head: int) -> str:
     """Say that a line has more cells than the head of its table.
 
     Parameters
     ----------
-    header
-        The names of the columns.
     cells
         How many cells the line has.
+    of_head
+        How many the head has, or the first line of a table without one.
 
     Returns
     -------
     str
         What is wrong with the line.
     """
-    what = f"{cells} cells, the head has {len(header)}"
+    what = f"{cells} cells, the head has {of_head}"
     return f"{what}: a decimal comma? Write a decimal point"

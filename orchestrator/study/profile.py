@@ -402,7 +402,7 @@ def read_columns(
             pair = [_cell(row, column) for column in columns]
             if None in row:
                 cells = len(reader.fieldnames) + len(row[None])
-                raise ValueError(more_cells(reader.fieldnames, cells))
+                raise ValueError(more_cells(cells, len(reader.fieldnames)))
             lines.append(reader.line_num)
             values.append(pair)
     except (ValueError, csv.Error) as error:

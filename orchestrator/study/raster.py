@@ -4,17 +4,19 @@ Heights are read from XYZ, ESRI ASCII grid, GeoTIFF and STL.
 """
 
 import io
+import itertools
 import warnings
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from itertools import islice
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from orchestrator.errors import InputError
+from orchestrator.study import epsg
+from orchestrator.study.points import read_points
 from orchestrator.study.source import decoded, read_bytes
 from orchestrator.study.surface import (
     FEWEST,
@@ -24,27 +26,43 @@ from orchestrator.study.surface import (
     Tags,
     checked,
 )
-from orchestrator.types import FloatArray, IntArray
+from orchestrator.types import FloatArray
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
 LARGEST = 2**28
 """Most bytes of a file."""
-UNEVEN = 1e-3
-"""Largest difference of two steps of an axis, over the step."""
 STL_HEAD, STL_TRIANGLE = 84, 50
 """Bytes of the head of a binary STL file, and of each of its triangles."""
 SCALE, TIE_POINT, TRANSFORMATION = 33550, 33922, 34264
-KEYS, KEY_NUMBERS, KEY_TEXTS, NODATA = 34735, 34736, 34737, 42113
-"""Tags of a GeoTIFF (OGC 19-008r4), and GDAL's for cells without a height."""
+KEYS, KEY_NUMBERS, KEY_TEXTS = 34735, 34736, 34737
+METADATA, NODATA = 42112, 42113
+"""Tags of a GeoTIFF (OGC 19-008r4), GDAL's for its metadata, and for cells without a
+height."""
 MODEL, PIXEL, LENGTH_UNIT, HEIGHT_UNIT = 1024, 1025, 3076, 4099
-"""Keys of a GeoTIFF: kind of the axes, what a pixel is, and units."""
+PROJECTED, VERTICAL = 3072, 4096
+"""Keys of a GeoTIFF: kind of the axes, what a pixel is, units, and EPSG codes of the
+coordinate systems on the ground and of the heights."""
 DEGREES, POINT, METRE = 2, 2, 9001
 FEET = {9002: 0.3048, 9003: 1200 / 3937}
 """Units of a GeoTIFF in feet, m."""
+FOOT = 0.305
+"""All feet to three digits, m."""
 GRID_KEYS = ("ncols", "nrows", "cellsize")
-POINT_REMEDY = "x, y and z in m, with a decimal point"
+CORNERS, CENTRES = ("xllcorner", "yllcorner"), ("xllcenter", "yllcenter")
+EMPTY = "nodata_value"
+"""Keys of the head of an ESRI grid."""
+ONE_OF = (("cellsize", "dx"), ("cellsize", "dy"), *zip(CENTRES, CORNERS, strict=True))
+"""Keys of a grid of which one alone may stand there."""
+NEAR_EMPTY = 1e-6
+"""Largest difference of an empty cell from the number of empty cells, over that."""
+DEEPEST, HIGHEST = 9000.0, 1e9
+"""Depth below which and height above which no ground lies, m, in whatever unit."""
+UNNAMED_EMPTY = "-9999"
+"""What stands in an empty cell of a grid whose head does not say it."""
+METRES = ("", "m", "metre", "metres", "meter", "meters")
+"""GDAL's words for the unit of heights that are in metres."""
 FORMATS = ".tif .tiff (GeoTIFF), .asc (ESRI), .xyz .csv .txt (x y z), .stl"
 BARE_TAGS: Tags = {
     KEYS: (1, 1, 0, 1, PIXEL, 0, 1, 1),
@@ -82,51 +100,89 @@ def read_surface(path: Path, where: str) -> Surface:
     elif ending == ".asc":
         raster = _of_grid(decoded(content, where), path.name, where)
     elif ending in (".xyz", ".csv", ".txt"):
-        raster = _of_points(decoded(content, where), path.name, where)
+        raster = read_points(decoded(content, where), path.name, where)
     elif ending == ".stl":
         _check_stl(content, where)
         raster = _of_triangles(path, where)
     else:
         what = f"the ending {ending!r} is of no surface"
         raise InputError(what, where, f"endings: {FORMATS}")
+    _check_heights(raster.z, where)
     return checked(raster, where)
+
+
+def _check_heights(z: FloatArray, where: str) -> None:
+    """Refuse heights that no ground has, and that stand for no height."""
+    for value in (float(np.nanmin(z, initial=0.0)), float(np.nanmax(z, initial=0.0))):
+        if not -DEEPEST <= value <= HIGHEST and np.isfinite(value):
+            what = f"{value:.6g} in {int((z == value).sum())} cells"
+            what = f"{what} looks like a cell without a height"
+            remedy = "leave such points out, or name the number as NODATA: gdal_edit"
+            raise InputError(what, where, f"{remedy} -a_nodata, or the head of an .asc")
 
 
 def _of_grid(text: str, name: str, where: str) -> Raster:
     """The raster of an ESRI ASCII grid, whose rows run from north to south."""
     lines = text.splitlines()
-    header = _head_of_grid(lines, where)
+    header, empty = _head_of_grid(lines, where)
     columns = header["ncols"]
     rows = header["nrows"]
-    values = _numbers(lines[len(header) :], len(header), where)
+    before = len(header) + bool(empty)
+    values = _numbers(lines[before:], before, empty, where)
     is_whole = columns % 1 == 0 and columns * rows == len(values)
     if not (is_whole and min(columns, rows) >= FEWEST):
         what = f"{len(values)} heights, not {columns:.9g} x {rows:.9g}"
         remedy = f"nrows lines of ncols numbers, {FEWEST} of each at least"
         raise InputError(what, where, remedy)
     heights = np.array(values).reshape(int(rows), int(columns))[::-1]
-    heights = np.where(heights == header.get("nodata_value", -9999.0), np.nan, heights)
+    heights = _without(heights, empty or UNNAMED_EMPTY)
     x = _axis_of_grid("x", int(columns), header, where)
     y = _axis_of_grid("y", int(rows), header, where)
     return Raster(name, x, y, heights)
 
 
-def _head_of_grid(lines: list[str], where: str) -> dict[str, float]:
-    """The numbers at the head of a grid by their keys, a line for each."""
+def _without(heights: FloatArray, empty: str) -> FloatArray:
+    """Heights with NaN in the cells that have the number of empty cells.
+
+    It is written in decimal, with fewer digits in the head of a file or in its cells.
+    """
+    if not _is_number(empty):
+        return heights
+    is_empty = np.isclose(heights, float(empty), rtol=NEAR_EMPTY, atol=0.0)
+    return np.where(is_empty, np.nan, heights)
+
+
+def _head_of_grid(lines: list[str], where: str) -> tuple[dict[str, float], str]:
+    """The numbers at the head of a grid by their keys, a line for each.
+
+    Apart from them: what stands in an empty cell, which may be a word.
+    """
     header: dict[str, float] = {}
+    empty = ""
     for line in lines:
         words = line.split()
         if len(words) != 2 or not words[0][0].isalpha():
             break
         key = words[0].lower()
-        if key in header:
+        if key in header or (key == EMPTY and empty):
             raise InputError(f"{key} stands twice", where, "remove one of the lines")
+        if key == EMPTY:
+            empty = words[1]
+            continue
+        if key not in {*GRID_KEYS, *itertools.chain.from_iterable(ONE_OF)}:
+            known = ", ".join((*GRID_KEYS, *CORNERS, *CENTRES, EMPTY))
+            what = f"{words[0]} is no key of a grid"
+            raise InputError(what, where, f"its head has {known}")
         header[key] = _number(words[1], f"{where}: {words[0]}")
     for key in GRID_KEYS:
         if key not in header:
             remedy = "its head has ncols, nrows, xllcorner, yllcorner, cellsize"
             raise InputError(f"{key} is missing", where, remedy)
-    return header
+    for one, other in ONE_OF:
+        if one in header and other in header:
+            what = f"its head has {one} and {other}"
+            raise InputError(what, where, "leave one of the two")
+    return header, empty
 
 
 def _axis_of_grid(
@@ -144,14 +200,19 @@ def _axis_of_grid(
     return _steps(start, step, count)
 
 
-def _numbers(lines: list[str], before: int, where: str) -> list[float]:
-    """The numbers of some lines; `before` lines of the file stand before them."""
+def _numbers(lines: list[str], before: int, empty: str, where: str) -> list[float]:
+    """The numbers of some lines; `before` lines of the file stand before them.
+
+    The word of empty cells is NaN.
+    """
     values: list[float] = []
     for number, line in enumerate(lines, before + 1):
+        words = line.split()
+        if empty and not _is_number(empty):
+            words = ["nan" if word == empty else word for word in words]
         try:
-            values.extend(map(float, line.split()))
+            values.extend(map(float, words))
         except ValueError:
-            words = line.split()
             bad = next(word for word in words if not _is_number(word))
             place = f"{where}: line {number}"
             remedy = "numbers with a decimal point, spaces between them"
@@ -173,113 +234,6 @@ def _number(word: str, where: str) -> float:
     if not _is_number(word):
         raise InputError(f"{word!r} is no number", where, "with a decimal point")
     return float(word)
-
-
-@dataclass(frozen=True)
-class _Lines:
-    """The lines of a file of points."""
-
-    text: str
-    where: str
-
-    def points(self) -> Iterator[tuple[int, list[str]]]:
-        """Number and words of each line but empty ones, comments and the head."""
-        is_head = True
-        for number, line in enumerate(self.text.splitlines(), 1):
-            words = _spaced(line).split()
-            if not words or words[0].startswith("#"):
-                continue
-            is_head = is_head and not all(map(_is_number, words))
-            if not is_head:
-                yield number, words
-
-    def refusal(self, point: int, what: str, remedy: str) -> InputError:
-        """The refusal of a point; they are counted from 0."""
-        number, _ = next(islice(self.points(), point, None))
-        return InputError(what, f"{self.where}: line {number}", remedy)
-
-    def check_head(self) -> int:
-        """The number of the line of the first point; an `InputError` for its head."""
-        first, _ = next(self.points(), (1, []))
-        for number, line in enumerate(islice(self.text.splitlines(), first - 1), 1):
-            names = [word.strip("\"'#").lower() for word in _spaced(line).split()]
-            if {*"xyz"} <= {*names} and names[:3] != [*"xyz"]:
-                what = f"the columns are {', '.join(names)}"
-                place = f"{self.where}: line {number}"
-                raise InputError(what, place, "the first three must be x, y and z")
-        return first
-
-    def wrong(self) -> InputError:
-        """The refusal of the first line that is no point."""
-        for number, words in self.points():
-            if len(words) < 3 or not all(map(_is_number, words[:3])):
-                what = f"{' '.join(words)!r} is no point"
-                return InputError(what, f"{self.where}: line {number}", POINT_REMEDY)
-        return InputError("its lines are no points", self.where, POINT_REMEDY)
-
-
-def _spaced(text: str) -> str:
-    """A text with spaces for commas and semicolons."""
-    return text.replace(",", " ").replace(";", " ")
-
-
-def _of_points(text: str, name: str, where: str) -> Raster:
-    """The raster of lines x y z, whose points lie on a grid in any order."""
-    lines = _Lines(text, where)
-    first = lines.check_head()
-    stream = io.BytesIO(_spaced(text).encode())
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # an empty file is refused below
-            points = np.loadtxt(stream, skiprows=first - 1, usecols=(0, 1, 2), ndmin=2)
-    except ValueError:
-        raise lines.wrong() from None
-    is_place = np.isfinite(points[:, :2]).all(axis=1)
-    if not is_place.all():
-        what = "x or y is not a number"
-        raise lines.refusal(int(is_place.argmin()), what, POINT_REMEDY)
-    if len(points) < FEWEST**2:
-        what = f"{len(points)} points are no surface"
-        raise InputError(what, where, "x, y and z in m, a point in each line")
-    return _on_grid(points, lines, name)
-
-
-def _on_grid(points: FloatArray, lines: _Lines, name: str) -> Raster:
-    """The raster of points that lie on a grid, NaN where there is none."""
-    along_x, column = _grid_axis(points[:, 0], "x", lines)
-    along_y, row = _grid_axis(points[:, 1], "y", lines)
-    if len(along_x) * len(along_y) > MOST_NODES:
-        what = f"{len(along_x)} x {len(along_y)} cells are more than {MOST_NODES}"
-        raise InputError(what, lines.where, "put them on a grid of larger cells")
-    _, first, counts = np.unique(
-        row * len(along_x) + column, return_index=True, return_counts=True
-    )
-    if counts.max() > 1:
-        twice = first[int(counts.argmax())]
-        x, y = points[twice, :2]
-        what = f"x = {x:.9g} m, y = {y:.9g} m has two heights"
-        raise lines.refusal(twice, what, "leave one height for each place")
-    heights = np.full((len(along_y), len(along_x)), np.nan)
-    heights[row, column] = points[:, 2]
-    return Raster(name, along_x, along_y, heights)
-
-
-def _grid_axis(
-    values: FloatArray, axis: str, lines: _Lines
-) -> tuple[FloatArray, IntArray]:
-    """An axis of equal steps through some values, and the place of each on it."""
-    found = np.unique(values)
-    step = float(np.diff(found).min(initial=np.inf))
-    places = (values - found[0]) / step
-    nearest = np.round(places).astype(int)
-    count = int(nearest.max()) + 1
-    off = np.abs(places - nearest)
-    worst = int(off.argmax())
-    if off[worst] > UNEVEN * count or count > MOST_NODES:
-        what = f"{axis} = {values[worst]:.9g} m is on no grid of {step:.4g} m"
-        remedy = "put the points on a grid of equal steps, with gdal_grid"
-        raise lines.refusal(worst, what, remedy)
-    return np.linspace(found[0], found[-1], count), nearest
 
 
 def _of_triangles(path: Path, where: str) -> Raster:
@@ -371,12 +325,10 @@ def _of_geotiff(content: bytes, name: str, where: str) -> Raster:
     heights = np.array(image, float)[::-1]
     tags: Any = getattr(image, "tag_v2", {})
     kept = {key: tags[key] for key in (KEYS, KEY_NUMBERS, KEY_TEXTS) if key in tags}
-    text = str(tags.get(NODATA, "")).strip("\0 ")
-    if _is_number(text):
-        # GDAL writes the number of a float in decimal
-        is_empty = np.isclose(heights, float(text), rtol=1e-6, atol=0.0)
-        heights = np.where(is_empty, np.nan, heights)
+    heights = _without(heights, str(tags.get(NODATA, "")).strip("\0 "))
     _check_units(_keys(kept), where)
+    _check_heights(heights, where)
+    heights = _in_metres(heights, _metadata(tags, where), where)
     along_x, along_y = _geotiff_axes(image, kept, where)
     return Raster(name, along_x, along_y, heights, kept)
 
@@ -398,12 +350,57 @@ def _check_units(keys: Mapping[int, int], where: str) -> None:
         what = "its axes are degrees of longitude and latitude"
         remedy = "project it to metres, with gdalwarp -t_srs EPSG:326NN, NN the zone"
         raise InputError(what, where, remedy)
-    for key, axes in ((LENGTH_UNIT, "axes"), (HEIGHT_UNIT, "heights")):
-        unit = keys.get(key, METRE)
-        if unit in FEET:
-            what = f"its {axes} are in feet"
-            remedy = f"multiply them by {FEET[unit]:.7g}: they must be in m"
+    for unit_key, system, kind, axes in (
+        (LENGTH_UNIT, PROJECTED, epsg.PROJECTED, "axes"),
+        (HEIGHT_UNIT, VERTICAL, epsg.VERTICAL, "heights"),
+    ):
+        unit = keys.get(unit_key)
+        what = f"its {axes} are in feet"
+        if unit is None:
+            # the unit is that of the coordinate system
+            metres = epsg.unit_of(kind, keys.get(system))
+            of_unit = "feet" if round(metres, 3) == FOOT else f"units of {metres:g} m"
+            what = f"it is in EPSG:{keys.get(system)}, whose {axes} are in {of_unit}"
+        elif unit == METRE or unit in FEET:
+            metres = FEET.get(unit, 1.0)
+        else:
+            what = f"its {axes} are in the unit EPSG:{unit}, not metres"
+            raise InputError(what, where, "project it to metres, with gdalwarp -t_srs")
+        if metres != 1:
+            remedy = f"multiply them by {metres:.7g}: they must be in m"
             raise InputError(what, where, remedy)
+
+
+def _metadata(tags: Mapping[int, Any], where: str) -> dict[str, str]:
+    """What GDAL says of the heights of a GeoTIFF: scale, offset and unit."""
+    text = str(tags.get(METADATA, "")).strip("\0 \n")
+    if not text:
+        return {}
+    try:
+        items = ElementTree.fromstring(text).iter("Item")
+    except ElementTree.ParseError as error:
+        what = f"GDAL's metadata are not readable: {error}"
+        raise InputError(what, where, "write it anew, with gdal_translate") from None
+    return {item.get("role", ""): (item.text or "").strip() for item in items}
+
+
+def _in_metres(
+    heights: FloatArray, metadata: Mapping[str, str], where: str
+) -> FloatArray:
+    """Heights by the scale and the offset with which they are stored."""
+    unit = metadata.get("unittype", "")
+    if unit.lower() not in METRES:
+        what = f"its heights are in {unit}"
+        raise InputError(what, where, "they must be in m: gdal_calc")
+    found = {}
+    for role, usual in (("scale", "1"), ("offset", "0")):
+        text = metadata.get(role, usual)
+        value = float(text) if _is_number(text) else np.nan
+        if not np.isfinite(value) or (role == "scale" and not value):
+            what = f"its {role} is {text!r}"
+            raise InputError(what, where, f"GDAL's {role} of a band is a number")
+        found[role] = value
+    return np.asarray(heights * found["scale"] + found["offset"])
 
 
 def _geotiff_axes(

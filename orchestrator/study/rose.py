@@ -204,7 +204,7 @@ def _rows(text: str, where: str) -> list[tuple[float, float, float]]:
         place = f"{where}: line {reader.line_num}"
         if None in row:
             cells = len(header) + len(row[None])
-            raise InputError(more_cells(header, cells), place, remedy)
+            raise InputError(more_cells(cells, len(header)), place, remedy)
         try:
             direction, speed, share = [number(row[name] or "") for name in COLUMNS]
         except ValueError as error:

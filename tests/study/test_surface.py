@@ -379,7 +379,7 @@ def test_a_form_of_few_cells_is_refused() -> None:
     [
         ("a.xyz", "x y z\n1 2 3\n1 2 q\n", "line 3"),
         ("a.xyz", "0 0 0\n", "1 points are no surface"),
-        ("a.xyz", "z x y\n1 2 3\n", "line 1: the columns are z, x, y"),
+        ("a.xyz", "z x q\n1 2 3\n", "line 1: the columns are z, x, q"),
         ("a.xyz", "1 2 3\ninf 2 3\n", "line 2: x or y is not a number"),
         ("a.asc", "ncols 9.5\nnrows 9\ncellsize 1\n1 2 3\n", "3 heights, not 9.5 x 9"),
         ("a.asc", WHOLE.format("inf", 0), "cellsize inf"),

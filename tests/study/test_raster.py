@@ -1,0 +1,338 @@
+"""Files of heights are read as they stand: names, units, decimal commas, empty cells.
+
+The heap is higher in its south-east: a mirrored, turned or shifted map is another.
+"""
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+from PIL.TiffImagePlugin import ImageFileDirectory_v2
+
+from orchestrator.errors import InputError
+from orchestrator.study import raster
+from orchestrator.study.raster import geotiff, read_surface
+from orchestrator.study.surface import Surface
+from orchestrator.types import FloatArray
+
+EAST, NORTH = 512_300.0, 5_640_800.0
+WHERE = "heap.toml: bed.surface"
+COLUMNS, ROWS = 44, 36
+
+
+def heights() -> FloatArray:
+    """A heap of 6 m in the south-east and a foot to the west, over cells of 1 m."""
+    x, y = np.arange(COLUMNS), np.arange(ROWS)[:, None]
+    high = 6.0 - 0.5 * np.hypot(x - 27, y - 14)
+    low = 3.0 - 0.5 * np.hypot(x - 14, y - 18)
+    return np.asarray(np.round(np.maximum(np.maximum(high, low), 0.0), 2), float)
+
+
+def points(
+    form: str, step: float = 1.0, east: float = EAST, north: float = NORTH
+) -> str:
+    """A line for each place; `form` has x, y and z."""
+    lines = []
+    for (row, column), z in np.ndenumerate(heights()):
+        x, y = east + step * column, north + step * row
+        lines.append(
+            form.format(x=x, y=y, z=step * z, comma=f"{z:.2f}".replace(".", ","))
+        )
+    return "\n".join(lines) + "\n"
+
+
+def read(folder: Path, text: str | bytes, name: str = "heap.csv") -> Surface:
+    path = folder / name
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    return read_surface(path, WHERE)
+
+
+def check_is_the_heap(found: Surface, step: float = 1.0) -> None:
+    """That a surface is the heap, with its axes."""
+    assert found.z.shape == (ROWS, COLUMNS)
+    assert found.x[0] == pytest.approx(EAST, abs=1e-6)
+    assert found.y[0] == pytest.approx(NORTH, abs=1e-6)
+    assert found.x[-1] - found.x[0] == pytest.approx(step * (COLUMNS - 1), rel=1e-4)
+    assert found.y[-1] - found.y[0] == pytest.approx(step * (ROWS - 1), rel=1e-4)
+    assert found.z == pytest.approx(step * heights(), abs=1e-3)
+
+
+def refused(folder: Path, text: str | bytes, name: str = "heap.csv") -> str:
+    """The message for a file."""
+    with pytest.raises(InputError) as caught:
+        read(folder, text, name)
+    message = str(caught.value)
+    assert message.startswith(WHERE)
+    assert "\n" not in message
+    assert caught.value.remedy
+    return message
+
+
+@pytest.mark.parametrize(
+    ("head", "form"),
+    [
+        ("Northing,Easting,Elevation", "{y},{x},{z}"),
+        ("Hochwert;Rechtswert;Höhe", "{y};{x};{z}"),
+        ("y_m,x_m,z_m", "{y},{x},{z}"),
+        ("z x y", "{z} {x} {y}"),
+        ("Easting (m),Northing (m),Height [m]", "{x},{y},{z}"),
+        ("x [m] y [m] z [m]", "{x} {y} {z}"),
+        ("Point,Northing,Easting,Elevation,Code", "A7,{y},{x},{z},ground shot"),
+        ("X,Y,Z,code", "{x},{y},{z},GS"),
+        ('"x"\t"y"\t"z"\t"class"', "{x}\t{y}\t{z}\t2"),
+        ("# x y z", "{x} {y} {z}"),
+        ("#x y z", "{x} {y} {z}"),
+        ("//X Y Z", "{x} {y} {z}"),
+        ("# north,east,level", "{y}, {x}, {z}"),
+        ("# Heap of sand, as measured\n# x y z", "{x} {y} {z}"),
+        ("x y z\nm m m", "{x} {y} {z}"),
+        ("", "{x} {y} {z} 12"),
+        ("", "{x};{y};{z};GS"),
+        ("", "{x} {y} {z} GS"),
+        ("", "{x}, {y}, {z}"),
+    ],
+)
+def test_columns_are_read_by_their_names(tmp_path: Path, head: str, form: str) -> None:
+    check_is_the_heap(read(tmp_path, f"{head}\n{points(form)}".lstrip("\n")))
+
+
+@pytest.mark.parametrize(
+    ("head", "form", "message"),
+    [
+        ("lat,lon,height", "{y},{x},{z}", "line 1: lat and lon are degrees"),
+        ("x_ft,y_ft,z_ft", "{x},{y},{z}", r"line 1: .*x_ft.*multiply x_ft by 0\.3048"),
+        ("x,y,z_mm", "{x},{y},{z}", "multiply z_mm by 0.001"),
+        ("easting,northing,x,z", "{x},{y},1,{z}", "line 1: .*x: easting or x"),
+        (
+            "a,b,c",
+            "{x},{y},{z}",
+            "line 1: the columns are a, b, c.*name them x, y and z",
+        ),
+        ("x,y,height_of_plant", "{x},{y},{z}", "name them x, y and z"),
+        ("x y z", "{x} {y} {z} 25", "line 2: 4 cells, the head has 3"),
+        ("y,x,z,code", "{y},{x}", "line 2: .* is no point"),
+        # geodesists call the northing x
+        ("x,y,z", "{y},{x},{z}", "northing before easting"),
+        ("", "{y} {x} {z}", "northing before easting"),
+    ],
+)
+def test_columns_that_may_be_others_are_refused(
+    tmp_path: Path, head: str, form: str, message: str
+) -> None:
+    text = f"{head}\n{points(form)}".lstrip("\n")
+    with pytest.raises(InputError, match=message):
+        read(tmp_path, text)
+    refused(tmp_path, text)
+
+
+@pytest.mark.parametrize("head", ["", "x;y;z\n", "x y z\n", "x,y,z\n", "x\ty\tz\n"])
+@pytest.mark.parametrize(
+    "form",
+    [
+        "{x:.0f};{y:.0f};{comma}",
+        "{x:.0f} {y:.0f} {comma}",
+        "{x:.0f}\t{y:.0f}\t{comma}",
+        "{x:.0f},{y:.0f},{comma}",
+        "{x:.0f},50;{y:.0f},50;{comma}",
+        "{x:.0f},50,{y:.0f},50,{comma}",
+    ],
+)
+def test_decimal_commas_are_refused(tmp_path: Path, head: str, form: str) -> None:
+    message = refused(tmp_path, head + points(form))
+    assert "line " in message
+    assert (
+        "decimal comma" in message
+        or "write 0.00" in message
+        or "decimal point" in message
+    )
+
+
+def test_one_line_with_a_decimal_comma_is_refused(tmp_path: Path) -> None:
+    # a whole height has no comma
+    lines = ("x,y,z\n" + points("{x:.0f},{y:.0f},{z:.0f}")).splitlines()
+    lines[700] += ",25"
+    message = refused(tmp_path, "\n".join(lines))
+    assert "line 701: 4 cells, the head has 3: a decimal comma?" in message
+
+
+def test_cells_of_a_foot_in_millimetres_are_on_a_grid(tmp_path: Path) -> None:
+    found = read(tmp_path, "x y z\n" + points("{x:.3f} {y:.3f} {z:.4f}", 0.3048))
+    assert found.steps == pytest.approx((0.3048, 0.3048), rel=1e-4)
+    check_is_the_heap(found, 0.3048)
+
+
+def tif(values: NDArray[Any], **items: str | float) -> bytes:
+    """A GeoTIFF with items of GDAL's metadata."""
+    directory = ImageFileDirectory_v2()
+    doubles = {
+        raster.SCALE: (1.0, 1.0, 0.0),
+        raster.TIE_POINT: (0.0, 0.0, 0.0, EAST - 0.5, NORTH + ROWS - 0.5, 0.0),
+    }
+    for key, value in doubles.items():
+        directory.tagtype[key] = 12
+        directory[key] = value
+    if items:
+        listed = [
+            f'<Item name="{role.upper()}" sample="0" role="{role}">{value}</Item>'
+            for role, value in items.items()
+        ]
+        directory.tagtype[raster.METADATA] = 2
+        directory[raster.METADATA] = f"<GDALMetadata>{''.join(listed)}</GDALMetadata>\n"
+        directory.tagtype[raster.NODATA] = 2
+        directory[raster.NODATA] = "-32768"
+    stream = io.BytesIO()
+    image = Image.fromarray(np.ascontiguousarray(values[::-1]))
+    image.save(stream, "TIFF", tiffinfo=directory)
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize(("scale", "offset"), [(0.1, 0.0), (0.01, 0.0), (0.01, 120.0)])
+def test_scale_and_offset_of_a_geotiff_are_applied(
+    tmp_path: Path, scale: float, offset: float
+) -> None:
+    rounded = np.round(heights() / scale) * scale
+    stored = np.round(heights() / scale).astype(np.int16)
+    stored[0, :3] = -32768  # beyond the rim, before it is scaled
+    found = read(tmp_path, tif(stored, scale=scale, offset=offset), "heap.tif")
+    assert found.z - offset == pytest.approx(rounded, abs=1e-6)
+    assert "continued as level ground over 3 cells" in found.said[-1]
+
+
+@pytest.mark.parametrize(
+    ("items", "message"),
+    [
+        ({"unittype": "ft"}, "its heights are in ft"),
+        ({"unittype": "US survey foot"}, "its heights are in US survey foot"),
+        ({"scale": "0"}, "its scale is '0'"),
+        ({"offset": "high"}, "its offset is 'high'"),
+    ],
+)
+def test_metadata_in_which_no_metre_stands_is_refused(
+    tmp_path: Path, items: dict[str, str], message: str
+) -> None:
+    content = tif(heights().astype(np.float32), **items)
+    assert message in refused(tmp_path, content, "heap.tif")
+
+
+def test_metres_of_gdals_metadata_are_metres(tmp_path: Path) -> None:
+    content = tif(heights().astype(np.float32), unittype="metre")
+    check_is_the_heap(read(tmp_path, content, "heap.tif"))
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({raster.PROJECTED: 2277}, "EPSG:2277, whose axes are in feet.*0.3048006"),
+        ({raster.PROJECTED: 6494}, r"EPSG:6494, whose axes are in feet.*by 0\.3048:"),
+        ({raster.PROJECTED: 22300}, "EPSG:22300, whose axes are in units of 1000 m"),
+        ({raster.VERTICAL: 6360}, "EPSG:6360, whose heights are in feet"),
+        (
+            {raster.PROJECTED: 32632, raster.LENGTH_UNIT: 9036},
+            "unit EPSG:9036, not metres",
+        ),
+        ({raster.LENGTH_UNIT: 32767}, "unit EPSG:32767, not metres"),
+    ],
+)
+def test_a_coordinate_system_in_feet_is_refused(
+    tmp_path: Path, keys: dict[int, int], message: str
+) -> None:
+    entries = [part for key, value in keys.items() for part in (key, 0, 1, value)]
+    table = (1, 1, 0, len(keys), *entries)
+    of = read(tmp_path, points("{x} {y} {z}"), "heap.xyz")
+    content = geotiff(of.x, of.y, of.z, {raster.KEYS: table})
+    with pytest.raises(InputError, match=message):
+        read(tmp_path, content, "heap.tif")
+
+
+@pytest.mark.parametrize("code", [32632, 25832, 2056, 2154, 6493, 27700, 5514, 3857])
+def test_a_coordinate_system_in_metres_needs_no_key_of_its_unit(
+    tmp_path: Path, code: int
+) -> None:
+    of = read(tmp_path, points("{x} {y} {z}"), "heap.xyz")
+    table = (1, 1, 0, 2, raster.PROJECTED, 0, 1, code, raster.VERTICAL, 0, 1, 7837)
+    content = geotiff(of.x, of.y, of.z, {raster.KEYS: table})
+    check_is_the_heap(read(tmp_path, content, "heap.tif"))
+
+
+def grid(head: str, empty: str = "", change: Callable[[str], str] = str) -> str:
+    """An ESRI grid whose first three cells of the northernmost row have no height."""
+    rows = [[f"{z:.2f}" for z in row] for row in heights()[::-1]]
+    if empty:
+        rows[0][:3] = [empty] * 3
+    body = "\n".join(" ".join(row) for row in rows)
+    corner = f"xllcenter {EAST}\nyllcenter {NORTH}\n"
+    return change(f"ncols {COLUMNS}\nnrows {ROWS}\n{corner}{head}{body}\n")
+
+
+@pytest.mark.parametrize(
+    ("mark", "empty"),
+    [
+        ("-9999", "-9999.000"),
+        ("-3.4028230607370965254e+38", "-3.402823e+38"),
+        ("null", "null"),
+        ("nan", "nan"),
+        ("1.70141e+38", "1.701410009187828e+38"),
+    ],
+)
+def test_empty_cells_of_a_grid_are_those_of_its_mark(
+    tmp_path: Path, mark: str, empty: str
+) -> None:
+    text = grid(f"cellsize 1\nNODATA_value {mark}\n", empty)
+    found = read(tmp_path, text, "heap.asc")
+    check_is_the_heap(found)
+    assert "continued as level ground over 3 cells" in found.said[-1]
+
+
+@pytest.mark.parametrize(
+    ("head", "message"),
+    [
+        ("cellsize 1\ndy 2\n", "cellsize and dy .*leave one of the two"),
+        ("cellsize 1\nxllcorner 3\n", "xllcenter and xllcorner .*leave one"),
+        ("dx 1\ndy 2\n", "cellsize is missing"),
+        ("cellsize 1\nxllcentre 3\n", "xllcentre is no key of a grid"),
+    ],
+)
+def test_a_head_that_contradicts_itself_is_refused(
+    tmp_path: Path, head: str, message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        read(tmp_path, grid(head), "heap.asc")
+    refused(tmp_path, grid(head), "heap.asc")
+
+
+def test_cells_that_look_empty_are_refused(tmp_path: Path) -> None:
+    low = heights()
+    low[-1, :3] = -32768
+    lines = points("{x} {y} {z}").splitlines()
+    lines[-1] = f"{EAST + COLUMNS - 1} {NORTH + ROWS - 1} -9999"
+    files: dict[str, tuple[str | bytes, str]] = {
+        "heap.tif": (tif(low.astype(np.int16)), "-32768 in 3 cells"),
+        "float.tif": (tif(np.where(low < 0, -3.4028235e38, low).astype(np.float32)), "-3.40282e"),
+        "heap.xyz": ("\n".join(lines), "-9999 in 1 cells"),
+        "heap.asc": (grid("cellsize 1\n", "-32768"), "-32768 in 3 cells"),
+    }  # fmt: skip
+    for name, (content, message) in files.items():
+        said = refused(tmp_path, content, name)
+        assert message in said
+        assert "looks like a cell without a height" in said
+
+
+@pytest.mark.parametrize(("pixel", "half"), [(1, 0.5), (2, 0.0)])
+def test_the_top_of_a_geotiff_is_where_it_stands(
+    tmp_path: Path, pixel: int, half: float
+) -> None:
+    # by hand: the tie point is the north-western corner of an area, or its middle
+    of = read(tmp_path, points("{x} {y} {z}"), "heap.xyz")
+    table = (1, 1, 0, 1, raster.PIXEL, 0, 1, pixel)
+    content = geotiff(of.x, of.y, of.z, {raster.KEYS: table})
+    found = read(tmp_path, content, "heap.tif")
+    row, column = np.unravel_index(int(found.z.argmax()), found.z.shape)
+    assert (found.x[column], found.y[row]) == (EAST + 27, NORTH + 14)
+    with Image.open(io.BytesIO(content)) as image:
+        tie = image.tag_v2[raster.TIE_POINT]  # type: ignore[attr-defined]
+    assert tie[3:5] == (EAST - half, NORTH + ROWS - 1 + half)
