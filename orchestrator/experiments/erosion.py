@@ -195,9 +195,7 @@ def without_obstacles(scene: Scene) -> Scene:
     Scene
         The scene without them.
     """
-    bed = scene.bed.model_copy(update={"obstacles": ()})
-    parts = {name: getattr(scene, name) for name in Scene.model_fields}
-    return Scene.model_construct(**{**parts, "bed": bed})
+    return scene.without_obstacles()
 
 
 def names_of(scenes: Sequence[Scene]) -> list[str]:

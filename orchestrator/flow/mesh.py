@@ -265,6 +265,10 @@ def ratio_of(cells: int, first: float, length: float) -> float:
     def beyond(ratio: float) -> float:
         return first * float(expm1(cells * log(ratio))) / (ratio - 1) - length
 
+    # cells that fill all but the last digits of a length are alike
+    if beyond(1 + STEADY) >= 0:
+        return 1.0
+
     from scipy.optimize import brentq  # a third of a second, for which no page waits
 
     # The last cell alone would fill the length at the upper end.

@@ -301,12 +301,17 @@ class Geometry:
 
         Scenes that differ in their forces alone share them. By the method "local" they
         are places along the bed line, as many as a figure shows. On the windward sides
-        of a profile none is counted where the flow runs back.
+        of a profile none is counted where the flow runs back without obstacles; where
+        these turn it, grains stay in the count.
         """
         packed = self._packing
         if not self.turned or self.cases is None:
             return packed
-        is_ahead = self.felt(self.model.stress(self.cases), packed.arc_length) > 0
+        sides = self.sides
+        arc_length = packed.arc_length
+        if sides is not self:
+            _, arc_length = sides.line.nearest(packed.centres)
+        is_ahead = sides.felt(sides.model.stress(self.cases), arc_length) > 0
         return replace(
             packed,
             windward=packed.windward & is_ahead,
@@ -320,6 +325,23 @@ class Geometry:
         The noise of a profile rises in a wake as well.
         """
         return self.bed.profile is not None and self.bed.counts == "windward"
+
+    @cached_property
+    def sides(self) -> "Geometry":
+        """The bed whose flow says which sides are windward: it has no obstacles.
+
+        Beds that differ in these alone are compared: they count the same sides.
+        """
+        if not (self.turned and self.bed.obstacles):
+            return self
+        return Geometry(self.scene.without_obstacles(), self.cases)
+
+    @property
+    def solved(self) -> tuple[FlowCase, ...]:
+        """The runs of the flow over the bed, and before it of that of `sides`."""
+        if self.sides is self:
+            return self.model.cases
+        return (*self.sides.model.cases, *self.model.cases)
 
     @cached_property
     def _packing(self) -> Packing:

@@ -179,6 +179,9 @@ class WornFlow(Case):
     def needs(self) -> tuple[Case, ...]:
         """The flow and the run of the round before, and the run that poured the bed."""
         runs = () if self.run is None else (self.run,)
+        if self.geometry.sides is not self.geometry:
+            # which of the grains have left is asked of those that are counted
+            runs = (*self.geometry.sides.model.cases, *runs)
         return (self.before, *runs, *self.geometry.pouring)
 
     @property
@@ -469,7 +472,7 @@ class PileCase(GrainCase):
         They are those of its flow model, the one that it goes on from, and the one that
         pours its grains.
         """
-        flows = self.geometry.model.cases if self.flow is None else (self.flow,)
+        flows = self.geometry.solved if self.flow is None else (self.flow,)
         return (
             *flows,
             *((self.before,) if self.before else ()),
@@ -486,6 +489,8 @@ class PileCase(GrainCase):
         # rules for which grains there are that came after other beds were run
         if self.geometry.turned:
             asked["turned"] = True
+        if self.geometry.sides is not self.geometry:
+            asked["sides"] = "without obstacles"
         if self.geometry.is_part:
             asked["part"] = True
         return asked
@@ -995,7 +1000,7 @@ class Pile(Geometry):
     @cached_property
     def runs(self) -> tuple[Case, ...]:
         """The cases that its answer is read from, those of the flow first."""
-        return (*self.model.cases, *self.pouring, *self.method.cases)
+        return (*self.solved, *self.pouring, *self.method.cases)
 
     @property
     def last_run(self) -> str | None:

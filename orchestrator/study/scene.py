@@ -92,6 +92,18 @@ class Scene(Question):
         parts["method"] = self.method.model_copy(update={"kind": kind})
         return Scene(**parts)
 
+    def without_obstacles(self) -> "Scene":
+        """Make the same question and method over a pile without its obstacles.
+
+        Returns
+        -------
+        Scene
+            The scene.
+        """
+        parts = {name: getattr(self, name) for name in Scene.model_fields}
+        parts["bed"] = self.bed.model_copy(update={"obstacles": ()})
+        return Scene.model_construct(**parts)
+
     @property
     def last_fraction(self) -> float:
         """Fraction of a pile's grains at which a run of DEM ends.

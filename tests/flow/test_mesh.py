@@ -13,7 +13,7 @@ from orchestrator.bed.line import of_bed
 from orchestrator.errors import InputError, SolverError
 from orchestrator.fidelity import limits
 from orchestrator.flow.foam import SolvedFlow
-from orchestrator.flow.mesh import made_by_gmsh
+from orchestrator.flow.mesh import made_by_gmsh, ratio_of
 from orchestrator.runs import case
 from orchestrator.study import study
 from orchestrator.types import FloatArray
@@ -149,3 +149,7 @@ def test_beds_and_settings_without_a_mesh_are_refused_with_their_field(
     (scene,) = study.parse(BED + text, name="t", where="t").scenes
     with pytest.raises(InputError, match=rf"a.toml: .*{field}: "):
         limits.check(scene, "a.toml")
+
+
+def test_cells_that_fill_a_length_but_for_round_off_are_alike() -> None:
+    assert ratio_of(5, 0.09999999999999987, 0.5) == 1.0

@@ -72,3 +72,47 @@ def test_a_card_says_which_metres_are_counted(tmp_path: Path) -> None:
     assert "counted: x = 164 to 186 m" in answers.card(results).scene
     heads = [remark.head for remark in remarks.remarks(results)]
     assert "A range of the bed is counted: x = 164 to 186 m." in heads
+
+
+FENCED = """
+fluid.kind = "air"
+grain = { diameter = 2.5e-4, density = 2650.0 }
+bed = { kind = "pile", profile = "own.csv" }
+method.kind = "local"
+method.flow.first_cell_height = 6e-3
+threshold.fractions = [0.1, 0.3]
+[axes]
+"bed.obstacles" = [[], [{ kind = "fence", x = 114.0, height = 0.05 }]]
+[profiles]
+"own.csv" = '''
+x_m,z_m
+POINTS
+'''
+"""
+
+
+@pytest.fixture(scope="module")
+def fenced(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    """A beach with a small dune, and the same with a fence."""
+    x = np.arange(112.4, 117.01, 0.05)
+    corners = [112.4, 114.2, 115.2, 115.6, 117.0]
+    z = np.interp(x, corners, [0.0, 0.05, 0.25, 0.05, 0.05])
+    rows = "\n".join(f"{a:.2f},{b:.4f}" for a, b in zip(x, z, strict=True))
+    text = FENCED.replace("POINTS", rows)
+    return small_study.run(tmp_path_factory.mktemp("fenced"), text)
+
+
+def test_beds_that_are_compared_count_the_same_metres(fenced: Results) -> None:
+    """Behind the fence the flow runs back: these places stay in the denominator."""
+    grains = fenced.joined("pile_grain")
+    assert grains["ustar_over_ustar0"].min() < 0
+    places = [part["x_m"] for _, part in grains.groupby("scene_id", sort=False)]
+    assert len(places) == 2
+    foot = 0.05  # of the fence, which carries no grains
+    for first, other in (places, places[::-1]):
+        lost = [x for x in first if other.sub(x).abs().min() > 0.02]
+        assert all(abs(x - 114.0) < foot for x in lost)
+    rows = fenced.joined("pile_threshold").sort_values(["obstacles", "fraction"])
+    of_fence, of_bare = np.reshape(rows["ustar0_m_s"].to_numpy(), (2, 2))
+    # a fence takes wind from the sand: none of it moves earlier for it
+    assert (of_fence >= of_bare).all()
