@@ -290,7 +290,7 @@ def _unfit(scene: Scene, bed: PileBed, line: BedLine) -> str:
     if slopes[at] <= limit + 1e-6:
         return ""
     first, last = sorted(bed.place(line.x[at : at + 2]).tolist())
-    where = f"{slopes[at]:.3g} deg at x = {first:.6g} ... {last:.6g} m"
+    where = f"{slopes[at]:.3g} deg at x = {first:.9g} ... {last:.9g} m"
     return f"{where} is beyond {why} = {limit:g} deg"
 
 
@@ -303,7 +303,7 @@ def _theory(scene: Scene, bed: PileBed) -> Iterator[Limit]:
     at = int(np.argmax(seen.slopes))
     slope = float(np.degrees(np.arctan(seen.slopes[at])))
     if slope > PILE_SLOPES_DEG[1] + 1e-6:
-        place = f"x = {float(bed.place(seen.x[at])):.6g} m"
+        place = f"x = {float(bed.place(seen.x[at])):.9g} m"
         what = f"a bed that rises by {slope:.3g} deg at {place} is no low one"
         yield Limit("slope", "method.flow.model", what, 'choose "solve"')
 

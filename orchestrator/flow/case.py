@@ -246,7 +246,7 @@ class FlowCase(Case):
             return
         place = float(self.profile.place(start)) if self.profile else start
         what = (
-            f"at x = {place:.6g} m the mesh needs cells {shortest:.2g} m long, far"
+            f"at x = {place:.9g} m the mesh needs cells {shortest:.2g} m long, far"
             f" shorter than its first cells are high, {self.first_cell_m:.2g} m"
         )
         if self._is_at_obstacle(start, end):

@@ -35,6 +35,11 @@ CLASSES = ("diameter_m", "fraction")
 """Columns of a sieve table of classes."""
 PASSING = ("sieve_mm", "passing_percent")
 """Columns of a sieve table as laboratories write it."""
+NO_PAN = "leave out the line of the pan, and end with the sieve that nothing passes"
+SIEVE_REMEDY = (
+    f"the first line must be {','.join(PASSING)} (what passes each sieve, mm) or "
+    f"{','.join(CLASSES)} (in m), then numbers; {NO_PAN}"
+)
 MOST_CORNERS = (
     3000  # most corners of a bed line, each of which is a grid line of the flow's mesh
 )
@@ -303,9 +308,12 @@ class Files:
         place = self._place(name, where)
         text = self._text(name, where)
         header = text.partition("\n")[0]
-        if PASSING[1] in header:
-            return _classes(read_columns(text, PASSING, place)[1], place)
-        return read_columns(text, CLASSES, place)[1]
+        if PASSING[0] in header or PASSING[1] in header:
+            lines, rows = read_columns(text, PASSING, place, SIEVE_REMEDY)
+            return _classes(lines, rows, place)
+        lines, rows = read_columns(text, CLASSES, place, SIEVE_REMEDY)
+        _check_rows(lines, rows, place)
+        return rows
 
     def _place(self, name: str, where: str) -> str:
         """The path of a file, for messages."""
@@ -341,27 +349,53 @@ class Files:
         return text
 
 
-def _classes(rows: list[list[float]], where: str) -> list[list[float]]:
+def _check_rows(lines: list[int], rows: list[list[float]], where: str) -> None:
+    """Refuse a class that has no size, or a fraction below 0."""
+    for line, (diameter, fraction) in zip(lines, rows, strict=True):
+        place = f"{where}: line {line}"
+        if not diameter > 0:
+            what = f"{CLASSES[0]}: {diameter:g} is no size"
+            raise InputError(what, place, "diameters are in m, above 0")
+        if not fraction >= 0:
+            what = f"{CLASSES[1]}: {fraction:g} is no part of the mass"
+            raise InputError(what, place, "fractions are from 0 to 1")
+
+
+def _classes(
+    lines: list[int], rows: list[list[float]], where: str
+) -> list[list[float]]:
     """The classes between sieves, of the per cent of the mass that passes each.
 
     A class has the geometric mean of its two sieves as diameter, m.
     """
-    rows = sorted(rows)
-    remedy = "begin with the sieve that all pass, end with one that nothing passes"
+    for line, (sieve, percent) in zip(lines, rows, strict=True):
+        place = f"{where}: line {line}"
+        if not sieve > 0:
+            what = f"{PASSING[0]}: {sieve:g} is no sieve"
+            raise InputError(what, place, f"openings are in mm, above 0; {NO_PAN}")
+        if not 0 <= percent <= 100:
+            what = f"{PASSING[1]}: {percent:g} is no part of the mass"
+            raise InputError(what, place, "per cent that pass are from 0 to 100")
     if len(rows) < 2:
+        remedy = "begin with the sieve that all pass, end with one that nothing passes"
         raise InputError("one class lies between two sieves", where, remedy)
-    passing = [percent for _, percent in rows]
-    if passing[0] != 0:
-        what = f"{passing[0]:g} % pass the smallest sieve, not 0"
-        raise InputError(what, where, remedy)
-    if passing[-1] != 100:
-        what = f"{passing[-1]:g} % pass the largest sieve, not 100"
-        raise InputError(what, where, remedy)
+    ordered = sorted(zip(rows, lines, strict=True))
+    (_, none), line = ordered[0]
+    if none != 0:
+        what = f"{none:g} % pass the smallest sieve, not 0"
+        remedy = f"add a finer one that nothing passes, if only by its size; {NO_PAN}"
+        raise InputError(what, f"{where}: line {line}", remedy)
+    (_, whole), line = ordered[-1]
+    if whole != 100:
+        what = f"{whole:g} % pass the largest sieve, not 100"
+        remedy = "begin with the sieve that all pass"
+        raise InputError(what, f"{where}: line {line}", remedy)
     classes = []
-    for (smaller, below), (larger, above) in pairwise(rows):
+    for ((smaller, below), _), ((larger, above), line) in pairwise(ordered):
         if above < below or larger == smaller:
             what = f"{above:g} % pass {larger:g} mm, and {below:g} % {smaller:g} mm"
-            raise InputError(what, where, "a larger sieve lets more pass")
+            place = f"{where}: line {line}"
+            raise InputError(what, place, "a larger sieve lets more pass")
         if above > below:
             diameter = 1e-3 * math.sqrt(smaller * larger)
             classes.append([rounded(diameter), rounded((above - below) / 100)])
@@ -369,7 +403,7 @@ def _classes(rows: list[list[float]], where: str) -> list[list[float]]:
 
 
 def read_columns(
-    text: str, names: tuple[str, str], where: str
+    text: str, names: tuple[str, str], where: str, remedy: str = ""
 ) -> tuple[list[int], list[list[float]]]:
     """Two columns of a CSV file with a header.
 
@@ -383,6 +417,8 @@ def read_columns(
         The names of the columns; those of a profile may have others, see `ALSO`.
     where
         The file, for messages.
+    remedy
+        What the first line must be, in words; by default the two names.
 
     Returns
     -------
@@ -406,9 +442,9 @@ def read_columns(
             lines.append(reader.line_num)
             values.append(pair)
     except (ValueError, csv.Error) as error:
-        remedy = f"the first line must be {','.join(names)}, then numbers"
-        if names[0].endswith("_m"):
-            remedy = f"{remedy} in m"
+        remedy = (
+            remedy or f"the first line must be {','.join(names)}, then numbers in m"
+        )
         place = f"{where}: line {reader.line_num or 1}"
         raise InputError(str(error), place, remedy) from None
     return lines, values
@@ -431,7 +467,7 @@ def _column(header: Sequence[str], name: str, names: tuple[str, str]) -> str:
     if len(header) == 1 and ";" in header[0]:
         what = f"{what}: commas between the cells, no semicolons"
     in_another_unit = in_metres(header)
-    if in_another_unit:
+    if in_another_unit and names[0].endswith("_m"):
         what = f"{what}: {in_another_unit}"
     raise ValueError(what)
 
@@ -551,14 +587,14 @@ def _check_steps(x: FloatArray, refusal: _Refusal) -> None:
     steps = np.diff(x)
     back = int(np.argmin(steps > 0))
     if steps[back] <= 0:
-        place = f"{x[back + 1]:g} m"
+        place = f"{x[back + 1]:.9g} m"
         what = f"x does not rise to {place}: unsorted, twice the same, or an overhang"
         remedy = "sort the lines by x, with one height for each place"
         raise refusal.at(back + 1, what, remedy)
     widest = int(np.argmax(steps))
     middle = float(np.median(steps))
     if len(x) >= DENSE and steps[widest] > GAP * middle:
-        gap = f"a gap of {steps[widest]:g} m after x = {x[widest]:g} m"
+        gap = f"a gap of {steps[widest]:g} m after x = {x[widest]:.9g} m"
         what = f"{gap}; others are {middle:g} m"
         raise refusal.at(widest + 1, what, "fill it with points")
 
@@ -593,7 +629,7 @@ def _check_heights(
     slopes = np.degrees(np.arctan2(np.diff(z), np.diff(x)))
     steep = int(np.argmax(np.abs(slopes)))
     if abs(slopes[steep]) > STEEPEST_DEG:
-        slope = f"{slopes[steep]:.0f} deg at x = {places[steep]:g} m"
+        slope = f"{slopes[steep]:.0f} deg at x = {places[steep]:.9g} m"
         what = f"{slope}, above {STEEPEST_DEG:g}"
         remedy = f"{more}; check that x and z are both in m"
         raise refusal.at(steep + 1, what, remedy)

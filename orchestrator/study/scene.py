@@ -229,7 +229,7 @@ def _check_points(scene: Scene, bed: PileBed, is_solved: bool) -> None:
         least = max(least, NARROWEST_OVER_CELL * scene.first_cell_height)
     if steps[near] < least:
         x = float(bed.profile.place(bed.profile.x[near + 1]))
-        what = f"points at x = {x:.6g} m are nearer than {least:.2g} m"
+        what = f"points at x = {x:.9g} m are nearer than {least:.2g} m"
         raise UnfitError("bed.profile", what, "leave out one, or raise bed.smoothing")
 
 

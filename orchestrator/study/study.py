@@ -47,6 +47,7 @@ from orchestrator.study.reading import (
 from orchestrator.study.scene import Scene, roughness_length
 from orchestrator.study.shapes import SHAPES
 from orchestrator.study.source import Source, decoded, find, presets, read_bytes
+from orchestrator.study.surface_study import TABLES as IN_SPACE
 
 BED = {"kind": "grain", "roughness": "d/30"}
 """Fields of a bed that a file may leave out."""
@@ -575,7 +576,12 @@ def _explained(error: ValidationError, where: str) -> InputError:
 
 
 def _hint(names: Sequence[str], branch: str) -> tuple[str, str] | None:
-    """Say that a pile has a field, where it is of no bed of one grain."""
-    if branch == "grain" and names[-1] in PileBed.model_fields:
+    """Say which beds have a field that is of no bed of this kind."""
+    *table, name = names
+    if branch == "grain" and name in PileBed.model_fields:
         return "a bed of one grain has none", 'a pile has it: kind = "pile"'
+    part = IN_SPACE.get(".".join(table))
+    if part is not None and name in part.model_fields:
+        remedy = 'leave it out, or bed.kind = "surface"'
+        return "beds in three dimensions alone have it", remedy
     return None

@@ -415,3 +415,30 @@ def test_what_is_not_on_a_shape_is_refused_alike(
     scene = study.parse(text, name="dune", where="dune.toml").scenes[0]
     with pytest.raises(InputError, match=f"bed.counted: {re.escape(message)}"):
         limits.check(scene, "dune.toml")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({30: "5123447.48,0.1"}, r"x does not rise to 5123447\.48 m"),
+        ({30: "5123447.61,9"}, r"deg at x = 5123447\.[56]\d* m"),
+        (dict.fromkeys(range(20, 50), ""), r"a gap of 3\.1 m after x = 5123446\.5 m"),
+    ],
+)
+def test_a_northing_is_told_to_the_centimetre(
+    tmp_path: Path, change: dict[int, str], message: str
+) -> None:
+    rows = [f"{5123444.6 + n / 10:.2f},{0.01 * min(n, 60 - n):.3f}" for n in range(60)]
+    for place, row in change.items():
+        rows[place] = row
+    with pytest.raises(InputError, match=message):
+        scene_of(tmp_path, points(*filter(None, rows)))
+
+
+def test_columns_in_feet_are_refused_with_their_factor(tmp_path: Path) -> None:
+    with pytest.raises(
+        InputError, match=r"line 1: .*multiply x_ft by 0\.3048: lengths"
+    ):
+        scene_of(tmp_path, GOOD.replace("x_m,z_m", "x_ft,z_ft"))
+    turned = GOOD.replace("x_m,z_m", "Hochwert (m),Höhe [m]")
+    assert scene_of(tmp_path, turned).id == scene_of(tmp_path, GOOD).id

@@ -108,6 +108,43 @@ FILES = {
 }
 
 
+SIEVES = {
+    "2,100\n1,60\n-1,0\n": r"sieve.csv: line 4: sieve_mm: -1 .*openings .* above 0",
+    "2,100\n0.85,60\n0,0\n": r"sieve.csv: line 4: sieve_mm: 0 .*pan",
+    "2,100\n0.85,60\npan,0\n": r"sieve.csv: line 4: sieve_mm: 'pan' .*pan",
+    "2,100\n\n0.85,160\n0.5,0\n": r"sieve.csv: line 4: passing_percent: 160 .*0 to 100",
+    "2,100\n0.85,-3\n0.5,0\n": r"sieve.csv: line 3: passing_percent: -3 .*0 to 100",
+    "4,100\n2,20\n1,60\n0.5,0\n": r"sieve.csv: line 3: 20 % pass 2 mm, and 60 % 1 mm",
+    "4,100\n2,60\n1,5\n": r"sieve.csv: line 4: 5 % pass the smallest sieve, not 0",
+    "2,60\n1,0\n": r"sieve.csv: line 2: 60 % pass the largest sieve, not 100",
+}
+CLASSES = {
+    "diameter_m,fraction\n1e-3,0.5\n\n0,0.5\n": r"sieve.csv: line 4: diameter_m: 0 ",
+    "diameter_m,fraction\n-1e-3,0.5\n": r"sieve.csv: line 2: diameter_m: -0.001 ",
+    "diameter_m,fraction\n1e-3,0.5\n2e-3,-1\n": r"sieve.csv: line 3: fraction: -1 ",
+    "sieve_mm,retained_percent\n2,0\n1,40\n": (
+        "line 1: .*sieve_mm,passing_percent .* or diameter_m,fraction"
+    ),
+    "sieve_mm,passing\n2,0\n": "line 1: .*sieve_mm,passing_percent",
+}
+
+
+def test_a_sieve_that_is_none_is_refused_with_its_line(tmp_path: Path) -> None:
+    sieve, source = tmp_path / "sieve.csv", tmp_path / "mixed.toml"
+    source.write_text(f"{BED % 'd/30'}\ngrain = {{ sizes = 'sieve.csv' }}\n")
+    head = "sieve_mm,passing_percent\n"
+    for text, message in {
+        **{head + k: v for k, v in SIEVES.items()},
+        **CLASSES,
+    }.items():
+        sieve.write_text(text)
+        with pytest.raises(InputError, match=message) as caught:
+            study.load(str(source))
+        assert str(sieve) in str(caught.value)
+        assert caught.value.remedy
+        assert "multiply" not in str(caught.value)
+
+
 def test_a_sieve_table_may_be_a_file_beside_the_study(tmp_path: Path) -> None:
     sieve, source = tmp_path / "sieve.csv", tmp_path / "mixed.toml"
     source.write_text(f"{BED % 'd/30'}\ngrain = {{ sizes = 'sieve.csv' }}\n")

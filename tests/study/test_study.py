@@ -159,6 +159,14 @@ BAD = [
         "tolerance, above the first table",
     ),
     ("[grain]\nviscosity = 1e-6\n", "grain.viscosity", "did you mean fluid.viscosity?"),
+    (
+        f'{PILE}[erosion]\nwind = "year.csv"\n',
+        "erosion.wind",
+        'beds in three dimensions alone have it (leave it out, or bed.kind = "surface")',
+    ),
+    (f"{PILE}surface = 'a.tif'\n", "bed.surface", "beds in three dimensions alone"),
+    (f"{PILE}[flow]\nfrom_deg = 90.0\n", "flow.from_deg", "beds in three dimensions"),
+    (f"{PILE}[method.flow]\nlevel = 'coarse'\n", "method.flow.level", "dimensions"),
     (f"{PILE}[flow]\nnodes = true\n", "flow.nodes", "method.flow.roughness"),
     (f"{PILE}[flow]\nnodes = false\n", "flow.nodes", "leave it out"),
     (
