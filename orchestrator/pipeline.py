@@ -15,7 +15,7 @@ from orchestrator.report.results import Results
 from orchestrator.runs import case, cluster, engine, terminal, workspace
 from orchestrator.runs.case import Case
 from orchestrator.runs.cluster import Queue
-from orchestrator.runs.workspace import STATE, STUDY, Workspace, claimed
+from orchestrator.runs.workspace import EXPERIMENT, STATE, STUDY, Workspace, claimed
 from orchestrator.study.profile import Files
 from orchestrator.study.study import Study, parse
 
@@ -191,8 +191,7 @@ def reopen(space: Workspace) -> tuple[Study, Plan]:
     where = str(space.root)
     if "study" not in about:
         what = f"this is the experiment {about['name']}"
-        again = f"orchestrator {_command_of(about, space.root)} --out {where}"
-        raise InputError(what, where, f"to draw it again: {again}")
+        raise InputError(what, where, f"to draw it again: {_again(about, space.root)}")
     # its text has those of the files that it names
     files = Files(None)
     study = parse(about["study"], name=about["name"], where=where, files=files)
@@ -200,13 +199,18 @@ def reopen(space: Workspace) -> tuple[Study, Plan]:
     return study, plan.make(study, space.cases)
 
 
-def _command_of(about: Mapping[str, Any], root: Path) -> str:
-    """The command of an experiment, with the file that it is on."""
-    command: str = COMMANDS.get(about["name"], about["name"])
+def _again(about: Mapping[str, Any], root: Path) -> str:
+    """The command of an experiment, with the file that it is on, and its directory."""
+    command = f"orchestrator {COMMANDS.get(about['name'], about['name'])}"
     source = about.get("source")
     if not isinstance(source, dict) or "file" not in source:
-        return command
-    return f"{command} {os.path.normpath(root / str(source['file']))}"
+        return f"{command} --out {root}"
+    file = Path(os.path.normpath(root / str(source["file"])))
+    if file.is_file():
+        return f"{command} {file} --out {root}"
+    # the results were moved without it
+    where = f"FILE is {file.name}, which is not in {file.parent}"
+    return f"{command} FILE --out {root}; {where}"
 
 
 def redraw(out: Path, *, every: bool = False) -> Finished:
@@ -245,7 +249,7 @@ def prune(directory: Path) -> str:
     Parameters
     ----------
     directory
-        The directory of the study.
+        The directory of the study or of the experiment.
 
     Returns
     -------
@@ -253,14 +257,19 @@ def prune(directory: Path) -> str:
         What was dropped, in words.
     """
     space = Workspace(directory.absolute())
+    about = space.description()
+    if "study" not in about:
+        # tables and pictures of experiments are made of results alone
+        with claimed(space.root, EXPERIMENT, about["name"], new=False):
+            ids = {name: case.id_of(space.cases / name) for name in about["cases"]}
+            return workspace.prune(space, ids, ())
     study, planned = reopen(space)
     with claimed(space.root, STUDY, study.name, new=False):
         done = planned.done(space.cases)
         made = tables.make(study, planned, space.cases, done)
         drawn = report.drawn_from(Results(study, planned, made, space.cases))
         kept = {case.name for case in drawn}
-        finished = {name: planned.cases[name] for name in done}
-        return workspace.prune(space, finished, kept)
+        return workspace.prune(space, {name: planned.ids[name] for name in done}, kept)
 
 
 def _draw(

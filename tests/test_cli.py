@@ -175,10 +175,24 @@ def test_report_on_an_experiment_says_the_command_that_draws_it(tmp_path: Path) 
     space = Workspace(tmp_path / "out")
     space.root.mkdir()
     space.describe(EXPERIMENT, "ladder", [], {"file": "../mine.toml"})
+    (tmp_path / "mine.toml").touch()
     file = re.escape(str(tmp_path / "mine.toml"))
     place = re.escape(str(space.root))
     with pytest.raises(InputError, match=f"orchestrator ladder {file} --out {place}"):
         pipeline.redraw(space.root)
+
+
+def test_the_command_that_draws_an_experiment_names_no_file_that_is_not_there(
+    tmp_path: Path,
+) -> None:
+    space = Workspace(tmp_path / "moved" / "out")
+    space.root.mkdir(parents=True)
+    space.describe(EXPERIMENT, "surface", [], {"file": "../mine.toml"})
+    with pytest.raises(InputError) as caught:
+        pipeline.redraw(space.root)
+    message = str(caught.value)
+    assert "orchestrator study FILE --out" in message
+    assert f"FILE is mine.toml, which is not in {tmp_path / 'moved'}" in message
 
 
 def test_any_failure_has_a_message_of_one_printable_line() -> None:

@@ -147,7 +147,7 @@ class Experiment:
             failed = pipeline.complete(
                 todo, space, workers=workers, limit_s=self.limit_s
             )
-            sections = self._write(folder, space)
+            sections = self._write(folder, space, failed)
         failures = {}
         for name, error in failed.items():
             if self.failing is None or name in self.failing:
@@ -170,16 +170,23 @@ class Experiment:
                 todo[name] = run
         return todo
 
-    def _write(self, folder: Folder, space: Workspace) -> Sequence[Section]:
-        """Write tables and page, and give the sections of the page."""
+    def _write(
+        self, folder: Folder, space: Workspace, failed: pipeline.Failures
+    ) -> Sequence[Section]:
+        """Write tables and page, and give the sections of the page.
+
+        Without any table the first failure says why there is none.
+        """
         cases = space.cases
         with style.settings():
             runs = Runs(self.planned, cases, self.planned.done(cases))
             tables, sections = self.results(runs)
+            if not tables and failed:
+                raise next(iter(failed.values()))
             if not tables:
-                what = "`orchestrator status` names the causes"
-                what = f"no reference ran to its end: {what}"
-                raise OrchestratorError(what, str(space.root))
+                what = "none of its cases has run to its end"
+                remedy = "`orchestrator status` names the causes"
+                raise OrchestratorError(what, str(space.root), remedy)
             made = self.files(runs) if self.files else {}
             with folder.renewed():
                 for key, table in tables.items():

@@ -399,6 +399,22 @@ def done_state(case: Case, cases: Path) -> dict[str, Any] | None:
     return marker_of(cases / case.name, case.id)
 
 
+def id_of(directory: Path) -> str:
+    """Read the id of the case in a directory.
+
+    Parameters
+    ----------
+    directory
+        The directory of the case.
+
+    Returns
+    -------
+    str
+        The id; empty where there is no case.
+    """
+    return str(read_json(directory / IDENTITY).get("id", ""))
+
+
 def marker_of(directory: Path, identity: str) -> dict[str, Any] | None:
     """The marker of the finished case of an id.
 
@@ -476,12 +492,32 @@ def prune(case: Case, cases: Path) -> None:
     cases
         The directory of all cases.
     """
-    directory = cases / case.name
-    state = done_state(case, cases) or {}
+    prune_of(cases / case.name, case.id)
+
+
+def prune_of(directory: Path, identity: str) -> bool:
+    """Drop the bulky files of the finished case of an id, see `prune`.
+
+    Parameters
+    ----------
+    directory
+        The directory of the case.
+    identity
+        The id of the case.
+
+    Returns
+    -------
+    bool
+        Whether the case is done; one that is not stays as it is.
+    """
+    state = marker_of(directory, identity)
+    if state is None:
+        return False
     for name in _matching(directory, state.get("bulky", ())):
         (directory / name).unlink()
         with contextlib.suppress(OSError):  # it is not empty
             os.removedirs((directory / name).parent)
+    return True
 
 
 def names_in(cases: Path) -> list[str]:

@@ -17,7 +17,7 @@ from orchestrator import __version__
 from orchestrator.errors import InputError, OrchestratorError, printable
 from orchestrator.runs import case as case_states
 from orchestrator.runs import files, process
-from orchestrator.runs.case import DONE, Case, failure, names_in
+from orchestrator.runs.case import DONE, failure, names_in
 from orchestrator.runs.files import (
     RECORD,
     Folder,
@@ -489,7 +489,7 @@ def status(directory: Path) -> tuple[str, bool]:
     return "\n".join(map(printable, lines)), bool(causes)
 
 
-def prune(space: Workspace, done: Mapping[str, Case], shown: Container[str]) -> str:
+def prune(space: Workspace, done: Mapping[str, str], shown: Container[str]) -> str:
     """Drop the bulky files of the finished cases, but for those that the page shows.
 
     The inputs, and all that tables and page are made of, stay.
@@ -499,7 +499,7 @@ def prune(space: Workspace, done: Mapping[str, Case], shown: Container[str]) -> 
     space
         The directory of the study, which the caller holds.
     done
-        The finished cases by their names.
+        The ids of the cases by their names. One that is not done stays as it is.
     shown
         Names of the cases that the page shows.
 
@@ -509,9 +509,10 @@ def prune(space: Workspace, done: Mapping[str, Case], shown: Container[str]) -> 
         A summary for people.
     """
     before, *_ = _sizes(space)
-    pruned = [case for name, case in done.items() if name not in shown]
-    for case in pruned:
-        case_states.prune(case, space.cases)
+    pruned = []
+    for name, identity in done.items():
+        if name not in shown and case_states.prune_of(space.cases / name, identity):
+            pruned.append(name)
     after, *left = _sizes(space)
     whole = ", ".join(name for name in done if name in shown)
     ran = f"pruned: {len(pruned)} cases; ./Allrun in one of them makes its files anew"

@@ -10,7 +10,9 @@ import pandas as pd
 import pytest
 from PIL import Image
 
+from orchestrator import pipeline
 from orchestrator.cli import main
+from orchestrator.errors import OrchestratorError
 from orchestrator.experiments import erosion
 from orchestrator.grains import onset
 from orchestrator.study import raster, surface_study
@@ -159,6 +161,41 @@ def test_erosion_of_a_cone_stands_beside_that_of_ap42(
     whole = own[own["part"] == "all"]
     assert len(classes) == len(erosion.CLASSES)
     assert whole[classes].to_numpy(float).sum() == pytest.approx(100.0)
+
+
+def test_the_results_of_a_surface_are_pruned_and_stay_finished(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = folder.parent / "cone.toml"
+    shutil.copytree(folder.parent, tmp_path / "moved")
+    out = tmp_path / "moved" / "out"
+    (flow,) = (out / "cases").iterdir()
+    before = {path.name for path in flow.iterdir()}
+    assert main(["prune", str(out)]) == 0
+    assert "pruned: 1 cases" in capsys.readouterr().out
+    gone = before - {path.name for path in flow.iterdir()}
+    # OpenFOAM's last time has the large fields
+    assert [name for name in gone if name.isdecimal()]
+    tables = {path.name: path.read_bytes() for path in (out / "tables").iterdir()}
+    assert main(["study", str(tmp_path / "moved" / file.name), "--out", str(out)]) == 0
+    # no solver has made them anew
+    assert not gone & {path.name for path in flow.iterdir()}
+    again = {path.name: path.read_bytes() for path in (out / "tables").iterdir()}
+    assert again == tables
+
+
+def test_a_surface_without_a_flow_says_why(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "cone.toml").write_text(FILE.partition("[erosion]")[0])
+    full = OrchestratorError("no space is left on the disk", "flow-1: mesh")
+    monkeypatch.setattr(pipeline, "complete", lambda todo, *_, **__: {"flow-1": full})
+    out = tmp_path / "out"
+    code = main(["study", str(tmp_path / "cone.toml"), "--out", str(out)])
+    said = capsys.readouterr().err
+    assert code == full.exit_code
+    assert "no space is left on the disk" in said
+    assert "reference" not in said
 
 
 def test_the_page_of_one_surface_names_it_on_the_card_alone(folder: Path) -> None:
