@@ -29,6 +29,7 @@ from orchestrator.experiments.surface_answer import (
     Answer,
     Direction,
     Ground,
+    Stream,
 )
 from orchestrator.flow.case import SPEED_HEIGHT
 from orchestrator.flow.mesh3 import LEVELS
@@ -49,9 +50,7 @@ from orchestrator.study.surface_parts import SurfaceScene
 from orchestrator.study.surface_study import SurfaceStudy
 from orchestrator.types import FloatArray
 
-WIND = "wind at 10 m, m/s,"
 HEADINGS = {
-    "from_deg": "wind from, °",
     "x_m": "first at x, m",
     "y_m": "y, m",
     "z_m": "z, m",
@@ -244,8 +243,10 @@ def tables(found: Sequence[Answer]) -> dict[str, pd.DataFrame]:
             rows.append({"surface": answer.name, **each.row()})
             curve = {"surface": answer.name, "from_deg": each.from_deg}
             shares = each.shares().at(winds)
-            curves.append(pd.DataFrame({**curve, "wind_m_s": winds, "share": shares}))
-            made[f"faces-{number}-{each.word}"] = each.every
+            names = answer.ground.stream.columns
+            drawn = pd.DataFrame({**curve, MOVES: winds, "share": shares})
+            curves.append(drawn.rename(columns=names))
+            made[f"faces-{number}-{each.word}"] = each.every.rename(columns=names)
     return {
         "directions": pd.DataFrame(rows),
         "shares": pd.concat(curves, ignore_index=True),
@@ -277,10 +278,16 @@ def files(found: Sequence[Answer]) -> dict[str, bytes]:
     for number, answer in enumerate(found, 1):
         grid = answer.grid
         for name, values in answer.maps.items():
-            path = f"maps/{number}-{name}.tif"
+            path = f"maps/{number}-{_in_files(name, answer)}.tif"
             made[path] = geotiff(grid.x, grid.y, values, answer.surface.tags)
         made[f"maps/{number}.vtk"] = _vtk(answer)
     return made
+
+
+def _in_files(name: str, answer: Answer) -> str:
+    """What files call a map, which has the name of a column and maybe a direction."""
+    column, dash, direction = name.partition("-")
+    return answer.ground.stream.columns.get(column, column) + dash + direction
 
 
 def _vtk(answer: Answer) -> bytes:
@@ -292,7 +299,7 @@ def _vtk(answer: Answer) -> bytes:
     height = grid.height + answer.surface.ground.at(x, y)
     body: Any = pyvista.StructuredGrid(x, y, height)
     for name, values in answer.maps.items():
-        body[name] = values.ravel(order="F")
+        body[_in_files(name, answer)] = values.ravel(order="F")
     body["height_m"] = grid.height.ravel(order="F")
     with TemporaryDirectory() as folder:
         path = Path(folder) / "surface.vtk"
@@ -315,7 +322,7 @@ def sections(found: Sequence[Answer], source: str) -> list[Section]:
     list of Section
         The sections, in their order.
     """
-    words = TEXTS["surface"]
+    words = _texts(found[0].ground.stream)
     listed: list[Section] = []
     for number, answer in enumerate(found, 1):
         listed += _sections(answer, f"-{number}" if len(found) > 1 else "", source)
@@ -327,6 +334,15 @@ def sections(found: Sequence[Answer], source: str) -> list[Section]:
     return [*listed, Section("How sure it is", words["sure"])]
 
 
+def _texts(stream: Stream) -> dict[str, str]:
+    """The texts of the page, by their names, with the word for what flows."""
+    texts = TEXTS["surface"]
+    return {
+        name: texts[name].format(flow=stream.word, at=stream.at)
+        for name in ("least", "stress", "winds", "shares", "hours", "sure")
+    }
+
+
 def _directions(answer: Answer) -> pd.DataFrame:
     """The table of directions for people: a place has the digits that its axes need."""
     rows = []
@@ -335,27 +351,31 @@ def _directions(answer: Answer) -> pd.DataFrame:
         for name in ("x_m", "y_m"):
             row[name] = surface_card.in_axes(row[name], answer.cell_m)
         rows.append({"surface": answer.name, **row})
-    return pd.DataFrame(rows).rename(columns=HEADINGS)
+    from_deg = f"{answer.ground.stream.word} from, °"
+    return pd.DataFrame(rows).rename(columns={"from_deg": from_deg, **HEADINGS})
 
 
 def _sections(answer: Answer, end: str, source: str) -> Iterator[Section]:
     """The sections of one surface; the names of its figures have the ending."""
-    words = TEXTS["surface"]
+    stream = answer.ground.stream
+    words = _texts(stream)
     told = "\n\n".join(surface_card.sentences(answer, source))
     first = answer.easiest.first
     mark = (float(first["x_m"]), float(first["y_m"]))
     several = len(answer.directions) > 1
-    title = "least wind of all directions" if several else answer.easiest.title
+    title = answer.easiest.title
+    if several:
+        title = f"least {stream.word} of all directions"
     from_deg = None if several else answer.easiest.from_deg
     least = [maps.Map(title, answer.maps[LEAST], from_deg, mark)]
-    drawing = maps.figure(answer.grid, least, f"{WIND} at which it moves")
+    drawing = maps.figure(answer.grid, least, f"{stream.at}, m/s, at which it moves")
     text = words["least"]
     yield Section(
         "", told, [Figure(f"least{end}", "Where motion starts", text, (), drawing)]
     )
     figures = [_figure(answer, RATIO, f"stress{end}", "Stress", words["stress"])]
     if several:
-        title = "Wind from each direction"
+        title = f"{stream.word.capitalize()} from each direction"
         figures.append(_figure(answer, MOVES, f"winds{end}", title, words["winds"]))
     curves = _curves(answer)
     figures.append(Figure(f"shares{end}", "Share", words["shares"], (), curves))
@@ -378,7 +398,8 @@ def _figure(answer: Answer, column: str, name: str, title: str, text: str) -> Fi
             answer.grid, drawn, "u*/u*₀", colours="RdBu_r", middle=1.0
         )
     else:
-        drawing = maps.figure(answer.grid, drawn, f"{WIND} at which it moves")
+        axis = f"{answer.ground.stream.at}, m/s, at which it moves"
+        drawing = maps.figure(answer.grid, drawn, axis)
     return Figure(name, title, text, (), drawing)
 
 
@@ -393,4 +414,4 @@ def _curves(answer: Answer) -> Canvas:
         if LEAVES in each.faces and answer.ground.is_natural:
             leaving = each.shares(LEAVES).at(winds)
         drawn.append((each.title, each.shares().at(winds), leaving, colour))
-    return maps.shares(drawn, winds)
+    return maps.shares(drawn, winds, answer.ground.stream.at)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -12,6 +12,7 @@ from orchestrator.flow.mesh3 import wind_axes
 from orchestrator.flow.surface_stress import SurfaceStress
 from orchestrator.grains import onset
 from orchestrator.grains.onset import Shares
+from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.physics.threshold import SingleGrain
 from orchestrator.report.maps import Grid
 from orchestrator.study.surface import Plane, Surface
@@ -30,8 +31,42 @@ FIRST_LEAVES = "first leaves, m/s"
 """Columns of directions: wind in which motion starts, and the first grains leave."""
 ASKED_SHARES = (0.1, 0.5)
 """Shares of the surface whose winds the answer has."""
+OF_CURRENT = {
+    MOVES: "current_m_s",
+    LEAVES: "current_leaves_m_s",
+    GOES_ON: "current_goes_on_m_s",
+    LEAST: "least_current_m_s",
+}
+"""What tables and maps call those columns in a liquid."""
 PER_CELL = 2.0
 """Steps of the raster of maps in a cell of the flow, at least."""
+
+
+class Stream(NamedTuple):
+    """What flows over a surface.
+
+    Attributes
+    ----------
+    word
+        The word for it.
+    height
+        Height above flat ground at which its speed is told, m.
+    columns
+        Names of columns in files, by those here, where they are others.
+    """
+
+    word: str
+    height: float
+    columns: Mapping[str, str]
+
+    @property
+    def at(self) -> str:
+        """Its speed in words."""
+        return f"{self.word} at {self.height:g} m"
+
+
+WIND = Stream("wind", onset.WIND_HEIGHT, {})
+CURRENT = Stream("current", 1.0, OF_CURRENT)
 
 
 @dataclass(frozen=True)
@@ -71,9 +106,15 @@ class Ground:
         Returns
         -------
         ndarray
-            Wind at 10 m, m/s, (F,).
+            Speed of the `stream`, m/s, (F,).
         """
-        return onset.wind_of(onset.undisturbed(local, ratio), self.roughness)
+        upstream = onset.undisturbed(local, ratio)
+        return onset.wind_of(upstream, self.roughness, self.stream.height)
+
+    @property
+    def stream(self) -> Stream:
+        """What flows over the ground: a wind, or in a liquid a current."""
+        return WIND if self.grain.fluid_density < GAS_BELOW else CURRENT
 
     @property
     def level_ustar(self) -> float:
@@ -86,8 +127,9 @@ class Ground:
 
     @property
     def flat(self) -> float:
-        """Wind at 10 m at which the grain moves on flat ground, m/s."""
-        return float(onset.wind_of(self.level_ustar, self.roughness))
+        """Speed of the `stream` at which the grain moves on flat ground, m/s."""
+        speed = onset.wind_of(self.level_ustar, self.roughness, self.stream.height)
+        return float(speed)
 
     def faces(
         self, stress: SurfaceStress, from_deg: float, plane: Plane
@@ -159,10 +201,13 @@ class Direction:
         Where the wind comes from, degrees.
     every
         All faces, also those of the flat ground.
+    stream
+        What flows.
     """
 
     from_deg: float
     every: pd.DataFrame
+    stream: Stream = WIND
 
     @classmethod
     def of(
@@ -192,7 +237,7 @@ class Direction:
         """
         every = ground.faces(stress, from_deg, surface.ground)
         every[HEAP] = surface.heap_at(stress.x_m, stress.y_m)
-        return cls(from_deg, every)
+        return cls(from_deg, every, ground.stream)
 
     @cached_property
     def form(self) -> pd.DataFrame:
@@ -260,7 +305,7 @@ class Direction:
     @property
     def title(self) -> str:
         """The direction in words."""
-        return f"wind from {self.from_deg:g}°"
+        return f"{self.stream.word} from {self.from_deg:g}°"
 
     def row(self) -> dict[str, Any]:
         """Give the numbers of the direction.

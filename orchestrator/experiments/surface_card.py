@@ -61,11 +61,13 @@ def card(found: Sequence[Answer], source: str) -> Card:
     first = min(found, key=lambda answer: answer.easiest.starts)
     others = f"; {len(found)} surfaces are compared below" if len(found) > 1 else ""
     directions = [f"{each.from_deg:g}°" for each in first.directions]
-    winds = f"wind from {', '.join(directions)}"
+    stream = first.ground.stream
+    winds = f"{stream.word} from {', '.join(directions)}"
     if len(directions) > 4:
-        winds = f"wind from {len(directions)} directions"
+        winds = f"{stream.word} from {len(directions)} directions"
     return Card(
-        "In which wind does this surface start to move, and how much of it moves?",
+        f"In which {stream.word} does this surface start to move, and how much of it "
+        "moves?",
         f"{first.name}; {heaps(first)}; {_grain(first, source)}; {winds}{others}.",
         tuple(_numbers(first)),
         NOT_MEASURED.format(*_ends_at_masts()),
@@ -102,6 +104,7 @@ def _numbers(answer: Answer) -> Iterator[Number]:
     """The figures of the card."""
     first = answer.easiest
     flat = answer.ground.flat
+    stream = answer.ground.stream
     notes = [f"first at {_place(answer)}", f"on flat ground in {flat:.3g} m/s"]
     high = factors_of_wind(onset.STARTS)[1] * first.starts
     alike = [each for each in answer.directions if each.starts <= high]
@@ -111,11 +114,11 @@ def _numbers(answer: Answer) -> Iterator[Number]:
     yield _wind(
         first,
         onset.STARTS,
-        f"wind at 10 m from {first.from_deg:g}° in which motion starts",
+        f"{stream.at} from {first.from_deg:g}° in which motion starts",
         "; ".join(filter(None, [*notes, tied])),
     )
     if isfinite(first.shares().wind_for(HALF)):
-        what = f"wind at 10 m from {first.from_deg:g}° in which half of it moves"
+        what = f"{stream.at} from {first.from_deg:g}° in which half of it moves"
         yield _wind(first, HALF, what)
     if answer.rose is not None:
         yield Number(
@@ -132,7 +135,7 @@ def _numbers(answer: Answer) -> Iterator[Number]:
     yield Number(
         100 * float(share),
         "%",
-        f"of it moves in {flat:.3g} m/s, the wind that moves flat ground",
+        f"of it moves in {flat:.3g} m/s, the {stream.word} that moves flat ground",
         low=100 * float(least),
         high=100 * float(most),
         interval_of=INTERVAL_OF,
@@ -254,9 +257,10 @@ def sentences(answer: Answer, source: str) -> Iterator[str]:
     """
     first = answer.easiest
     shares = first.shares()
+    stream = answer.ground.stream
     yield (
-        f"On {answer.name} ({_grain(answer, source)}) motion starts in a wind of "
-        f"{first.starts:.3g} m/s at 10 m from {first.from_deg:g}°. "
+        f"On {answer.name} ({_grain(answer, source)}) motion starts in a {stream.word} "
+        f"of {first.starts:.3g} m/s at {stream.height:g} m from {first.from_deg:g}°. "
         f"A tenth of the surface moves in {shares.wind_for(TENTH):.3g} m/s."
     )
     if len(answer.directions) > 1:

@@ -193,8 +193,10 @@ def goes_on(
     return np.asarray(np.sqrt(found.shields) * unit)
 
 
-def wind_of(ustar0: ArrayLike, roughness: float) -> FloatArray:
-    """Compute the wind at 10 m over flat ground.
+def wind_of(
+    ustar0: ArrayLike, roughness: float, height: float = WIND_HEIGHT
+) -> FloatArray:
+    """Compute the wind, or the current, at a height over flat ground.
 
     Parameters
     ----------
@@ -202,13 +204,15 @@ def wind_of(ustar0: ArrayLike, roughness: float) -> FloatArray:
         Undisturbed friction velocity, m/s.
     roughness
         Roughness length z0 of the ground, m.
+    height
+        The height, m; by default that of winds.
 
     Returns
     -------
     FloatArray
         Wind, m/s, of the same shape.
     """
-    return log_law_speed(ustar0, WIND_HEIGHT, roughness)
+    return log_law_speed(ustar0, height, roughness)
 
 
 def undisturbed(local: FloatArray, ratio: FloatArray) -> FloatArray:

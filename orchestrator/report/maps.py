@@ -286,7 +286,9 @@ def _scale(ax: Axes) -> None:
 
 
 def shares(
-    curves: Sequence[tuple[str, FloatArray, FloatArray, str]], winds: FloatArray
+    curves: Sequence[tuple[str, FloatArray, FloatArray, str]],
+    winds: FloatArray,
+    speed: str,
 ) -> Canvas:
     """Draw the share of a surface that is above threshold against the wind.
 
@@ -297,6 +299,8 @@ def shares(
         a gust or an empty array, and its colour.
     winds
         The winds, m/s.
+    speed
+        What they are, in words.
 
     Returns
     -------
@@ -304,7 +308,7 @@ def shares(
         The figure.
     """
     canvas, (ax,) = style.grid(
-        [""], 2.6, "wind at 10 m over flat ground, m/s", "share that moves, %", 1
+        [""], 2.6, f"{speed} over flat ground, m/s", "share that moves, %", 1
     )
     colours = []
     for label, moving, leaving, colour in curves:

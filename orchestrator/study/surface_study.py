@@ -14,6 +14,7 @@ from typing import Any
 from pydantic import Field, ValidationError
 
 from orchestrator.errors import InputError
+from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.runs.files import digest_file
 from orchestrator.study import units
 from orchestrator.study.declare import Part, UnfitError
@@ -152,6 +153,9 @@ def load(source: str | Path) -> SurfaceStudy | None:
     if file.erosion.wind is not None:
         rose = files.rose(file.erosion.wind)
     scenes = tuple(_scenes(file, files))
+    if rose and any(scene.fluid.density >= GAS_BELOW for scene in scenes):
+        what = "the fluid is a liquid, and a wind rose is of air"
+        raise InputError(what, f"{where}: erosion.wind", "leave it out")
     digests = {**files.digests, path.name: sha256(content).hexdigest()}
     return SurfaceStudy(
         name=path.stem,

@@ -15,6 +15,7 @@ from orchestrator.cli import main
 from orchestrator.errors import OrchestratorError
 from orchestrator.experiments import erosion
 from orchestrator.grains import onset
+from orchestrator.physics.constants import KARMAN
 from orchestrator.study import raster, surface_study
 from orchestrator.study.surface import cone
 
@@ -182,6 +183,43 @@ def test_the_results_of_a_surface_are_pruned_and_stay_finished(
     assert not gone & {path.name for path in flow.iterdir()}
     again = {path.name: path.read_bytes() for path in (out / "tables").iterdir()}
     assert again == tables
+
+
+def test_in_water_the_answer_is_a_current(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = FILE.replace('kind = "air"', 'kind = "water"').partition("[erosion]")[0]
+    file, out = tmp_path / "cone.toml", tmp_path / "out"
+    file.write_text(text)
+    # the flow is the same: its viscosity is that of the solve
+    shutil.copytree(folder / "cases", out / "cases")
+    assert main(["study", str(file), "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("In which current does this surface start to move")
+    assert "current at 1 m from 270°" in said
+    assert {line for line in said.splitlines() if "wind" in line} == {
+        line for line in said.splitlines() if "masts of Askervein" in line
+    }
+    (flow,) = (out / "cases").iterdir()
+    assert flow.name in {path.name for path in (folder / "cases").iterdir()}
+    every = pd.read_csv(out / "tables" / "faces-1-270.csv")
+    shares = pd.read_csv(out / "tables" / "shares.csv")
+    assert not [name for name in (*every, *shares) if "wind" in name]
+    study = surface_study.load(file)
+    assert study is not None
+    grain = study.scenes[0].grain_in_pocket
+    row = every[every["z_m"] > 5].iloc[3]
+    slope, heading = np.array([row["slope_deg"]]), np.array([row["heading_deg"]])
+    local = onset.leaves(grain, "bridged", slope, heading)[0]
+    # the law begins at 0 on the ground
+    current = local / row["ustar_over_ustar0"] * np.log1p(1 / 0.005) / KARMAN
+    assert row["current_leaves_m_s"] == pytest.approx(current, rel=1e-4)
+    assert (out / "maps" / "1-current_m_s-270.tif").is_file()
+    assert not list((out / "maps").glob("*wind*"))
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "current at 1 m" in page
+    assert "wind at 10 m, " not in page
+    assert "wind in which" not in page
 
 
 def test_a_surface_without_a_flow_says_why(

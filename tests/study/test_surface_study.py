@@ -226,6 +226,13 @@ def test_the_name_of_a_file_says_which_lengths_were_understood(tmp_path: Path) -
     assert scene.name.startswith(f"heap.xyz, {width} m by {width} m, 32.81 m high")
 
 
+def test_a_wind_rose_over_water_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "year.csv").write_text("from_deg,speed_m_s,share\n0,5,1\n")
+    text = FILE.replace('"air"', '"water"') + '[erosion]\nwind = "year.csv"\n'
+    with pytest.raises(InputError, match=r"erosion\.wind: the fluid is a liquid"):
+        load(tmp_path, text)
+
+
 def test_a_wind_that_is_likelier_in_another_unit_is_asked_about(tmp_path: Path) -> None:
     (tmp_path / "year.csv").write_text("from_deg,speed_m_s,share\n0,36,0.9\n0,0,0.1\n")
     study = load(tmp_path, FILE + '[erosion]\nwind = "year.csv"\n')
