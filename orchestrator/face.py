@@ -24,11 +24,18 @@ FIRST = (
     "alpha_deg",
     "fraction",
     "wind_10m_m_s",
+    "wind_10m_low_m_s",
+    "wind_10m_high_m_s",
     "mean_velocity_m_s",
+    "mean_velocity_low_m_s",
+    "mean_velocity_high_m_s",
     "stress_pa",
+    "stress_low_pa",
+    "stress_high_pa",
     "ustar0_m_s",
     "ustar0_low_m_s",
     "ustar0_high_m_s",
+    "interval_of",
     "measured_ustar0_m_s",
     "shields",
     "usable",
@@ -36,7 +43,7 @@ FIRST = (
 )
 """Columns of `Opened.thresholds` that come before all others, those that have values.
 
-A gas has no mean velocity and a liquid no wind, so that these are at most twelve.
+The flow and its interval are those of the page.
 """
 OF_GRAINS = {
     "ustar0_m_s": ("ustar_m_s", "ustar_closed_form_m_s"),
@@ -310,9 +317,10 @@ class Opened:
     def thresholds(self) -> pd.DataFrame:
         """The thresholds of the piles, or else of single grains, beside their scenes.
 
-        The first twelve columns are those that most users need. They tell points apart,
-        and have the flow, its interval, the measured flow, the Shields number, and
-        whether the threshold is usable. ``why_not`` is NaN for a usable threshold.
+        The first columns are those that most users need. They tell points apart, and
+        have the flow and its interval as the page has them, the measured flow, the
+        Shields number, and whether the threshold is usable. ``why_not`` is NaN for a
+        usable threshold.
         """
         piles = self._results.joined("pile_threshold")
         rows = piles if len(piles) else self._results.joined("single_grain")

@@ -33,7 +33,7 @@ from orchestrator.report.subjects import (
     solid,
 )
 from orchestrator.study.profile import WITH_X
-from orchestrator.tables.quoted import grain_ustar
+from orchestrator.tables.quoted import MEASURED, SEEDS, grain_ustar
 from orchestrator.types import BoolArray, FloatArray
 
 NONE = Card(
@@ -44,6 +44,8 @@ NONE = Card(
     Worth("bad", "no answer yet", "No case has given a result."),
 )
 """The card of a study without results."""
+NUMBERS = "load steps, count and the known error of the method"
+"""What the numerical interval of a share of a bed is of."""
 OF_ONE_GRAIN = (*GRAIN_COLUMNS.values(), "gusts", "criterion")
 """Columns that the thresholds of one grain by all laws follow from."""
 SHAPES = {
@@ -95,7 +97,7 @@ def _of_beds(results: Results) -> Card:
     rows = results.exemplars
     if rows.empty:
         rows = results.at_fraction.assign(seeds=1, of_seeds=1)
-    if are_several_beds(rows):
+    if are_several_beds(results.at_fraction):
         return _of_several(rows, results)
     row = rows.iloc[0]
     if sheets.sizes(results) is not None:
@@ -116,7 +118,7 @@ def are_several_beds(rows: pd.DataFrame) -> bool:
     bool
         Whether they are.
     """
-    return len(rows[labels.varying(rows, "fraction")].drop_duplicates()) > 1
+    return bool(labels.varying(rows, "fraction"))
 
 
 def is_one_grain(grains: pd.DataFrame) -> bool:
@@ -145,8 +147,18 @@ def _of_bed(row: pd.Series, results: Results) -> Card:
         _scene(row, pile, results),
         tuple(_numbers_of_bed(row, pile, results, told)),
         single.source(row, told, single.known(row["first_ustar0_m_s"])),
-        single.worth(row),
+        _worth(row),
     )
+
+
+def _worth(row: pd.Series, few: bool = False) -> Worth:
+    """What the answer of one bed is worth, seeds as one."""
+    worth = single.worth(row, few)
+    if worth.mark == "bad" or row["seeds"] == row["of_seeds"]:
+        return worth
+    word = f"usable, with gaps: {row['seeds']} of {row['of_seeds']} beds"
+    advice = "They differ in chance alone; the table says what is against the others."
+    return Worth("care", word, advice)
 
 
 def _question(row: pd.Series, pile: Pile, told: Quantity) -> str:
@@ -211,15 +223,9 @@ def _numbers_of_bed(
 
 
 def _first_motion(row: pd.Series, first: float, told: Quantity) -> Number:
-    """The flow that moves the first grains, with its interval or that of the seeds."""
-    low, high = single.first_interval(row)
-    of_what = "load step and the known error of the method"
-    if row["of_seeds"] > 1:
-        low = float(row["first_least"])
-        high = float(row["first_largest"])
-        of_what = _of_seeds(row)
-    elif row["tested_rows"] > 0:
-        of_what = single.tested_on(row)
+    """The flow that moves the first grains, with its interval."""
+    low, high = _speeds(row, "first_ustar0")
+    of_what = _interval_of(row, "load step and the known error of the method")
     return _flow_number(row, told, "the first grains", (first, low, high), of_what)
 
 
@@ -244,26 +250,24 @@ def _flow_number(
     )
 
 
-def _of_seeds(row: pd.Series) -> str:
-    """What the interval of several beds is of."""
-    beds = f"{row['seeds']} beds that differ in chance alone"
-    return f"{beds}; the table has the interval of the method"
+def _speeds(row: pd.Series, stem: str) -> tuple[float, float]:
+    """The ends of the interval of a friction velocity of a row, m/s."""
+    low, high = (single.known(row[f"{stem}{end}_m_s"]) for end in ("_low", "_high"))
+    return low, high
 
 
-def _share_interval(row: pd.Series) -> tuple[float, float, str]:
-    """Ends of the friction velocity of a share (m/s), and what the interval is of."""
-    ustar = float(row["ustar0_m_s"])
-    if row["of_seeds"] > 1:
-        ends = (float(row["least"]), float(row["largest"]))
-        of_what = _of_seeds(row)
-    elif row["tested_rows"] > 0:
-        return *single.tested(row, ustar), single.tested_on(row)
-    else:
-        ends = (single.known(row["shields_low"]), single.known(row["shields_high"]))
-        of_what = "load steps, count and the known error of the method"
-    theta = float(row["shields"])
-    low, high = (ustar * math.sqrt(end / theta) for end in ends)
-    return low, high, of_what
+def _interval_of(row: pd.Series, numerical: str) -> str:
+    """What the interval of a bed is of, of seeds together."""
+    of_what = row["interval_of"]
+    if not isinstance(of_what, str):
+        return ""
+    beds = ""
+    if row.get("of_seeds", 1) > 1:
+        beds = f"{row['of_seeds']} beds that differ in chance alone"
+    if of_what == SEEDS:
+        return f"the range of {beds}; no error of the method is known"
+    said = single.tested_on(row) if of_what == MEASURED else numerical
+    return f"{said}; it holds {beds}" if beds else said
 
 
 def _place(row: pd.Series, pile: Pile, results: Results) -> Number:
@@ -324,10 +328,11 @@ def share(row: pd.Series, told: Quantity) -> Number:
     Returns
     -------
     Number
-        With its interval, or the range of the seeds.
+        With its interval.
     """
     ustar = float(row["ustar0_m_s"])
-    low, high, of_what = _share_interval(row)
+    low, high = _speeds(row, "ustar0")
+    of_what = _interval_of(row, NUMBERS)
     part = percent(row["fraction"])
     what = "of the bed" if row["method"] == "local" else "of the grains"
     return _flow_number(row, told, f"{part} {what}", (ustar, low, high), of_what)
@@ -347,7 +352,7 @@ def ustar_number(row: pd.Series) -> Number:
         With its interval.
     """
     ustar = float(row["ustar0_m_s"])
-    low, high, _ = _share_interval(row)
+    low, high = _speeds(row, "ustar0")
     return Number(
         ustar,
         "m/s",
@@ -371,19 +376,15 @@ def _of_several(rows: pd.DataFrame, results: Results) -> Card:
     ]
     rows = rows.assign(**{column: values})
     shown = rows.loc[shown.index].sort_values(column, kind="stable")
-    shown = sheets.with_tested(shown, told)
-    telling = labels.varying(rows, "fraction")
-    numbers = [
-        _end_of_range(shown.iloc[0], told, telling, "least"),
-        _end_of_range(shown.iloc[-1], told, telling, "most"),
-    ]
+    telling = labels.varying(results.at_fraction, "fraction")
+    numbers = _range(shown, told, telling)
     every = results.joined("pile_threshold")
     scenes = every["scene_id"].nunique()
     count = int(every["usable"].sum())
-    shape = _common_shape(rows)
+    shape = _common_shape(results.at_fraction)
     return Card(
         f"At which {told.flow} do {scenes} {shape} start to move?",
-        _span_of(rows),
+        _span_of(results.at_fraction),
         (*numbers, _usable_number(count, len(every))),
         single.source(shown.iloc[0], told),
         _worth_of_many(shown, count, len(every)),
@@ -427,6 +428,16 @@ def _ends(values: Sequence[float]) -> list[str]:
     return list(dict.fromkeys([f"{values[0]:g}", f"{values[-1]:g}"]))
 
 
+def _range(rows: pd.DataFrame, told: Quantity, telling: Sequence[str]) -> list[Number]:
+    """The least and the largest flow of beds or grains that rise by it, or the one."""
+    if len(rows) == 1:
+        return [_end_of_range(rows.iloc[0], told, telling, "")]
+    return [
+        _end_of_range(rows.iloc[0], told, telling, "least "),
+        _end_of_range(rows.iloc[-1], told, telling, "most "),
+    ]
+
+
 def _end_of_range(
     row: pd.Series, told: Quantity, telling: Sequence[str], which: str
 ) -> Number:
@@ -438,13 +449,11 @@ def _end_of_range(
         moves = f"moves {percent(row['fraction'])}"
     low = single.known(row.get(told.column("_low")))
     high = single.known(row.get(told.column("_high")))
-    of_what = ""
-    if row["tested_rows"] > 0:
-        of_what = single.tested_on(row)
+    of_what = _interval_of(row, NUMBERS if "fraction" in row else "the load step")
     return Number(
         single.in_unit(row, ustar, told),
         told.unit,
-        f"{which} {told.name} that {moves}: {what}",
+        f"{which}{told.name} that {moves}: {what}",
         single.place_of(told, row),
         low=low,
         high=high,
@@ -499,7 +508,7 @@ def _of_mixture(row: pd.Series, results: Results) -> Card:
         _scene(row, pile, results),
         (all_sizes, spread, flow),
         single.source(row, told),
-        single.worth(row, few=bool(here["few"].any())),
+        _worth(row, few=bool(here["few"].any())),
     )
 
 
@@ -532,14 +541,13 @@ def _of_grains(grains: pd.DataFrame) -> Card:
     told = sheets.quantity(grains)
     usable = grains[valid(grains)]
     shown = usable if len(usable) else grains
-    shown = sheets.with_tested(shown.sort_values("ustar0_m_s", kind="stable"), told)
+    shown = shown.sort_values("ustar0_m_s", kind="stable")
     telling = labels.varying(grains, "bed")
     return Card(
         f"At which {told.flow} does one grain start to move, by its size and bed?",
         _span_of(grains),
         (
-            _end_of_range(shown.iloc[0], told, telling, "least"),
-            _end_of_range(shown.iloc[-1], told, telling, "most"),
+            *_range(shown, told, telling),
             _usable_number(len(usable), len(grains)),
         ),
         single.source(shown.iloc[0], told),

@@ -16,6 +16,8 @@ DISCS: dict[Mark, str] = {"good": "●", "care": "◐", "bad": "○"}
 """A full disc, a half disc and a ring, as the page draws them."""
 WIDTH = 79
 """Letters of a line in a terminal."""
+MOST_DIGITS = 9
+"""Largest number of digits that tell two ends of an interval apart."""
 MOST_NUMBERS = 3
 """Largest number of large figures of a card."""
 
@@ -92,11 +94,14 @@ class Number:
 
     @property
     def interval(self) -> str:
-        """The interval as it is written, without its unit; empty without one."""
+        """The interval as it is written, without its unit; empty without one.
+
+        Its ends have more digits than the number where they would be written alike.
+        """
         has_low = math.isfinite(self.low)
         has_high = math.isfinite(self.high)
         if has_low and has_high:
-            return self._written(self.low, self.high, " … ")
+            return apart(self.low, self.high, self._digits, "f")
         if has_low:
             return f"above {self._one(self.low)}"
         return f"below {self._one(self.high)}" if has_high else ""
@@ -126,6 +131,37 @@ class Number:
         if self.decimals is not None:
             return self.decimals
         return decimals(self.value)
+
+
+def apart(low: float, high: float, digits: int, form: str) -> str:
+    """Write both ends of an interval, with as many digits as tell them apart.
+
+    Parameters
+    ----------
+    low, high
+        The ends.
+    digits
+        Digits behind the point, or of ``#g`` those that matter, if these are enough.
+    form
+        Format of a number without its digits: ``f``, ``g`` or ``#g``.
+
+    Returns
+    -------
+    str
+        The text.
+
+    Examples
+    --------
+    >>> apart(0.1717, 0.1721, 2, "f"), apart(0.17, 0.17, 2, "f")
+    ('0.1717 … 0.1721', '0.17 … 0.17')
+    """
+    flag, kind = form[:-1], form[-1]
+    ends = (low, high)
+    texts = [f"{end:{flag}.{digits}{kind}}" for end in ends]
+    while texts[0] == texts[1] and low != high and digits < MOST_DIGITS:
+        digits += 1
+        texts = [f"{end:{flag}.{digits}{kind}}" for end in ends]
+    return " … ".join(texts)
 
 
 def decimals(value: float) -> int:

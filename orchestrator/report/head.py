@@ -46,7 +46,7 @@ def of(results: Results) -> Head | None:
     pile = results.plan.piles[str(row["scene_id"])]
     has_place = row["first_ustar0_m_s"] > 0 and not single.is_level(row)
     is_line = has_place and not pile.bed.is_triangle
-    if is_line and not answers.are_several_beds(rows):
+    if is_line and not answers.are_several_beds(results.at_fraction):
         return head_line.along(row, pile, results)
     return None
 
@@ -72,7 +72,7 @@ def below(results: Results) -> Head | None:
     row = rows.iloc[0]
     if sheets.sizes(results) is not None:
         return head_share.sizes(row, results)
-    if answers.are_several_beds(rows):
+    if answers.are_several_beds(results.at_fraction):
         return head_sweep.sweep(rows)
     return head_share.shares(row, results)
 

@@ -20,7 +20,7 @@ from orchestrator.report.drawing import (
     margins,
     ratio,
 )
-from orchestrator.report.results import Results
+from orchestrator.report.results import Results, seeds_of
 from orchestrator.report.style import Look
 from orchestrator.report.subjects import Quantity
 from orchestrator.types import BoolArray, FloatArray
@@ -87,9 +87,7 @@ def _curves(row: pd.Series, results: Results) -> list[tuple[Any, Any]]:
     if table.empty:
         return []
     told = single.quantity(row)
-    scenes = [row["scene_id"]]
-    if row["of_seeds"] > 1:
-        scenes += [name for name in table["scene_id"].unique() if name != scenes[0]]
+    scenes = [str(row["scene_id"]), *seeds_of(row, results.at_fraction)]
     found = []
     for scene in scenes:
         curve = table[table["scene_id"] == scene]

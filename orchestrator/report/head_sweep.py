@@ -54,7 +54,7 @@ def sweep(rows: pd.DataFrame) -> Head | None:
     if column is None:
         return None
     others = [name for name in labels.varying(rows, column) if name != "fraction"]
-    series = _series(sheets.with_tested(rows, told), others)
+    series = _series(rows, others)
     if len(series) > MOST_SERIES or len(rows) < 2:
         return None
     info = labels.words(column)

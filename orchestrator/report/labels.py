@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from orchestrator.report.card import apart
 from orchestrator.study import fields
 from orchestrator.study.declare import Info
 
@@ -195,33 +196,33 @@ def amount(value: float, unit: str) -> str:
     return f"{value:g} {unit}".rstrip()
 
 
-def interval(low: float, high: float, form: str = "#.3g") -> str:
+def interval(low: float, high: float, digits: int = 3, form: str = "#g") -> str:
     """Write an interval.
 
     Parameters
     ----------
     low, high
         Its ends; one that is not known (NaN, infinite) leaves it open there.
-    form
-        Format of a number.
+    digits, form
+        How a number is written, as of `card.apart`.
 
     Returns
     -------
     str
-        The text, one number where both ends are written alike.
+        The text; ends that would be written alike have more digits.
 
     Examples
     --------
-    >>> interval(0.1, 0.2), interval(0.1, float("nan"))
-    ('0.100 … 0.200', 'above 0.100')
+    >>> interval(0.1, 0.2), interval(0.1, float("nan")), interval(0.1713, 0.1714)
+    ('0.100 … 0.200', 'above 0.100', '0.1713 … 0.1714')
     """
-    ends = [format(float(end), form) for end in (low, high) if np.isfinite(end)]
-    if len(ends) == 2:
-        return " … ".join(dict.fromkeys(ends))
+    if np.isfinite(low) and np.isfinite(high):
+        return apart(low, high, digits, form)
+    one = f"{form[:-1]}.{digits}{form[-1]}"
     if np.isfinite(low):
-        return f"above {ends[0]}"
+        return f"above {low:{one}}"
     if np.isfinite(high):
-        return f"below {ends[0]}"
+        return f"below {high:{one}}"
     return "—"
 
 

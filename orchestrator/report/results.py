@@ -123,14 +123,15 @@ class Results:
 
     @cached_property
     def exemplars(self) -> pd.DataFrame:
-        """The thresholds at that fraction, rising by slope.
+        """The thresholds at that fraction, seeds as one, rising by slope.
 
         Of each slope the usable first, then large grains, DEM, beds that wear, the
-        least z0.
+        least z0. Beds that do not reach the fraction are not among them.
         """
         if self.at_fraction.empty:
             return self.at_fraction
-        here = seeds_as_one(self.at_fraction[self.at_fraction["shields"].notna()])
+        here = seeds_as_one(self.at_fraction)
+        here = here[here["shields"].notna()]
         order = here.assign(dem=here["method"] == "dem", wears=here["update"] > 0)
         by = ["alpha_deg", "usable", "d_m", "dem", "wears", "z0_over_d"]
         return order.sort_values(
@@ -223,6 +224,8 @@ def split(
 def seeds_as_one(rows: pd.DataFrame) -> pd.DataFrame:
     """Merge thresholds of piles that differ in their seed alone.
 
+    The tables give all of them one interval, which holds them all.
+
     Parameters
     ----------
     rows
@@ -231,18 +234,18 @@ def seeds_as_one(rows: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        A row with the means over the usable seeds, with the columns ``seeds`` and
-        ``of_seeds`` (how many, of how many), ``least`` and ``largest`` of their Shields
-        numbers, ``first_least`` and ``first_largest`` of the flows that move the first
-        grain.
+        A row with the means over the usable seeds, or over all if none is, with the
+        columns ``seeds``, how many seeds the means are of, and ``of_seeds``, how many
+        there are.
     """
-    keys = [*fields.others(rows, "seed"), "asked", "fraction"]
+    keys = _but_seed(rows)
     usable = valid(rows)
     twins = usable.groupby([rows[key] for key in keys], dropna=False)
     is_told = usable | ~twins.transform("any")
     rows = rows.assign(of_seeds=twins.transform("size"))[is_told]
+    # of seeds that are not usable the first that reached the fraction stands for all
+    rows = rows.sort_values("shields", key=pd.isna, kind="stable")
     groups = rows.groupby(keys, dropna=False)
-    tau = groups["shields"]
     names = [
         "shields",
         "ustar0_m_s",
@@ -250,17 +253,37 @@ def seeds_as_one(rows: pd.DataFrame) -> pd.DataFrame:
         "shields_model_low",
         "shields_model_high",
     ]
-    first = groups["first_ustar0_m_s"]
     means: pd.DataFrame = groups[names].transform("mean")
-    rows = rows.assign(
-        **means,
-        first_least=first.transform("min"),
-        first_largest=first.transform("max"),
-        least=tau.transform("min"),
-        largest=tau.transform("max"),
-        seeds=tau.transform("size"),
-    )
+    rows = rows.assign(**means, seeds=groups["shields"].transform("count"))
     return rows.drop_duplicates(keys)
+
+
+def _but_seed(rows: pd.DataFrame) -> list[str]:
+    """The columns in which thresholds of beds that differ in their seed alone agree."""
+    return [*fields.others(rows, "seed"), "asked", "fraction"]
+
+
+def seeds_of(row: pd.Series, rows: pd.DataFrame) -> list[str]:
+    """List the scenes whose beds differ from that of a row in their seed alone.
+
+    Parameters
+    ----------
+    row
+        A row of the thresholds.
+    rows
+        Thresholds with the columns of their scenes.
+
+    Returns
+    -------
+    list of str
+        The ids, without that of the row.
+    """
+    groups = rows.groupby(_but_seed(rows), dropna=False).ngroup()
+    is_row = (rows["scene_id"] == row["scene_id"]) & (
+        rows["fraction"] == row["fraction"]
+    )
+    is_twin = groups.isin(groups[is_row]) & ~is_row
+    return [str(name) for name in rows.loc[is_twin, "scene_id"]]
 
 
 def drawable(table: pd.DataFrame, *columns: str) -> "pd.Series[bool]":

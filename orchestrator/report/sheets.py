@@ -135,10 +135,9 @@ def _first_grain(row: pd.Series, frame: pd.DataFrame) -> pd.DataFrame:
     values[PART] = "first grain"
     heads = _heads(told)
     values[heads[0]] = f"{single.in_unit(row, ustar, told):#.3g}"
-    ends = single.first_interval(row)
-    if heads[1] in values and not np.isnan(ends).all():
-        low, high = (single.in_unit(row, end, told) for end in ends)
-        values[heads[1]] = labels.interval(low, high)
+    if heads[1] in values:
+        ends = (row[f"first_{told.column(end)}"] for end in ("_low", "_high"))
+        values[heads[1]] = labels.interval(*ends)
     if heads[2] in values:
         values[heads[2]] = f"{single.in_unit(row, beside, told):#.3g}"
     if USTAR_HEAD in values:
@@ -194,14 +193,12 @@ def single_grains(results: Results) -> pd.DataFrame:
     if rows.empty:
         return rows
     is_dem = rows["method"] == "dem"
-    exact = rows["shields_closed_form"]
     re = rows["reynolds"].where(is_dem, rows["reynolds_closed_form"])
-    values = {}
-    for end in ("", "_low", "_high"):
-        values[f"shields{end}"] = rows[f"shields_dem{end}"].where(is_dem, exact)
-    ustar = rows["ustar_m_s"].where(is_dem, rows["ustar_closed_form_m_s"])
-    values["ustar0_m_s"] = ustar
-    values["by"] = is_dem.map({True: "DEM", False: "closed form"})
+    values = {
+        "shields": rows["shields_dem"].where(is_dem, rows["shields_closed_form"]),
+        "ustar0_m_s": rows["ustar_m_s"].where(is_dem, rows["ustar_closed_form_m_s"]),
+        "by": is_dem.map({True: "DEM", False: "closed form"}),
+    }
     return pd.concat([rows.assign(reynolds=re), pd.DataFrame(values)], axis=1)
 
 
@@ -269,7 +266,6 @@ def _thresholds(
     else:
         rows = rows.sort_values(["alpha_deg", "d_m"], kind="stable")
     told = quantity(rows)
-    rows = with_tested(rows, told)
     rows = _open_ended(rows, "shields_low", "shields_high")
     rows = _open_ended(rows, told.column("_low"), told.column("_high"))
     number = rows.groupby(list(keys), dropna=False, sort=False).ngroup()
@@ -314,38 +310,6 @@ def _columns(
         ends = ["shields_model_low", "shields_model_high"]
         columns["interval of other models"] = ends
     return columns
-
-
-def with_tested(rows: pd.DataFrame, told: Quantity) -> pd.DataFrame:
-    """Give thresholds their tested intervals where there are such.
-
-    Parameters
-    ----------
-    rows
-        Thresholds with the columns of their scenes.
-    told
-        What their flow is told by.
-
-    Returns
-    -------
-    DataFrame
-        The rows with other intervals of the Shields number and of the flow in its unit.
-    """
-    is_tested = rows["tested_rows"] > 0
-    if not is_tested.any():
-        return rows
-    of_unit: dict[str, list[float]] = {"_low": [], "_high": []}
-    for _, row in rows.iterrows():
-        ends = single.tested(row, float(row["ustar0_m_s"]))
-        for name, end in zip(of_unit, ends, strict=True):
-            of_unit[name].append(single.in_unit(row, end, told))
-    changed = {}
-    for name, values in of_unit.items():
-        column = told.column(name)
-        changed[column] = rows[column].mask(is_tested, values)
-        tau = rows[f"tested{name}"]
-        changed[f"shields{name}"] = rows[f"shields{name}"].mask(is_tested, tau)
-    return rows.assign(**changed)
 
 
 def _usable(count: int, of: int, why_not: str, is_range: bool) -> str:
@@ -436,7 +400,7 @@ def sizes(results: Results) -> Sheet | None:
             "size, mm": [f"{size:.3g}" for size in groups["size"].mean()],
             **_spans(low, high, SPANS_OF_SIZES),
             "part that had moved, %": _intervals(
-                100 * low["class_moved_low"], 100 * high["class_moved_high"], ".0f"
+                100 * low["class_moved_low"], 100 * high["class_moved_high"], 0, "f"
             ),
             "exposed grains of a bed": grains,
         }
@@ -496,11 +460,11 @@ def _spans(
 
 
 def _intervals(
-    low: Iterable[float], high: Iterable[float], form: str = "#.3g"
+    low: Iterable[float], high: Iterable[float], digits: int = 3, form: str = "#g"
 ) -> list[str]:
     """The interval between each two values as a text, open where one is not known."""
     ends = zip(low, high, strict=True)
-    return [labels.interval(least, most, form) for least, most in ends]
+    return [labels.interval(least, most, digits, form) for least, most in ends]
 
 
 def _ranges(

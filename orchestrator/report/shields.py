@@ -68,7 +68,7 @@ GAP = np.full((1, 2), np.nan)
 BEYOND = 1e6
 """A place above every frame, over the lower end of a bar."""
 AXES = labels.RE_AXIS, labels.TAU_AXIS
-DEM = ("reynolds", "shields_dem", "shields_dem_low", "shields_dem_high")
+DEM = ("reynolds", "shields_dem", "shields_low", "shields_high")
 """Columns of a single grain: x, y and the ends of its interval."""
 PILE = ("reynolds", "shields", "shields_low", "shields_high")
 """Columns of a pile: x, y and the ends of its interval."""
@@ -738,7 +738,7 @@ def _texts(row: pd.Series, columns: Sequence[str], telling: Sequence[str]) -> li
     value, low, high = (row[name] for name in columns[1:])
     threshold = f"τ_c = {value:.4g}"
     if pd.notna(low) or pd.notna(high):
-        threshold += f" ({labels.interval(low, high, '.4g')})"
+        threshold += f" ({labels.interval(low, high, 4, 'g')})"
     if "fraction" in row:
         threshold += f" at n/N = {row['fraction']:.0%}"
     ustar = row["ustar0_m_s"] if "ustar0_m_s" in row else row["ustar_m_s"]

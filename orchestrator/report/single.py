@@ -315,26 +315,6 @@ def tested(row: Row, ustar: float) -> tuple[float, float]:
     return low, ustar * math.sqrt(float(row["tested_high"]) / theta)
 
 
-def first_interval(row: Row) -> tuple[float, float]:
-    """Find the interval of the flow that moves the first grains of a bed.
-
-    Parameters
-    ----------
-    row
-        A threshold of a pile with the columns of its scene.
-
-    Returns
-    -------
-    low, high : float
-        The tested interval, or else that of load step and known error, m/s; an end that
-        is not known is NaN.
-    """
-    if row["tested_rows"] > 0:
-        return tested(row, known(row["first_ustar0_m_s"]))
-    low = known(row.get("first_ustar0_low_m_s"))
-    return low, known(row.get("first_ustar0_high_m_s"))
-
-
 def tested_on(row: Row) -> str:
     """Say which measured thresholds the tested interval of a row held.
 

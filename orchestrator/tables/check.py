@@ -4,6 +4,8 @@ import math
 
 import pandas as pd
 
+from orchestrator.tables.quoted import OF_PILE
+
 KEYS = ["scene_id", "fraction"]
 Contradictions = dict[tuple[str, float], str]
 """By the scene and the fraction, what DEM says against an answer."""
@@ -18,8 +20,8 @@ def with_agreement(checks: pd.DataFrame, thresholds: pd.DataFrame) -> pd.DataFra
         A row for each pile and fraction that DEM checks, with ``shields_dem_low`` and
         ``shields_dem_high``.
     thresholds
-        The answers, with ``shields_low`` and ``shields_high``. They hold the known
-        error of the fidelity.
+        The answers with their numerical intervals, which hold the known error of the
+        fidelity.
 
     Returns
     -------
@@ -29,11 +31,11 @@ def with_agreement(checks: pd.DataFrame, thresholds: pd.DataFrame) -> pd.DataFra
     """
     if checks.empty:
         return checks
-    ends = ["shields_low", "shields_high"]
-    answers = thresholds[[*KEYS, *ends]].drop_duplicates(KEYS)
+    answers = thresholds[[*KEYS, *OF_PILE]].drop_duplicates(KEYS)
     table = checks.merge(answers, on=KEYS, how="left", validate="many_to_one")
-    lower = table[["shields_low", "shields_dem_low"]].fillna(0.0).max(axis=1)
-    upper = table[["shields_high", "shields_dem_high"]].fillna(float("inf")).min(axis=1)
+    low, high = OF_PILE
+    lower = table[[low, "shields_dem_low"]].fillna(0.0).max(axis=1)
+    upper = table[[high, "shields_dem_high"]].fillna(float("inf")).min(axis=1)
     is_reached = table["shields"].notna()
     is_reached_by_dem = table["shields_dem"].notna()
     overlap = (lower <= upper) & is_reached & is_reached_by_dem
@@ -58,7 +60,7 @@ def contradictions(checks: pd.DataFrame) -> Contradictions:
         return {}
     found: Contradictions = {}
     for row in checks[~checks["agree"]].to_dict("records"):
-        here = _told(row["shields"], row["shields_low"], row["shields_high"])
+        here = _told(row["shields"], *(row[name] for name in OF_PILE))
         dem = _told(row["shields_dem"], row["shields_dem_low"], row["shields_dem_high"])
         sentence = f"DEM of this bed contradicts it: it has {dem}, this has {here}"
         found[row["scene_id"], row["fraction"]] = sentence

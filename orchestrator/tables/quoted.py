@@ -1,14 +1,16 @@
 """Thresholds in the units that a report quotes: speeds and stresses, with intervals.
 
+A threshold has one interval, which is made here: page, card, figures and texts read it.
 Beside each stands what a measured threshold gives: the same flow, with the measured
 threshold of one grain on a level bed in place of the computed one.
 """
 
 import re
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from orchestrator.physics import saltation
 from orchestrator.physics.beside import GOES_ON
@@ -16,42 +18,71 @@ from orchestrator.physics.constants import GAS_BELOW, GRAIN_COLUMNS
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.threshold import SingleGrain, thresholds_of
 from orchestrator.physics.velocity import measurable_speeds
-from orchestrator.types import FloatArray
+from orchestrator.types import BoolArray, FloatArray
 
 ENDS = ("_low", "_high")
 """Endings of the columns of an interval, before the unit."""
 SPEEDS = ("wind_10m", "mean_velocity")
 """Speeds of which the interval and the measured value are told, without the unit."""
+MEASURED, NUMERICAL, SEEDS = "measured thresholds", "numerical", "seeds"
+"""What an interval is of, in the column ``interval_of``."""
+OF_PILE = ("shields_numerical_low", "shields_numerical_high")
+OF_GRAIN = ("shields_dem_low", "shields_dem_high")
+"""Columns of the ends of the numerical interval of a Shields number."""
+OF_FIRST = ("first_ustar0_numerical_low_m_s", "first_ustar0_numerical_high_m_s")
+"""The same of the friction velocity at which motion starts."""
 GUSTS = re.compile(r"(\d+) of intensity (\S+),")
 """Events and intensity in the words of the column ``gusts``."""
 
 
-def quoted(rows: pd.DataFrame) -> dict[str, FloatArray]:
+class _Ends(NamedTuple):
+    """The ends of the intervals of n values, NaN where one is not known."""
+
+    low: FloatArray
+    high: FloatArray
+
+
+def quoted(rows: pd.DataFrame, twins: "pd.Series[int] | None" = None) -> dict[str, Any]:
     """Compute the columns that reports quote.
 
-    The ends of an interval of the Shields number are those of a stress: u*_0 goes with
-    its root. Measured values are u*_0 times the ratio of the measured friction velocity
-    of one grain on a level bed to the computed one. On a level bed under its
-    undisturbed flow every grain has the measured threshold itself.
+    The interval of a threshold is the tested one, where thresholds of such beds were
+    measured, else the numerical one; of beds that differ in chance alone it holds the
+    intervals and the thresholds of all, and is open above if one does not reach the
+    fraction. The ends of an interval of the Shields number are those of a stress: u*_0
+    goes with its root. Measured values are u*_0 times the ratio of the measured
+    friction velocity of one grain on a level bed to the computed one. On a level bed
+    under its undisturbed flow every grain has the measured threshold itself.
 
     Parameters
     ----------
     rows
         Thresholds of piles or of single grains, with the columns of their scenes and
         those of `beside`.
+    twins
+        A number that thresholds share whose beds differ in chance alone; by default
+        there are none.
 
     Returns
     -------
     dict of str to ndarray
-        Stress of the undisturbed flow, Pa; ends of u*_0, of the wind at 10 m, of the
-        mean velocity (m/s) and of that stress; the same with the measured threshold.
-        NaN where there is none.
+        Stress of the undisturbed flow, Pa; ends of the Shields number, of u*_0, of the
+        wind at 10 m, of the mean velocity (m/s) and of that stress, and what they are
+        of; the flow that moves the first grain, in these units with its ends; the same
+        with the measured threshold. NaN where there is none.
     """
     ustar = _ustar(rows)
     density = rows["rho_f_kg_m3"].to_numpy(float)
-    columns = {"stress_pa": density * ustar**2}
-    for end, at in zip(ENDS, _interval(rows, ustar), strict=True):
+    theta = rows["shields"].to_numpy(float)
+    of_row = _interval(rows)
+    held = _held(of_row, theta, twins)
+    columns: dict[str, Any] = {"stress_pa": density * ustar**2}
+    columns |= {f"shields{end}": at for end, at in zip(ENDS, held, strict=True)}
+    columns["interval_of"] = _named(rows, of_row, held, twins)
+    ends = _held(_Ends(*(_rooted(ustar, at, theta) for at in of_row)), ustar, twins)
+    for end, at in zip(ENDS, ends, strict=True):
         columns |= _in_units(rows, at, end)
+    if "first_ustar0_m_s" in rows:
+        columns |= _first(rows, twins)
     level = grain_ustar(rows.assign(alpha_deg=0.0))
     measured = {}
     for name in ("curve", "median", "low", "high"):
@@ -79,6 +110,24 @@ def quoted(rows: pd.DataFrame) -> dict[str, FloatArray]:
     return columns
 
 
+def _first(rows: pd.DataFrame, twins: "pd.Series[int] | None") -> dict[str, FloatArray]:
+    """The flow that moves the first grain of each bed, with its ends, by column."""
+    first = rows["first_ustar0_m_s"].to_numpy(float)
+    theta = rows["shields"].to_numpy(float)
+    is_tested = _is_tested(rows)
+    ends = []
+    for name, tested in zip(OF_FIRST, ("tested_low", "tested_high"), strict=True):
+        by_measured = _rooted(first, rows[tested].to_numpy(float), theta)
+        ends.append(np.where(is_tested, by_measured, rows[name].to_numpy(float)))
+    held = _held(_Ends(*ends), first, twins)
+    columns: dict[str, FloatArray] = {}
+    for end, at in {"": first, **dict(zip(ENDS, held, strict=True))}.items():
+        of_end = _in_units(rows, at, end)
+        columns |= {f"first_{name}": column for name, column in of_end.items()}
+    del columns["first_ustar0_m_s"]  # it is in the rows
+    return columns
+
+
 def _ustar(rows: pd.DataFrame) -> FloatArray:
     """Friction velocity of the undisturbed flow at each threshold, m/s."""
     if "ustar0_m_s" in rows:
@@ -87,17 +136,73 @@ def _ustar(rows: pd.DataFrame) -> FloatArray:
     return np.where(is_dem, rows["ustar_m_s"], rows["ustar_closed_form_m_s"])
 
 
-def _interval(rows: pd.DataFrame, ustar: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Ends of the friction velocity, m/s; of a pile by its Shields number."""
-    if "shields_low" not in rows:
-        low = rows["ustar_low_m_s"].to_numpy(float)
-        high = rows["ustar_high_m_s"].to_numpy(float)
-        return low, high
-    theta = rows["shields"].to_numpy(float)
+def _is_tested(rows: pd.DataFrame) -> BoolArray:
+    """Which thresholds have a tested interval."""
+    return np.asarray((rows["tested_rows"] > 0) & rows["tested_low"].notna())
+
+
+def _interval(rows: pd.DataFrame) -> _Ends:
+    """The ends of the Shields number of each row by itself."""
+    names = OF_PILE if OF_PILE[0] in rows else OF_GRAIN
+    is_tested = _is_tested(rows)
+    ends = []
+    for name, tested in zip(names, ("tested_low", "tested_high"), strict=True):
+        of_method = rows[name].to_numpy(float)
+        ends.append(np.where(is_tested, rows[tested].to_numpy(float), of_method))
+    return _Ends(*ends)
+
+
+def _rooted(ustar: FloatArray, end: FloatArray, theta: FloatArray) -> FloatArray:
+    """The friction velocity at an end of the interval of a Shields number, m/s."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        low = ustar * np.sqrt(rows["shields_low"].to_numpy(float) / theta)
-        high = ustar * np.sqrt(rows["shields_high"].to_numpy(float) / theta)
-    return low, high
+        return np.asarray(ustar * np.sqrt(end / theta))
+
+
+def _held(ends: _Ends, value: FloatArray, twins: "pd.Series[int] | None") -> _Ends:
+    """The intervals that hold those of all twins, and their values.
+
+    Without any known end of one it is the range of the values. A value that is not
+    known is that of a bed that does not reach the fraction: nothing is known above it.
+    """
+    if twins is None:
+        return ends
+    low, high = (np.asarray(end, float) for end in ends)
+    has_ends = ~(np.isnan(low) & np.isnan(high))
+    is_open_below = has_ends & np.isnan(low)
+    is_open_above = (has_ends & np.isnan(high)) | np.isnan(value)
+    each = pd.DataFrame(
+        {
+            "low": np.where(is_open_below, -np.inf, np.fmin(low, value)),
+            "high": np.where(is_open_above, np.inf, np.fmax(high, value)),
+        }
+    )
+    groups = each.groupby(twins.to_numpy())
+    least = groups["low"].transform("min").to_numpy(float)
+    most = groups["high"].transform("max").to_numpy(float)
+    is_alone = groups["low"].transform("size").to_numpy() == 1
+    return _Ends(
+        np.where(is_alone, low, np.where(np.isfinite(least), least, np.nan)),
+        np.where(is_alone, high, np.where(np.isfinite(most), most, np.nan)),
+    )
+
+
+def _named(
+    rows: pd.DataFrame, of_row: _Ends, held: _Ends, twins: "pd.Series[int] | None"
+) -> NDArray[Any]:
+    """What each interval is of; None without one."""
+    is_tested = _is_tested(rows)
+    is_numerical = np.isfinite(of_row.low) | np.isfinite(of_row.high)
+    if twins is not None:
+        groups = twins.to_numpy()
+        is_tested, is_numerical = (
+            pd.Series(each).groupby(groups).transform("any").to_numpy(bool)
+            for each in (is_tested, is_numerical)
+        )
+    is_known = np.isfinite(held.low) | np.isfinite(held.high)
+    choices = [~is_known, is_tested, is_numerical]
+    names = np.array([None, MEASURED, NUMERICAL, SEEDS], object)
+    first = np.argmax([*choices, np.ones(len(rows), bool)], axis=0)
+    return np.asarray(names[first])
 
 
 def _in_units(rows: pd.DataFrame, ustar: FloatArray, end: str) -> dict[str, FloatArray]:

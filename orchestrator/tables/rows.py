@@ -558,8 +558,8 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
             "stress": scene.forces.stress,
             "fraction": fraction,
             "shields": value,
-            "shields_low": low,
-            "shields_high": high,
+            "shields_numerical_low": low,
+            "shields_numerical_high": high,
             "smooth_bed": smooth,
             "shields_model_low": value * (1 - model.low),
             "shields_model_high": value * (1 + model.high),
@@ -591,8 +591,8 @@ def _starts(answer: Answer) -> Row:
     return {
         "first_x_m": float(bed.place(first_x)),
         "first_ustar0_m_s": first_ustar0,
-        "first_ustar0_low_m_s": low,
-        "first_ustar0_high_m_s": high,
+        "first_ustar0_numerical_low_m_s": low,
+        "first_ustar0_numerical_high_m_s": high,
         "pivot_x_m": float(bed.place(pivot_x)),
         "pivot_first_m_s": pivot_ustar0,
     }

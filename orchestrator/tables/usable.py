@@ -18,7 +18,7 @@ from orchestrator.physics.velocity import (
 )
 from orchestrator.study import fields
 from orchestrator.tables.check import Contradictions
-from orchestrator.tables.quoted import quoted
+from orchestrator.tables.quoted import OF_PILE, quoted
 
 EXPOSED_FROM = 0.25
 """Part of a grain over the tops of its neighbours from which it is exposed."""
@@ -60,13 +60,11 @@ def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame
     if thresholds.empty:
         return thresholds
     of_scene = scenes.set_index("scene_id")
-    alike = [*fields.others(of_scene, "seed"), "asked"]
-    replicas = of_scene.groupby(alike, dropna=False).ngroup()
     ids = thresholds["scene_id"]
     table = thresholds.assign(
         layout=ids.map(_layouts(of_scene)),
         lifted=thresholds["share_carried_off"] > 0,
-        replicas=ids.map(replicas),
+        replicas=ids.map(_replicas(of_scene)),
     )
     reached = table.dropna(subset=["shields"])
     groups = reached.groupby([*SIMILAR, "replicas"], dropna=False)["shields"]
@@ -78,10 +76,22 @@ def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame
         largest.reset_index(), on=SIMILAR, how="left", validate="many_to_one"
     )
     wider = table["scatter"].fillna(0.0).to_numpy()
-    low, _ = within(table["shields_low"].to_numpy(), wider)
-    _, high = within(table["shields_high"].to_numpy(), wider)
-    table = table.assign(shields_low=low, shields_high=high)
+    least, most = OF_PILE
+    low, _ = within(table[least].to_numpy(), wider)
+    _, high = within(table[most].to_numpy(), wider)
+    table = table.assign(**{least: low, most: high})
     return table.drop(columns=["layout", "lifted", "replicas"])
+
+
+def _replicas(scenes: pd.DataFrame) -> "pd.Series[int]":
+    """A number for each scene, by its id, that those share that differ in their seed.
+
+    Those that were asked for otherwise are no replicas.
+    """
+    alike = fields.others(scenes, "seed")
+    if "asked" in scenes:
+        alike.append("asked")
+    return scenes.groupby(alike, dropna=False).ngroup()
 
 
 def _layouts(scenes: pd.DataFrame) -> "pd.Series[int]":
@@ -114,7 +124,8 @@ def with_usable(
     Returns
     -------
     DataFrame
-        The table with ``usable``, ``why_not`` and what was measured, by `beside`.
+        The table with ``usable``, ``why_not``, what was measured, by `beside`, and the
+        columns of `quoted`.
     """
     if table.empty:
         return table
@@ -123,13 +134,13 @@ def with_usable(
     if "reynolds_closed_form" in rows:
         is_dem = rows["method"] == "dem"
         rows["reynolds"] = rows["reynolds"].where(is_dem, rows["reynolds_closed_form"])
+        rows["shields"] = rows["shields_dem"].where(is_dem, rows["shields_closed_form"])
     ustar = rows["reynolds"] * rows["nu_m2_s"] / rows["d_m"]
     rows["law"] = ""
     for name, part in rows.groupby("force_law"):
         rows.loc[part.index, "law"] = _beyond_law(str(name), part, ustar[part.index])
     rows["standing_out"] = standing_out(rows["relative_size"], rows["beta_deg"])
     rows["flow_reynolds"] = _flow_reynolds(rows)
-    rows["shields"] = rows.get("shields", rows.get("shields_closed_form"))
     measured = beside(rows)
     rows["tested_rows"] = measured["tested_rows"]
     against = contradicted or {}
@@ -141,11 +152,15 @@ def with_usable(
             reasons.append(against[key])
         texts.append("; ".join(reasons))
     rows = rows.assign(**measured)
+    twins = None
+    if "fraction" in rows:
+        replicas = rows["scene_id"].map(_replicas(scenes.set_index("scene_id")))
+        twins = rows.groupby([replicas, "fraction"], dropna=False).ngroup()
     made = {
         "usable": [not text for text in texts],
         "why_not": texts,
         **measured,
-        **quoted(rows),
+        **quoted(rows, twins),
     }
     return pd.concat([table, pd.DataFrame(made, index=table.index)], axis=1)
 
@@ -301,8 +316,7 @@ def _open_ends(row: Mapping[Any, Any]) -> Iterator[str]:
 
     It is empty if the interval has one.
     """
-    low = row.get("shields_low", np.nan)
-    high = row.get("shields_high", np.nan)
+    low, high = (row.get(name, np.nan) for name in OF_PILE)
     if np.isnan(low) or not np.isnan(high) or np.isnan(row["shields"]):
         return
     if row["error_estimate"] >= 1:

@@ -53,8 +53,8 @@ def test_cheap_answers_are_checked_by_one_pile_by_dem(tmp_path: Path) -> None:
     assert check["agree"].all()
     # the intervals contain the known error, as a factor both ways
     value, factor = answers["shields"], 1 + answers["error_estimate"] - 1e-8
-    assert (answers["shields_high"] >= value * factor).all()
-    assert (answers["shields_low"] <= value / factor).all()
+    assert (answers["shields_numerical_high"] >= value * factor).all()
+    assert (answers["shields_numerical_low"] <= value / factor).all()
 
 
 def test_an_answer_that_its_check_contradicts_is_not_usable(
@@ -77,7 +77,7 @@ def test_an_answer_that_its_check_contradicts_is_not_usable(
     # the smaller of the two piles is checked, and every pile keeps its answer
     assert set(check["scene_id"]) == set(small["scene_id"])
     assert set(tables["methods"]["method"]) == {"pivot"}
-    beyond = check["shields_high"] < check["shields_dem_low"]
+    beyond = check["shields_numerical_high"] < check["shields_dem_low"]
     assert beyond.any()
     assert (check["agree"] != beyond).all()
     contradicted = small["why_not"].str.contains("DEM of this bed contradicts it")
@@ -131,7 +131,11 @@ def test_gusts_have_no_known_error(tmp_path: Path) -> None:
         assert not rows["usable"].any()
         assert rows["why_not"].str.contains("the error of .* is not known").all()
         if name == "pile_threshold":
-            assert rows[["shields_low", "shields_high"]].isna().all(axis=None)
+            assert (
+                rows[["shields_numerical_low", "shields_numerical_high"]]
+                .isna()
+                .all(axis=None)
+            )
 
 
 def test_a_tolerance_of_the_command_line_is_kept_for_the_next_report(

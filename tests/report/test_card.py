@@ -15,13 +15,11 @@ from orchestrator.report import (
     drawing,
     head,
     head_grain,
-    sheets,
     shields,
     single,
 )
 from orchestrator.report.card import Card, Number, Worth, lines
 from orchestrator.report.results import Results
-from orchestrator.report.subjects import STRESS
 from tests.report.conftest import changed, copies, legend_of, only
 
 WIND = Number(13.44, "m/s", "wind", low=9.947, high=13.44, measured=9.683)
@@ -32,6 +30,8 @@ def test_ends_have_the_digits_of_their_number() -> None:
     assert (WIND.figure, WIND.interval, WIND.beside) == ("13.4", "9.9 … 13.4", "9.7")
     stress = Number(19.2, "Pa", "", last=38.0, low=math.nan, high=40.0)
     assert (stress.figure, stress.interval) == ("19.2–38.0", "below 40.0")
+    alike = Number(0.1719, "Pa", "", low=0.1717, high=0.1721)
+    assert (alike.figure, alike.interval) == ("0.17", "0.1717 … 0.1721")
     count = Number(7, "of 17", "claims", decimals=0)
     assert (count.figure, count.interval, count.beside) == ("7", "", "")
 
@@ -145,8 +145,9 @@ def test_the_first_motion_has_an_interval_in_its_unit(results: Results) -> None:
     assert row["first_ustar0_low_m_s"] < first < row["first_ustar0_high_m_s"]
     number = answers.card(heap).numbers[1]
     assert number.low < number.value < number.high
-    beside = {"tested_rows": 20.0, "tested_held": 0.8}
-    beside |= {"tested_low": row["shields"] / 4, "tested_high": 4 * row["shields"]}
+    beside: dict[str, float | str] = {"tested_rows": 20.0, "tested_held": 0.8}
+    beside |= {"interval_of": "measured thresholds"}
+    beside |= {"first_ustar0_low_m_s": first / 2, "first_ustar0_high_m_s": 2 * first}
     table = heap.tables["pile_threshold"].assign(**beside)
     tested = answers.card(changed(heap, pile_threshold=table)).numbers[1]
     assert "80 % of 20 measured" in tested.interval_of
@@ -207,16 +208,3 @@ def test_labels_of_the_picture_of_a_grain_lie_on_no_points(
                     continue
                 points = ax.transData.transform(line.get_xydata())
                 assert not any(box.contains(x, y) for x, y in points)
-
-
-def test_a_table_has_the_tested_interval_in_the_unit_of_its_flow() -> None:
-    """A stress goes with the Shields number; a row without measurements keeps its own."""
-    row = {"rho_f_kg_m3": 1000.0, "ustar0_m_s": 0.02, "shields": 0.04}
-    row |= {"shields_low": 0.039, "shields_high": 0.041}
-    row |= {"stress_low_pa": 0.39, "stress_high_pa": 0.41}
-    row |= {"tested_low": 0.02, "tested_high": 0.08}
-    rows = pd.DataFrame([row | {"tested_rows": 9.0}, row | {"tested_rows": 0.0}])
-    found = sheets.with_tested(rows, STRESS)
-    assert found["stress_low_pa"].tolist() == pytest.approx([0.2, 0.39])
-    assert found["stress_high_pa"].tolist() == pytest.approx([0.8, 0.41])
-    assert found["shields_high"].tolist() == pytest.approx([0.08, 0.041])

@@ -115,8 +115,14 @@ def test_each_fluid_has_a_row_and_a_sentence(results: Results) -> None:
 
 def test_seeds_are_one_row_with_their_range(results: Results) -> None:
     thetas = (0.04, 0.05, 0.09)
+    ustar = float(results.at_fraction["ustar0_m_s"].iloc[0])
+    ends = {
+        "ustar0_low_m_s": ustar * np.sqrt(0.04 / 0.06),
+        "ustar0_high_m_s": ustar * np.sqrt(0.09 / 0.06),
+    }
     seeds = (
-        {"seed": n, "packing": "disordered", "shields": t} for n, t in enumerate(thetas)
+        {"seed": n, "packing": "disordered", "shields": t, **ends}
+        for n, t in enumerate(thetas)
     )
     study = copies(results, *seeds)
     sheet = sheets.short(study)
@@ -124,10 +130,10 @@ def test_seeds_are_one_row_with_their_range(results: Results) -> None:
     assert set(sheet.frame["usable"]) == {"3 of 3 seeds"}
     assert set(sheet.frame[sheets.TAU_HEAD]) == {"0.0400 … 0.0900"}
     share = answers.card(study).numbers[-1]
-    assert share.interval_of.startswith("3 beds that differ in chance alone; ")
+    assert share.interval_of.endswith("it holds 3 beds that differ in chance alone")
     # a wind goes nearly with the root of the Shields number
-    ends = (share.low / share.value, share.high / share.value)
-    assert ends == pytest.approx(np.sqrt([0.04 / 0.06, 0.09 / 0.06]), rel=0.02)
+    shown = (share.low / share.value, share.high / share.value)
+    assert shown == pytest.approx(np.sqrt([0.04 / 0.06, 0.09 / 0.06]), rel=0.02)
 
 
 def test_a_study_of_single_grains_has_an_answer_too(results: Results) -> None:
@@ -223,11 +229,16 @@ def test_sizes_of_a_mixture_say_what_so_few_grains_leave_open() -> None:
         "shields_own_high": [0.04, 0.05, np.nan],
     }
     assert [
-        labels.interval(low, high, ".2g")
+        labels.interval(low, high, 2, "g")
         for low, high in zip(*ends.values(), strict=True)
     ] == ["0.02 … 0.04", "below 0.05", "—"]
-    assert labels.interval(0.02, np.inf, ".2g") == "above 0.02"
-    assert labels.interval(0.0391, 0.0392, ".2g") == "0.039"
+    assert labels.interval(0.02, np.inf, 2, "g") == "above 0.02"
+
+
+def test_no_interval_is_one_bare_number() -> None:
+    """It read as no uncertainty at all."""
+    assert labels.interval(0.0391, 0.0392, 2, "g") == "0.0391 … 0.0392"
+    assert labels.interval(0.17, 0.17, 2, "g") == "0.17 … 0.17"
 
 
 def test_every_point_says_its_scene_interval_and_case(results: Results) -> None:
