@@ -5,6 +5,7 @@ Heights are read from XYZ, ESRI ASCII grid, GeoTIFF and STL.
 
 import io
 import itertools
+import re
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from orchestrator.errors import InputError
 from orchestrator.study import epsg
+from orchestrator.study.heads import METRE as METRES
 from orchestrator.study.points import read_points
 from orchestrator.study.source import decoded, read_bytes
 from orchestrator.study.surface import (
@@ -61,8 +63,15 @@ DEEPEST, HIGHEST = 9000.0, 1e9
 """Depth below which and height above which no ground lies, m, in whatever unit."""
 UNNAMED_EMPTY = "-9999"
 """What stands in an empty cell of a grid whose head does not say it."""
-METRES = ("", "m", "metre", "metres", "meter", "meters")
-"""GDAL's words for the unit of heights that are in metres."""
+UNIT_OF_WKT = re.compile(r'UNIT\["([^"]+)",\s*(\d+\.?\d*(?:[eE][+-]?\d+)?)')
+UNIT_OF_ARCINFO = re.compile(r"^\s*z?units\s+(\w+)", re.IGNORECASE | re.MULTILINE)
+"""Units in a file .prj: their names, and in well-known text their size."""
+UNIT_OFF = 1e-4
+"""Largest difference of a unit from the metre, m: the German legal metre."""
+UNSAID = "no"
+"""Arc/Info's word for no unit of the heights."""
+LARGEST_PROJECTION = 2**20
+"""Most bytes of a file .prj."""
 FORMATS = ".tif .tiff (GeoTIFF), .asc (ESRI), .xyz .csv .txt (x y z), .stl"
 BARE_TAGS: Tags = {
     KEYS: (1, 1, 0, 1, PIXEL, 0, 1, 1),
@@ -98,6 +107,7 @@ def read_surface(path: Path, where: str) -> Surface:
     if ending in (".tif", ".tiff"):
         raster = _of_geotiff(content, path.name, where)
     elif ending == ".asc":
+        _check_projection(path.with_suffix(".prj"), where)
         raster = _of_grid(decoded(content, where), path.name, where)
     elif ending in (".xyz", ".csv", ".txt"):
         raster = read_points(decoded(content, where), path.name, where)
@@ -109,6 +119,32 @@ def read_surface(path: Path, where: str) -> Surface:
         raise InputError(what, where, f"endings: {FORMATS}")
     _check_heights(raster.z, where)
     return checked(raster, where)
+
+
+def _check_projection(path: Path, where: str) -> None:
+    """Refuse a grid beside whose file a coordinate system in another unit stands."""
+    if not path.is_file():
+        return
+    where = f"{where}: {path.name}"
+    text = decoded(read_bytes(path, LARGEST_PROJECTION, where), where)
+    units = [(name, float(size)) for name, size in UNIT_OF_WKT.findall(text)]
+    is_projected = any(word in text for word in ("PROJCS", "PROJCRS", "LOCAL_CS"))
+    lengths = [unit for unit in units if not (is_projected and _is_angle(unit[0]))]
+    off = [(name, size) for name, size in lengths if abs(size - 1) > UNIT_OFF]
+    for name in UNIT_OF_ARCINFO.findall(text):
+        if name.lower() not in (UNSAID, *METRES):
+            off.append((name, 0.0))
+    for name, size in off:
+        what = f"its lengths are in {name}"
+        remedy = "project it to metres, with gdalwarp -t_srs EPSG:326NN, NN the zone"
+        if size and not _is_angle(name):
+            remedy = f"multiply them by {size:.7g}: they must be in m"
+        raise InputError(what, where, remedy)
+
+
+def _is_angle(unit: str) -> bool:
+    """Whether a unit of a coordinate system is of an angle."""
+    return unit.lower().startswith(("deg", "grad", "rad"))
 
 
 def _check_heights(z: FloatArray, where: str) -> None:
@@ -134,6 +170,10 @@ def _of_grid(text: str, name: str, where: str) -> Raster:
         what = f"{len(values)} heights, not {columns:.9g} x {rows:.9g}"
         remedy = f"nrows lines of ncols numbers, {FEWEST} of each at least"
         raise InputError(what, where, remedy)
+    widths = {len(line.split()) for line in lines[before:] if line.strip()}
+    if widths == {rows} and rows != columns:
+        what = f"its lines have {rows:.9g} numbers, and ncols is {columns:.9g}"
+        raise InputError(what, where, "are ncols and nrows exchanged?")
     heights = np.array(values).reshape(int(rows), int(columns))[::-1]
     heights = _without(heights, empty or UNNAMED_EMPTY)
     x = _axis_of_grid("x", int(columns), header, where)
@@ -327,7 +367,6 @@ def _of_geotiff(content: bytes, name: str, where: str) -> Raster:
     kept = {key: tags[key] for key in (KEYS, KEY_NUMBERS, KEY_TEXTS) if key in tags}
     heights = _without(heights, str(tags.get(NODATA, "")).strip("\0 "))
     _check_units(_keys(kept), where)
-    _check_heights(heights, where)
     heights = _in_metres(heights, _metadata(tags, where), where)
     along_x, along_y = _geotiff_axes(image, kept, where)
     return Raster(name, along_x, along_y, heights, kept)
@@ -389,7 +428,7 @@ def _in_metres(
 ) -> FloatArray:
     """Heights by the scale and the offset with which they are stored."""
     unit = metadata.get("unittype", "")
-    if unit.lower() not in METRES:
+    if unit.lower() not in ("", *METRES):
         what = f"its heights are in {unit}"
         raise InputError(what, where, "they must be in m: gdal_calc")
     found = {}

@@ -203,6 +203,14 @@ def test_scale_and_offset_of_a_geotiff_are_applied(
     assert "continued as level ground over 3 cells" in found.said[-1]
 
 
+def test_packed_heights_use_all_numbers_of_their_type(tmp_path: Path) -> None:
+    # 3 m are 0: the ground is far below 0, and no cell is empty
+    stored = np.round((heights() - 3) / 1e-4).astype(np.int16)
+    assert stored.min() < -29_000
+    found = read(tmp_path, tif(stored, scale=1e-4, offset=3.0), "heap.tif")
+    assert found.z == pytest.approx(heights(), abs=1e-4)
+
+
 @pytest.mark.parametrize(
     ("items", "message"),
     [
@@ -303,6 +311,58 @@ def test_a_head_that_contradicts_itself_is_refused(
     with pytest.raises(InputError, match=message):
         read(tmp_path, grid(head), "heap.asc")
     refused(tmp_path, grid(head), "heap.asc")
+
+
+def test_exchanged_counts_of_a_grid_are_refused(tmp_path: Path) -> None:
+    def exchanged(text: str) -> str:
+        head = f"ncols {COLUMNS}\nnrows {ROWS}\n"
+        return text.replace(head, f"ncols {ROWS}\nnrows {COLUMNS}\n")
+
+    message = refused(tmp_path, grid("cellsize 1\n", change=exchanged), "heap.asc")
+    assert f"its lines have {COLUMNS} numbers, and ncols is {ROWS}" in message
+    # lines may end anywhere
+    wrapped = grid("cellsize 1\n").replace(" 0.00 0.00 0.00\n", " 0.00\n0.00 0.00\n")
+    check_is_the_heap(read(tmp_path, wrapped, "heap.asc"))
+
+
+UTM = 'PROJCS["UTM",GEOGCS["WGS",UNIT["Degree",0.0174532925]],UNIT["{}",{}]]'
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            UTM.format("Foot_US", 0.3048006096012192),
+            "heap.prj: .*in Foot_US.*0.3048006",
+        ),
+        ('GEOGCS["WGS",UNIT["Degree",0.0174532925]]', "heap.prj: .*are in Degree"),
+        ('BOUNDCRS[PROJCRS["A",LENGTHUNIT["foot",0.3048]]]', "heap.prj: .*in foot"),
+        ("Projection STATEPLANE\nUnits FEET\n", "heap.prj: .*in FEET"),
+        ("Projection UTM\nZunits CENTIMETERS\nUnits METERS\n", "in CENTIMETERS"),
+    ],
+)
+def test_a_projection_beside_a_grid_is_not_overlooked(
+    tmp_path: Path, text: str, message: str
+) -> None:
+    (tmp_path / "heap.prj").write_text(text)
+    with pytest.raises(InputError, match=message):
+        read(tmp_path, grid("cellsize 1\n"), "heap.asc")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        UTM.format("Meter", 1.0),
+        UTM.format("metre", "1"),
+        "Projection UTM\nZunits NO\nUnits METERS\n",
+        'LOCAL_CS["none"]',
+    ],
+)
+def test_a_grid_beside_a_projection_in_metres_is_read(
+    tmp_path: Path, text: str
+) -> None:
+    (tmp_path / "heap.prj").write_text(text)
+    check_is_the_heap(read(tmp_path, grid("cellsize 1\n"), "heap.asc"))
 
 
 def test_cells_that_look_empty_are_refused(tmp_path: Path) -> None:
