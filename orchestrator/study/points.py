@@ -189,7 +189,7 @@ class _Lines:
             raise InputError(what, self.place(first), remedy)
 
     def check_cells(self, layout: _Layout) -> None:
-        """Refuse the first line with more cells than the head."""
+        """Refuse the first line with more cells than the head that may be numbers."""
         for place, line in enumerate(islice(self.lines, layout.first, None)):
             if layout.separator is None:
                 is_short = len(line.split()) <= layout.cells
@@ -198,7 +198,8 @@ class _Lines:
             if is_short:
                 continue
             cells = _split(line, layout.separator)
-            if len(cells) > layout.cells:
+            # a word behind the columns takes nothing from a number
+            if any(map(_begins, cells[layout.cells :])):
                 where = self.place(layout.first + place)
                 what = more_cells(len(cells), layout.cells)
                 raise InputError(what, where, POINT_REMEDY)

@@ -87,6 +87,7 @@ def refused(folder: Path, text: str | bytes, name: str = "heap.csv") -> str:
         ('"x"\t"y"\t"z"\t"class"', "{x}\t{y}\t{z}\t2"),
         ("# x y z", "{x} {y} {z}"),
         ("#x y z", "{x} {y} {z}"),
+        ("# x y z", "{x} {y} {z} GS wet"),
         ("//X Y Z", "{x} {y} {z}"),
         ("# north,east,level", "{y}, {x}, {z}"),
         ("# Heap of sand, as measured\n# x y z", "{x} {y} {z}"),
