@@ -281,12 +281,11 @@ def _separator(line: str) -> str | None:
 
 def _cells(line: str) -> list[str]:
     """The cells of a line of a head, or of a point, by its own separator."""
-    joined = re.sub(r"\s+(?=[(\[])", " ", line)
-    separator = _separator(joined)
+    separator = _separator(line)
     if separator is None:
         # a unit in brackets belongs to the name before it
-        joined = re.sub(r"\s+(?=[(\[])", "_", joined)
-    return _split(joined, separator)
+        line = re.sub(r"\s+(?=[(\[])", "_", line)
+    return _split(line, separator)
 
 
 def _split(line: str, separator: str | None) -> list[str]:

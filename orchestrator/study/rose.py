@@ -133,7 +133,8 @@ def _sectors(directions: FloatArray, blows: BoolArray) -> tuple[FloatArray, floa
         # the first sector may begin anywhere
         residuals = np.radians(written * count)
         turn = np.angle(np.exp(1j * residuals).sum())
-        first = float(np.degrees(turn)) / count
+        # without round-off, of which a flow beside the sector would get a part
+        first = round(float(np.degrees(turn)) / count, 9)
         number = np.round((directions - first) / width)
         middles = first + width * number
         is_near = np.abs(written - middles[blows]) <= ROUNDED_DEG

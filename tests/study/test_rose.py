@@ -47,6 +47,15 @@ def test_a_uniform_wind_gives_each_flow_one_share(
     assert found == pytest.approx([1 / flows] * flows, rel=1e-9)
 
 
+def test_sectors_that_are_those_of_the_flows_stay_whole() -> None:
+    rows = "".join(
+        f"{way},{speed},0.125\n" for way in (270, 0, 90, 180) for speed in (3, 8)
+    )
+    table = read_rose(HEAD + rows, "a.csv", WHERE).table([0.0, 90, 180, 270], WHERE)
+    assert table["solved_deg"].tolist() == table["from_deg"].tolist()
+    assert table["share"].tolist() == [0.125] * 8
+
+
 def test_compass_points_in_whole_degrees_are_sectors() -> None:
     # 22.5 degrees is written as 22 or 23
     directions = [
