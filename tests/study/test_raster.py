@@ -117,6 +117,13 @@ def test_columns_are_read_by_their_names(tmp_path: Path, head: str, form: str) -
         ("x,y,height_of_plant", "{x},{y},{z}", "name them x, y and z"),
         ("x y z", "{x} {y} {z} 25", "line 2: 4 cells, the head has 3"),
         ("y,x,z,code", "{y},{x}", "line 2: .* is no point"),
+        ("x y z\nft ft ft", "{x} {y} {z}", "line 2: the unit is ft"),
+        (
+            "@File: 4\n# a comment\nEOD",
+            "A1 {x} {y} {z}",
+            "line 1: '@File: 4' is no point",
+        ),
+        ("Heap of sand", "{x} {y} {z}", "line 1: the columns are Heap, of, sand"),
         # geodesists call the northing x
         ("x,y,z", "{y},{x},{z}", "northing before easting"),
         ("", "{y} {x} {z}", "northing before easting"),
@@ -151,6 +158,12 @@ def test_decimal_commas_are_refused(tmp_path: Path, head: str, form: str) -> Non
         or "write 0.00" in message
         or "decimal point" in message
     )
+
+
+def test_a_foot_behind_the_points_is_refused_with_its_line(tmp_path: Path) -> None:
+    text = "@File_Version: 4\n" + points("{x} {y} {z}") + "EOD\n"
+    message = refused(tmp_path, text)
+    assert f"line {COLUMNS * ROWS + 2}: 'EOD' is no point" in message
 
 
 def test_one_line_with_a_decimal_comma_is_refused(tmp_path: Path) -> None:
