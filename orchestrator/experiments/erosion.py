@@ -129,6 +129,11 @@ class Surface(NamedTuple):
         lost = 58 * excess**2 + 25 * excess
         return np.asarray(lost @ (share / share.sum()))
 
+    @property
+    def area(self) -> float:
+        """Sum of the shares of its faces: of a surface in three dimensions m2."""
+        return float(self.faces["share"].sum())
+
     def total(self, winds: ArrayLike) -> float:
         """Erosion potential of several winds, one after another.
 
@@ -588,7 +593,7 @@ def card(found: Sequence[Pile], winds: Sequence[float], source: str) -> Card:
         f"How much dust does a wind of {speeds} m/s take from this pile?",
         f"{subject}.",
         tuple(numbers),
-        "No loss was measured on such a pile; the law of the loss is that of AP-42.",
+        TEXTS["erosion"]["measured"],
         Worth(
             "care",
             "usable, to compare",

@@ -84,12 +84,7 @@ def experiment(study: SurfaceStudy, out: Path) -> Experiment:
     threshold, source = given_threshold(study.erosion.threshold, study.file)
     flows = {scene: flow_of(scene) for scene in study.scenes}
     members = alike(study.scenes)
-    roses = {}
-    for bare, scenes in members.items():
-        if study.rose:
-            directions = [scene.flow.from_deg for scene in scenes]
-            where = f"{study.file}: erosion.wind"
-            roses[bare] = study.rose.table(directions, where)
+    roses = roses_of(study, members)
 
     def answers(runs: Runs) -> list[Answer]:
         found = []
@@ -174,6 +169,38 @@ def alike(
         flow = scene.flow.model_copy(update={"from_deg": 0.0})
         bare = scene.model_copy(update={"flow": flow})
         found.setdefault(bare, []).append(scene)
+    return found
+
+
+def roses_of(
+    study: SurfaceStudy, members: Mapping[SurfaceScene, Sequence[SurfaceScene]]
+) -> dict[SurfaceScene, pd.DataFrame]:
+    """List the wind rose of a study with the flows that answer it.
+
+    Parameters
+    ----------
+    study
+        The study.
+    members
+        Its scenes by `alike`.
+
+    Returns
+    -------
+    dict
+        The table of the rose for the scenes of each key; empty without a rose.
+
+    Raises
+    ------
+    InputError
+        If the rose blows from where no flow is.
+    """
+    if not study.rose:
+        return {}
+    where = f"{study.file}: erosion.wind"
+    found = {}
+    for bare, scenes in members.items():
+        directions = [scene.flow.from_deg for scene in scenes]
+        found[bare] = study.rose.table(directions, where)
     return found
 
 

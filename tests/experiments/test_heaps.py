@@ -5,12 +5,14 @@ from math import cos, pi, radians, tan
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from orchestrator.experiments import surface, surface_card
+from orchestrator.experiments import surface, surface_card, surface_erosion
 from orchestrator.experiments.experiment import Experiment, Results, Runs
 from orchestrator.flow.surface_case import SURFACE_STRESS
 from orchestrator.flow.surface_stress import SurfaceStress, faces_of
+from orchestrator.report.card import Card
 from orchestrator.study import surface_study
 from orchestrator.study.raster import geotiff
 from orchestrator.study.surface_study import SurfaceStudy
@@ -180,3 +182,136 @@ def test_the_page_has_places_to_a_part_of_a_cell(tmp_path: Path) -> None:
     card = sections[0].card
     assert card is not None
     assert card.numbers[0].note.startswith("first at x = 4312")
+
+
+COAL = 'threshold = "uncrusted coal pile"\n'
+
+
+def eroded(
+    folder: Path,
+    cones: Sequence[tuple[float, float, float]] = TWO,
+    strength: Callable[[float], float] = lambda from_deg: 1.0,
+    directions: Sequence[float] = (270.0,),
+    more: str = "",
+) -> tuple[pd.DataFrame, Card, str]:
+    """The table, the card and the sentences of the erosion of cones."""
+    study = study_of(folder, cones, directions=directions, more=COAL + more)
+    experiment = surface_erosion.experiment(study, folder)
+    made, sections = answered(study, experiment, folder / "cases", strength)
+    card = sections[0].card
+    assert card is not None
+    return made["erosion"], card, sections[0].text
+
+
+def test_each_heap_is_a_pile_of_ap42(tmp_path: Path) -> None:
+    alone, one, said = eroded(tmp_path / "one", ONE)
+    both, card, of_both = eroded(tmp_path / "both", TWO)
+    # AP-42: a pile of coal of 36 deg loses 6.4 to 11.2 g/m2 in 20 m/s
+    for shown in (one, card):
+        assert shown.numbers[1].figure == "6.4–11.2"
+    assert "flat ground" not in said + of_both
+    assert both["pile"].nunique() == 2
+    whole = both[both["part"] == "all"]
+    epa = whole.loc[whole["surface"] == "AP-42, A", "P, g/m²"]
+    assert epa.to_numpy() == pytest.approx(6.4, abs=0.05)
+    areas = whole.loc[whole["surface"] == "wind from 270°", "area, m²"]
+    assert areas.to_numpy() == pytest.approx(
+        [0.95 * lateral([cone]) for cone in TWO], rel=0.05
+    )
+    # with a second heap cells are 1.23 m long, not 0.79: they smooth the first more
+    first = both[both["pile"] == both["pile"].iloc[0]]
+    own = alone["P, g/m²"].to_numpy()
+    assert first["P, g/m²"].to_numpy() == pytest.approx(own, rel=0.06)
+
+
+def test_a_low_heap_alone_is_flat_ground_to_ap42(tmp_path: Path) -> None:
+    """One heap is as high as before, the other has a base of 24 m and 2.2 m."""
+    x, y = np.arange(0, 80.1, 0.5), np.arange(0, 60.1, 0.5)
+    high = 7.0 - tan(radians(SLOPE)) * np.hypot(x - 24, (y - 26)[:, None])
+    low = 2.2 - 2.2 / 12 * np.hypot(x - 60, (y - 30)[:, None])
+    study_of(tmp_path, more=COAL)
+    heights = np.maximum(np.maximum(high, low), 0.0)
+    (tmp_path / "heaps.tif").write_bytes(geotiff(EAST + x, NORTH + y, heights, {}))
+    study = surface_study.load(tmp_path / "heaps.toml")
+    assert study is not None
+    experiment = surface_erosion.experiment(study, tmp_path)
+    made, sections = answered(study, experiment, tmp_path / "cases")
+    told = sections[0].text.split("\n\n")
+    assert "flat ground" not in told[0]
+    assert "by AP-42, to which it is flat ground, " in told[1]
+    rows = made["erosion"]
+    by_epa = rows[rows["surface"].str.startswith("AP-42")]
+    assert by_epa.groupby("pile", sort=False).size().tolist() == [4, 1]
+
+
+def test_masses_are_those_of_areas_and_parts_add_up(tmp_path: Path) -> None:
+    table, card, said = eroded(tmp_path)
+    assert (table["loss, kg"] * 1000).to_numpy() == pytest.approx(
+        (table["area, m²"] * table["P, g/m²"]).to_numpy()
+    )
+    own = table[table["surface"] == "wind from 270°"]
+    for _, pile in own.groupby("pile"):
+        whole, *parts = pile["loss, kg"]
+        assert sum(parts) == pytest.approx(whole)
+    total = own.loc[own["part"] == "all", "loss, kg"].sum()
+    assert f"{total:.3g} kg in all" in card.numbers[0].note
+    area = own.loc[own["part"] == "all", "area, m²"].sum()
+    assert f"2 heaps of {area:.3g} m²" in card.scene
+    assert card.numbers[0].value == pytest.approx(1000 * total / area)
+    assert said.count(" kg from its ") == 2
+    assert "38 to 2,000 times" in card.source
+
+
+def test_the_worst_direction_leads_and_a_tie_is_said(tmp_path: Path) -> None:
+    strengths = {0.0: 0.8, 90.0: 0.99, 180.0: 1.0}
+    *_, card, said = eroded(tmp_path, TWO, strengths.__getitem__, [0.0, 90.0, 180.0])
+    first, _, last = card.numbers
+    assert first.meaning.endswith("with a wind from 180°, the worst of 3")
+    assert "90° is not told from it within the interval" in first.note
+    assert first.low < first.value < first.high
+    assert last.meaning == "with a wind from 0°, the least of all"
+    assert last.value < first.low
+    at = [said.index(f"wind from {angle}°") for angle in (180, 90, 0)]
+    assert at == sorted(at)
+
+
+def test_the_rose_of_the_file_weighs_the_directions(tmp_path: Path) -> None:
+    rose = "from_deg,speed_m_s,share\n0,20,0.1\n0,5,0.5\n180,20,0.3\n180,30,0.1\n"
+    tmp_path.joinpath("year.csv").write_text(rose)
+    strengths = {0.0: 1.1, 180.0: 1.0}
+    more = 'wind = "year.csv"\nfastest_mile = [20.0, 30.0]\n'
+    table, card, said = eroded(tmp_path, TWO, strengths.__getitem__, [0.0, 180.0], more)
+    # the worst of single winds is 0, but most of the year's blow from 180
+    assert "wind from 0°, the worst of 2" in card.numbers[0].meaning
+    assert card.numbers[2].meaning.startswith("in the mean over the winds of the rose")
+    assert card.numbers[2].note.endswith("in wind from 180°")
+    one = table[(table["part"] == "all") & (table["surface"] == "wind from 180°")]
+    by_20, by_both = (
+        eroded(
+            tmp_path / f"{n}",
+            TWO,
+            strengths.__getitem__,
+            [0.0, 180.0],
+            f"fastest_mile = {winds}\n",
+        )[0]
+        for n, winds in enumerate(([20.0], [20.0, 30.0]))
+    )
+
+    def kg(rows: pd.DataFrame, angle: int) -> float:
+        is_meant = (rows["part"] == "all") & (rows["surface"] == f"wind from {angle}°")
+        return float(rows.loc[is_meant, "loss, kg"].sum())
+
+    assert one["loss, kg"].sum() == pytest.approx(kg(by_both, 180))
+    # 5 m/s takes nothing, and 30 m/s is the rest of both
+    by_hand = 0.1 * kg(by_20, 0) + 0.3 * kg(by_20, 180)
+    by_hand += 0.1 * (kg(by_both, 180) - kg(by_20, 180))
+    assert card.numbers[2].value == pytest.approx(by_hand)
+    assert f"costs {by_hand:.3g} kg in the mean" in said
+
+
+def test_a_calm_rose_takes_nothing(tmp_path: Path) -> None:
+    tmp_path.joinpath("year.csv").write_text("from_deg,speed_m_s,share\n270,4,1\n")
+    *_, card, said = eroded(tmp_path, more='wind = "year.csv"\n')
+    assert card.numbers[2].value == 0
+    assert card.numbers[2].note == "none of them reaches the threshold"
+    assert "No wind of the rose reaches the threshold" in said
