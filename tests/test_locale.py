@@ -55,14 +55,13 @@ def comma(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     folder = tmp_path_factory.mktemp("locale")
     (folder / "characters").write_text(CHARACTERS)
     (folder / "numbers").write_text(NUMBERS)
-    command = ["localedef", "--no-archive", "--force", "-f", folder / "characters"]
+    characters, numbers = str(folder / "characters"), str(folder / "numbers")
+    command = ["localedef", "--no-archive", "--force", "-f", characters, "-i", numbers]
     if shutil.which("localedef") is None:
         stop = pytest.fail if os.environ.get("SKIP_NOTHING") else pytest.skip
         stop("without localedef, which Debian has in its package libc-bin")
     # it warns of all that the locale leaves as it is
-    subprocess.run(
-        [*command, "-i", folder / "numbers", folder / "xx_XX"], capture_output=True
-    )
+    subprocess.run([*command, str(folder / "xx_XX")], capture_output=True)
     environment = {**os.environ, "LOCPATH": str(folder), "LC_ALL": "xx_XX"}
     said = subprocess.check_output(["printf", "%.1f", "1,5"], env=environment)
     assert said == b"1,5", "the locale is not in use"
