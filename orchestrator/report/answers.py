@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -381,13 +382,59 @@ def _of_several(rows: pd.DataFrame, results: Results) -> Card:
     every = results.joined("pile_threshold")
     scenes = every["scene_id"].nunique()
     count = int(every["usable"].sum())
-    shape = _common_shape(results.at_fraction)
+    third = _first_of_several(shown, results, told, telling)
+    if third is None or count < len(every):
+        third = _usable_number(count, len(every))
+    worth = _worth_of_many(shown, count, len(every))
+    advice = f"{worth.advice} {_no_difference(shown, told)}".strip()
     return Card(
-        f"At which {told.flow} do {scenes} {shape} start to move?",
+        f"At which {told.flow} do {scenes} {_common_shape(results.at_fraction)} start "
+        "to move?",
         _span_of(results.at_fraction),
-        (*numbers, _usable_number(count, len(every))),
+        (*numbers, third),
         single.source(shown.iloc[0], told),
-        _worth_of_many(shown, count, len(every)),
+        replace(worth, advice=advice),
+    )
+
+
+def _first_of_several(
+    shown: pd.DataFrame, results: Results, told: Quantity, telling: Sequence[str]
+) -> Number | None:
+    """The least flow that moves the first grains of several beds, and where they lie.
+
+    None where no bed has such a place.
+    """
+    starts = [
+        row
+        for _, row in shown.iterrows()
+        if row["first_ustar0_m_s"] > 0 and not single.is_level(row)
+    ]
+    if not starts:
+        return None
+    row = min(starts, key=lambda each: float(each["first_ustar0_m_s"]))
+    bed = results.plan.piles[str(row["scene_id"])].bed
+    number = _first_motion(row, float(row["first_ustar0_m_s"]), told)
+    what = ", ".join(labels.told(row, list(telling)[:3]))
+    where = f"at x = {counted.place(float(row['first_x_m']), bed)} m"
+    meaning = f"least {told.name} that moves the first grains, {where}: {what}"
+    return replace(number, meaning=meaning)
+
+
+def _no_difference(shown: pd.DataFrame, told: Quantity) -> str:
+    """That the known errors hide the difference of several beds; empty if they do not.
+
+    Unknown errors show no difference and hide none.
+    """
+    ends = shown.iloc[[0, -1]]
+    stresses = ends["ustar0_m_s"].to_numpy(float) ** 2
+    error = float(np.hypot(*ends["error_estimate"].astype(float)))
+    apart = float(stresses.max() / stresses.min()) - 1
+    if len(shown) < 2 or not apart < error:
+        return ""
+    return (
+        f"The beds show no difference: the least and the most {told.name} are "
+        f"{percent(apart)} apart in stress, less than their known errors together, "
+        f"{percent(error)}."
     )
 
 

@@ -45,15 +45,28 @@ def metres(x: pd.Series, bed: PileBed) -> str:
         for start, end in zip(first, last, strict=True)
     ]
     if len(stretches) <= MOST:
-        named = [f"{_place(a, bed)} to {_place(b, bed)}" for a, b in stretches]
+        named = [f"{place(a, bed)} to {place(b, bed)}" for a, b in stretches]
         return f"x = {' and '.join(named)} m"
     whole = length(sum(end - start for start, end in stretches))
-    ends = f"{_place(places[0], bed)} and {_place(places[-1], bed)} m"
+    ends = f"{place(places[0], bed)} and {place(places[-1], bed)} m"
     return f"{whole} in {len(stretches)} stretches between x = {ends}"
 
 
-def _place(x: float, bed: PileBed) -> str:
-    """X as the user has it, with the digits that matter."""
+def place(x: float, bed: PileBed) -> str:
+    """Write x as the user has it, with the digits that matter.
+
+    Parameters
+    ----------
+    x
+        The place, m.
+    bed
+        The bed.
+
+    Returns
+    -------
+    str
+        The number.
+    """
     return place_of_file(x, bed.profile) if bed.profile else f"{x:.4g}"
 
 

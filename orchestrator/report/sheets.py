@@ -11,7 +11,7 @@ from orchestrator.digits import percent
 from orchestrator.fidelity.fidelities import FIDELITIES, LOCAL, OWN_NUMBERS
 from orchestrator.grains.threshold import STEP
 from orchestrator.physics.laws import LAWS
-from orchestrator.report import labels, single
+from orchestrator.report import counted, labels, single
 from orchestrator.report.results import Results, measured_hills, split
 from orchestrator.report.subjects import MEAN, STRESS, TERMS, WIND, Quantity, is_gas
 from orchestrator.study import fields
@@ -119,20 +119,61 @@ def _of_piles(results: Results, every: pd.DataFrame) -> Sheet:
         return _sheet(here, keys if _fits(here, keys) else RANGES, "pile_threshold")
     sheet = _sheet(every, [*keys, "fraction"], "pile_threshold")
     if every["scene_id"].nunique() > 1:
-        return sheet
-    first = _first_grain(every.iloc[0], sheet.frame)
+        if PART not in sheet.frame:
+            return sheet
+        return replace(sheet, frame=_first_grains(results, every, keys, sheet.frame))
+    first = _first_grain(every.iloc[0], sheet.frame, {PART: "first grain"})
     return replace(sheet, frame=first)
 
 
-def _first_grain(row: pd.Series, frame: pd.DataFrame) -> pd.DataFrame:
-    """The table of one bed, with a row for its first grain above the others."""
+def _first_grains(
+    results: Results, every: pd.DataFrame, keys: Sequence[str], frame: pd.DataFrame
+) -> pd.DataFrame:
+    """The table of several beds, with a row for the first grain above those of each.
+
+    The row says where it lies. Beds that differ in chance alone have none.
+    """
+    # as the rows of the table are
+    every = every.sort_values(["alpha_deg", "d_m"], kind="stable")
+    beds = every.groupby(list(keys), dropna=False, sort=False)
+    parts = []
+    start = 0
+    for _, rows in beds:
+        end = start + rows["fraction"].nunique()
+        part = frame.iloc[start:end].reset_index(drop=True)
+        start = end
+        row = rows.iloc[0]
+        if rows["scene_id"].nunique() == 1:
+            named = {head: str(part[head].iloc[0]) for head in _heads_of(keys, part)}
+            named[PART] = "first grain"
+            if not single.is_level(row):
+                bed = results.plan.piles[str(row["scene_id"])].bed
+                where = counted.place(float(row["first_x_m"]), bed)
+                named[PART] = f"first grain, at x = {where} m"
+            part = _first_grain(row, part, named)
+        parts.append(part)
+    return pd.concat(parts, ignore_index=True)
+
+
+def _heads_of(keys: Sequence[str], frame: pd.DataFrame) -> list[str]:
+    """The heads in a table of the columns that name its beds."""
+    heads = [labels.words(column).label for column in keys]
+    return [head for head in heads if head in frame]
+
+
+def _first_grain(
+    row: pd.Series, frame: pd.DataFrame, named: Mapping[str, str]
+) -> pd.DataFrame:
+    """The table of one bed, with a row for its first grain above the others.
+
+    The row has some cells that name it, by their heads.
+    """
     ustar = float(row["first_ustar0_m_s"])
     if not ustar > 0:
         return frame
     told = single.quantity(row)
     beside = single.measured_ustar(row, ustar)
-    values = dict.fromkeys(frame.columns, "—")
-    values[PART] = "first grain"
+    values = {**dict.fromkeys(frame.columns, "—"), **named}
     heads = _heads(told)
     values[heads[0]] = f"{single.in_unit(row, ustar, told):#.3g}"
     if heads[1] in values:

@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from orchestrator.fidelity import limits
-from orchestrator.report import answers, remarks
+from orchestrator.report import answers, remarks, sheets, single
 from orchestrator.report.results import Results
+from orchestrator.report.subjects import WIND
 from orchestrator.study import study
 from tests import small_study
+from tests.report.conftest import changed
 
 BEACH = [(112.4, 0.0), (162.4, 1.25), (187.4, 7.25), (198.4, 1.25), (232.4, 1.25)]
 """A beach of 1:40, a dune of 6 m on it, x and z in m."""
@@ -116,3 +118,46 @@ def test_beds_that_are_compared_count_the_same_metres(fenced: Results) -> None:
     of_fence, of_bare = np.reshape(rows["ustar0_m_s"].to_numpy(), (2, 2))
     # a fence takes wind from the sand: none of it moves earlier for it
     assert (of_fence >= of_bare).all()
+
+
+def test_a_comparison_says_where_each_bed_starts(fenced: Results) -> None:
+    rows = fenced.joined("pile_threshold").drop_duplicates("scene_id")
+    sheet = sheets.short(fenced)
+    assert sheet is not None
+    part = sheet.frame[sheets.PART]
+    firsts = sheet.frame[part.str.startswith("first grain")]
+    assert firsts[sheets.PART].tolist() == [
+        f"first grain, at x = {x:.2f} m" for x in rows["first_x_m"]
+    ]
+    assert firsts["wind at 10 m, m/s"].astype(float).tolist() == pytest.approx(
+        [
+            single.in_unit(row, row["first_ustar0_m_s"], WIND)
+            for _, row in rows.iterrows()
+        ],
+        rel=5e-3,
+    )
+    # each stands above the shares of its own bed
+    assert part.index[part.str.startswith("first")].tolist() == [0, 3]
+    assert sheet.frame["obstacles"].nunique() == 2
+    usable = changed(
+        fenced, pile_threshold=fenced.tables["pile_threshold"].assign(usable=True)
+    )
+    first = answers.card(usable).numbers[2]
+    least = rows.iloc[int(rows["first_ustar0_m_s"].argmin())]
+    assert f"at x = {least['first_x_m']:.2f} m" in first.meaning
+    assert first.value == pytest.approx(
+        single.in_unit(least, least["first_ustar0_m_s"], WIND)
+    )
+
+
+@pytest.mark.parametrize(
+    ("error", "is_none"), [(0.02, False), (0.05, True), (np.nan, False)]
+)
+def test_a_difference_below_the_errors_is_said_to_be_none(
+    fenced: Results, error: float, is_none: bool
+) -> None:
+    """At 30 % the stresses are 4.6 % apart; two errors add by their squares."""
+    methods = fenced.tables["methods"].assign(error_estimate=error)
+    rows = fenced.tables["pile_threshold"].assign(usable=True, error_estimate=error)
+    study_ = changed(fenced, methods=methods, pile_threshold=rows)
+    assert ("no difference" in answers.card(study_).worth.advice) is is_none
