@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import re
 import sys
 import warnings
 from argparse import Namespace
@@ -57,6 +58,23 @@ RUNNING = {
 """Those that run cases, with the preset that each runs by default."""
 
 
+def _with_negative_numbers(words: Sequence[str]) -> list[str]:
+    """Write a negative number in one word with its option.
+
+    Alone argparse takes -5e-3 and -29:29:9 for options.
+    """
+    joined: list[str] = []
+    for word in words:
+        is_value = (
+            bool(joined) and joined[-1].startswith("--") and "=" not in joined[-1]
+        )
+        if is_value and re.match(r"-\.?\d", word):
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command.
 
@@ -83,7 +101,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     warnings.showwarning = lambda message, *_, **__: _say(f"warning: {message}")
     # PYTHONWARNINGS=error is about libraries: a message of this program ends no command
     warnings.simplefilter("default", UserWarning)
-    options = parser().parse_args(sys.argv[1:] if arguments is None else arguments)
+    words = sys.argv[1:] if arguments is None else arguments
+    options = parser().parse_args(_with_negative_numbers(words))
     try:
         if getattr(options, "workers", 1) < 1:
             raise InputError("at least 1", "--workers")

@@ -1,7 +1,10 @@
 """The public Python face: `threshold`, `run` and `open`."""
 
+import os
 import warnings
+from collections.abc import Mapping
 from html import escape
+from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -112,7 +115,8 @@ def threshold(
     -------
     DataFrame
         A row for each point of the raveled arrays, or for each point and law, with
-        units in the columns' names; ``valid`` and ``why_not`` say where a law ends.
+        units in the columns' names; ``valid`` and ``why_not`` say where a law ends. Of
+        series and frames it has their index, so that it can be assigned to them.
         A number that is usual in another unit is asked about in a warning.
 
     Raises
@@ -131,7 +135,11 @@ def threshold(
     >>> rows["shields"].round(4).tolist()
     [0.0272, 0.0323]
     """
+    for name, word in {"law": law, "fluid": fluid, "criterion": criterion}.items():
+        if not isinstance(word, str | None):
+            raise InputError(f"{word!r} is no name", name, "write one, such as a text")
     given: dict[str, Any] = {"diameter": diameter, **parameters}
+    index = _index({**given})
     for name, values in given.items():
         if name not in PARAMETERS:
             what = f"there are {', '.join(PARAMETERS)}"
@@ -155,8 +163,32 @@ def threshold(
     if asked:
         warnings.warn("; ".join(asked), stacklevel=2)
     rows = pd.DataFrame(table)
+    count = len(points["diameter"])
+    is_indexed = index is not None and len(index) == count
+    if index is not None and is_indexed:
+        rows.index = index.repeat(len(rows) // count)
     chosen = rows if law is None else rows[rows["answer"]]
-    return chosen.drop(columns="answer").reset_index(drop=True)
+    chosen = chosen.drop(columns="answer")
+    return chosen if is_indexed else chosen.reset_index(drop=True)
+
+
+def _index(given: Mapping[str, Any]) -> "pd.Index[Any] | None":
+    """The index of the series and frames among some parameters; None without any.
+
+    Rows are paired by their places, so that all must have one index.
+    """
+    first = ""
+    index = None
+    for name, values in given.items():
+        if not isinstance(values, pd.Series | pd.DataFrame):
+            continue
+        if index is None:
+            first = name
+            index = values.index
+        elif not values.index.equals(index):
+            what = f"its index is not that of {first}"
+            raise InputError(what, name, "align them first, or give .to_numpy()")
+    return index
 
 
 def _column(name: str, values: Any) -> "NDArray[Any]":
@@ -214,8 +246,14 @@ def run(
     """
     if workers is None:
         workers = processors.count()
+    given: Any = workers  # Python gives what it likes
+    if isinstance(given, bool) or not isinstance(given, Integral):
+        raise InputError(f"{workers!r} is no whole number", where="workers")
     if workers < 1:
         raise InputError(f"{workers} is below 1", where="workers")
+    _check_path("source", source)
+    if out is not None:
+        _check_path("out", out)
     asked = study.load(source, tolerance)
     place = Path(out or Path("results") / asked.name)
     finished = pipeline.run(asked, place, workers=workers)
@@ -244,9 +282,16 @@ def open(directory: str | Path) -> "Opened":
     OrchestratorError
         If it holds no study or no tables, or these have changed since.
     """
+    _check_path("directory", directory)
     space = Workspace(Path(directory).absolute())
     asked, planned = pipeline.reopen(space)
     return Opened(Results(asked, planned, tables.read(space, "tables"), space.cases))
+
+
+def _check_path(name: str, path: object) -> None:
+    """Refuse an argument that is no path."""
+    if not isinstance(path, str | os.PathLike):
+        raise InputError(f"{path!r} is no path", name, "write a text, or a Path")
 
 
 class Plot:

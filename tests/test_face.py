@@ -3,10 +3,12 @@
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import orchestrator
@@ -115,3 +117,46 @@ def test_the_page_opens_files_as_it_says(
     *_, counted, columns = capsys.readouterr().out.splitlines()
     assert int(counted.split()[0]) > 1000
     assert columns == "['column', 'meaning']"
+
+
+def test_the_index_of_what_is_given_is_that_of_the_answer() -> None:
+    """On a filtered or shuffled frame an assignment paired the wrong rows."""
+    sand = pd.DataFrame({"d_m": [2e-4, 5e-4, 1e-3, 2e-3]}, index=[7, 3, 9, 1])
+    sand["u"] = orchestrator.threshold(sand["d_m"])["ustar_m_s"]
+    for size, found in zip(sand["d_m"], sand["u"], strict=True):
+        assert found == orchestrator.threshold(size)["ustar_m_s"][0]
+    part = sand[sand["d_m"] > 3e-4]
+    # also from another parameter, from a frame, and with a row for each law
+    beside = orchestrator.threshold(1e-3, roughness=part["d_m"] / 30)
+    assert beside.index.tolist() == [3, 9, 1]
+    assert orchestrator.threshold(part[["d_m"]]).index.tolist() == [3, 9, 1]
+    laws = orchestrator.threshold(part["d_m"], law=None)
+    assert laws.index.tolist() == np.repeat([3, 9, 1], laws["law"].nunique()).tolist()
+    assert orchestrator.threshold(part["d_m"].to_numpy()).index.tolist() == [0, 1, 2]
+    grid = orchestrator.threshold(part["d_m"], slope_deg=[[0.0], [10.0]])
+    assert grid.index.tolist() == [*range(6)]
+    with pytest.raises(InputError, match="roughness: its index is not that of diam"):
+        orchestrator.threshold(part["d_m"], roughness=(sand["d_m"] / 30).head(3))
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: orchestrator.threshold(1e-3, law=["low", "high"]), "law: .* no name"),  # type: ignore[arg-type]
+        (lambda: orchestrator.threshold(1e-3, law=5), "law: 5 is no name"),  # type: ignore[arg-type]
+        (lambda: orchestrator.threshold(1e-3, fluid=["air"]), "fluid: .* no name"),  # type: ignore[arg-type]
+        (lambda: orchestrator.threshold(1e-3, criterion=1), "criterion: 1 is no name"),  # type: ignore[arg-type]
+        (lambda: orchestrator.run("first-look", tolerance="0.1"), "tolerance: '0.1'"),  # type: ignore[arg-type]
+        (lambda: orchestrator.run("first-look", workers="2"), "workers: '2' is no"),  # type: ignore[arg-type]
+        (lambda: orchestrator.run("first-look", workers=1.5), "workers: 1.5 is no"),  # type: ignore[arg-type]
+        (lambda: orchestrator.run("first-look", workers=True), "workers: True is no"),
+        (lambda: orchestrator.run(5), "source: 5 is no path"),  # type: ignore[arg-type]
+        (lambda: orchestrator.run("first-look", out=5), "out: 5 is no path"),  # type: ignore[arg-type]
+        (lambda: orchestrator.open(1), "directory: 1 is no path"),  # type: ignore[arg-type]
+    ],
+)
+def test_arguments_of_another_type_are_refused(
+    call: Callable[[], object], said: str
+) -> None:
+    with pytest.raises(InputError, match=said):
+        call()

@@ -111,6 +111,8 @@ PARAMETERS = {
 """By keyword, which is also the name in JSON. The paper's values are the defaults."""
 OF_FLUID = {"fluid_density": "density", "viscosity": "viscosity"}
 """Parameters that a fluid has by its name, as a table ``[fluid]`` calls them."""
+LARGEST_DEPTH = 1e4
+"""Largest depth of a flow, m, as in a study file."""
 GEOMETRIC = ("diameter", "viscosity", "roughness", "depth")
 """Parameters whose ranges are geometric; all others are spaced evenly."""
 QUANTITIES = {

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from orchestrator.calculator.table import Table
+from orchestrator.calculator.table import Table, mark, mark_laminar, why_no_depth
 from orchestrator.errors import InputError
 from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.physics.velocity import measurable_speeds
@@ -18,7 +18,9 @@ def add_depth(table: Table, bed_slope: float, has_depth: bool) -> None:
 
     The stress of a wide channel of depth h that falls by S is rho g h S, so that
     h = u*^2 / (g S). The slope itself changes the threshold by less than S/tan(phi),
-    8 % at most, which is left out.
+    8 % at most, which is left out. A threshold whose flow would not cover the grain, is
+    deeper than any, or may be laminar is marked as not valid, as where a depth is
+    given.
 
     Parameters
     ----------
@@ -33,7 +35,8 @@ def add_depth(table: Table, bed_slope: float, has_depth: bool) -> None:
     Raises
     ------
     InputError
-        In a gas, with a depth, or for a slope that is 0 or too steep.
+        In a gas, with a depth, for a slope that is 0 or too steep, or where no answer
+        has a depth.
 
     Examples
     --------
@@ -58,15 +61,37 @@ def add_depth(table: Table, bed_slope: float, has_depth: bool) -> None:
         remedy = "write the fall over the length, such as 0.005"
         raise InputError(what, "--bed-slope", remedy)
     ustar = table["ustar_m_s"]
-    depth = ustar**2 / (table["g_m_s2"] * slope)
-    speeds = measurable_speeds(
-        ustar,
-        roughness=table["z0_m"],
-        fluid_density=table["rho_f_kg_m3"],
-        viscosity=table["nu_m2_s"],
-        depth=depth,
-        closed=False,
-    )
+    # the slope may be as small as numbers are
+    with np.errstate(over="ignore"):
+        depth = ustar**2 / (table["g_m_s2"] * slope)
+        speeds = measurable_speeds(
+            ustar,
+            roughness=table["z0_m"],
+            fluid_density=table["rho_f_kg_m3"],
+            viscosity=table["nu_m2_s"],
+            depth=depth,
+            closed=False,
+        )
     table[COLUMN] = np.full(len(ustar), slope)
     table["depth_m"] = depth
     table["mean_velocity_m_s"] = speeds["mean_velocity_m_s"]
+    _mark_depths(table)
+    mark_laminar(table)
+
+
+def _mark_depths(table: Table) -> None:
+    """Mark thresholds without a depth; refuse a table in which no answer has one."""
+    reasons = [""] * len(table["depth_m"])
+    for row, depth in enumerate(table["depth_m"].tolist()):
+        # a law without a threshold has its own reason
+        if np.isfinite(table["ustar_m_s"][row]):
+            reasons[row] = why_no_depth(depth, float(table["d_m"][row]))
+    answers = np.flatnonzero(table["answer"]).tolist()
+    if all(reasons[row] for row in answers):
+        what = reasons[answers[0]]
+        is_deep = table["depth_m"][answers[0]] > table["d_m"][answers[0]]
+        remedy = f"take a {'steeper' if is_deep else 'gentler'} slope"
+        raise InputError(what, "--bed-slope", remedy)
+    for row, reason in enumerate(reasons):
+        if reason:
+            mark(table, row, reason)

@@ -1,5 +1,6 @@
 """Thresholds of many single grains under every force law, as one table."""
 
+import itertools
 import re
 from collections import defaultdict
 from collections.abc import Mapping
@@ -13,6 +14,7 @@ from orchestrator.calculator import (
     BY_FLUID,
     CRITERIA,
     GOES_ON,
+    LARGEST_DEPTH,
     LEAVES,
     OF_FLUID,
     PARAMETERS,
@@ -113,9 +115,11 @@ def thresholds(
         remedy = f"take the criterion {LEAVES}, or a larger grain"
         raise InputError(NO_START, "threshold: criterion", remedy)
     if not table["valid"].any():
+        place = int(np.argmax(table["answer"]))
+        reason = f"{table['law'][place]}: {table['why_not'][place]}"
         remedy = "are all numbers in SI units?"
-        raise InputError("no force law holds", "threshold", remedy)
-    _mark_laminar(table)
+        raise InputError(f"no force law holds; {reason}", "threshold", remedy)
+    mark_laminar(table)
     return table
 
 
@@ -159,8 +163,14 @@ def _of_all_laws(grains: Table, asked: str, criterion: str) -> Table:
     return table
 
 
-def _mark_laminar(table: Table) -> None:
-    """Mark the thresholds in open water whose flow may be laminar as not valid."""
+def mark_laminar(table: Table) -> None:
+    """Mark the thresholds in open water whose flow may be laminar as not valid.
+
+    Parameters
+    ----------
+    table
+        The table of `thresholds`, whose columns ``valid`` and ``why_not`` are changed.
+    """
     with np.errstate(all="ignore"):
         reynolds = open_water_reynolds(
             table["ustar_m_s"],
@@ -171,9 +181,51 @@ def _mark_laminar(table: Table) -> None:
         is_laminar = reynolds < LAMINAR_BELOW
     is_laminar &= table["rho_f_kg_m3"] >= GAS_BELOW
     for row in np.flatnonzero(is_laminar).tolist():
-        reasons = [table["why_not"][row], laminar(float(reynolds[row]))]
-        table["why_not"][row] = "; ".join(filter(None, reasons))
-    table["valid"] &= ~is_laminar
+        mark(table, row, laminar(float(reynolds[row])))
+
+
+def mark(table: Table, row: int, reason: str) -> None:
+    """Mark a threshold as not valid.
+
+    Parameters
+    ----------
+    table
+        The table of `thresholds`, whose columns ``valid`` and ``why_not`` are changed.
+    row
+        Its row.
+    reason
+        Why it is not, beside other reasons.
+    """
+    table["why_not"][row] = "; ".join(filter(None, [table["why_not"][row], reason]))
+    table["valid"][row] = False
+
+
+def why_no_depth(depth: float, diameter: float) -> str:
+    """Say why a depth is none of a flow over a bed of grains.
+
+    Parameters
+    ----------
+    depth
+        The depth, m.
+    diameter
+        Diameter of the grains, m.
+
+    Returns
+    -------
+    str
+        The reason; empty for a depth that covers the grains and is no more than
+        `LARGEST_DEPTH`.
+
+    Examples
+    --------
+    >>> why_no_depth(4e-4, 5e-4)
+    'a depth of 0.0004 m does not cover a grain of 0.0005 m'
+    """
+    if not depth > diameter:
+        return f"a depth of {depth:g} m does not cover a grain of {diameter:g} m"
+    if depth > LARGEST_DEPTH:
+        return f"a depth of {depth:g} m is deeper than {LARGEST_DEPTH:g} m"
+    return ""
 
 
 def _check_law(asked: str) -> None:
@@ -188,15 +240,13 @@ def _check_law(asked: str) -> None:
 
 
 def _check_depth(grains: Table) -> None:
-    """Refuse a depth that does not cover the grains, or that of a gas."""
-    depth = grains["depth"]
-    diameter = grains["diameter"]
+    """Refuse a depth that no flow over the grains has, or that of a gas."""
     density = grains["fluid_density"]
     remedy = "give the depth of a liquid, in m; of water: fluid.kind water"
-    if not (depth > diameter).all():
-        grain = f"a grain of {diameter.max():g} m"
-        what = f"a depth of {depth.min():g} m does not cover {grain}"
-        raise InputError(what, "threshold: depth", remedy)
+    pairs = zip(grains["depth"].tolist(), grains["diameter"].tolist(), strict=True)
+    for what in itertools.starmap(why_no_depth, pairs):
+        if what:
+            raise InputError(what, "threshold: depth", remedy)
     if (density < GAS_BELOW).all():
         what = f"{density[0]:g} kg/m3 is a gas"
         raise InputError(what, "threshold: depth", remedy)
@@ -219,18 +269,23 @@ def _block(name: str, at: Threshold, exposure: Exposure, grains: Table) -> Table
     """The columns that the threshold under one force law has by itself."""
     ustar = at.friction_velocity
     density = grains["fluid_density"]
+    found = {
+        "ustar_m_s": ustar,
+        "stress_pa": density * ustar**2,
+        "shields": at.shields,
+        "reynolds": at.reynolds,
+        "drag_n": at.drag,
+        "lift_n": at.lift,
+        **measurable_speeds(
+            ustar,
+            roughness=grains["roughness"],
+            fluid_density=density,
+            viscosity=grains["viscosity"],
+            depth=np.where(density < GAS_BELOW, np.nan, grains["depth"]),
+        ),
+    }
     block: Table = {"law": np.full(len(density), name, object)}
-    for column, (attribute, _) in QUANTITIES.items():
-        # the speeds and the stress are no attributes: they follow below
-        block[column] = getattr(at, attribute, density)
-    block |= measurable_speeds(
-        ustar,
-        roughness=grains["roughness"],
-        fluid_density=density,
-        viscosity=grains["viscosity"],
-        depth=np.where(density < GAS_BELOW, np.nan, grains["depth"]),
-    )
-    block["stress_pa"] = density * ustar**2
+    block |= {column: found[column] for column in QUANTITIES}
     block["valid"] = at.valid
     reasons = why_not(
         LAWS[name],

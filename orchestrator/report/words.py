@@ -18,6 +18,7 @@ from orchestrator.report.page import Guest, versions
 from orchestrator.report.results import Results, valid
 from orchestrator.report.sheets import Sheet
 from orchestrator.runs import case
+from orchestrator.tables import COLUMNS
 
 MOST_LETTERS = 46
 """Letters of a column in a terminal; longer cells stand on several lines."""
@@ -48,7 +49,11 @@ def text(results: Results, guests: Sequence[Guest] = ()) -> str:
         table = sheet(results, guests)
         qualified = remarks.remarks(results)
     except KeyError as error:
-        what = f"its tables lack {error}: another version of this program wrote them"
+        lacking = _columns_in(error)
+        if not lacking:
+            raise  # a fault of this program, which says where it is
+        listed = ", ".join(lacking)
+        what = f"its tables lack {listed}: another version of this program wrote them"
         where = str(results.cases.parent)
         remedy = "`orchestrator study` of the same file runs it again"
         raise OrchestratorError(what, where, remedy) from None
@@ -58,6 +63,15 @@ def text(results: Results, guests: Sequence[Guest] = ()) -> str:
     if qualified:
         said += ["", *remark_lines(qualified)]
     return "\n".join(said)
+
+
+def _columns_in(error: KeyError) -> list[str]:
+    """The columns of tables that were looked up in vain; none of any other key."""
+    key = error.args[0] if error.args else None
+    if key in COLUMNS:
+        return [str(key)]
+    # of several columns pandas makes one text
+    return [column for column in COLUMNS if repr(column) in str(key)]
 
 
 def card(results: Results, guests: Sequence[Guest] = ()) -> Card:

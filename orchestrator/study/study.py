@@ -13,6 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
+from numbers import Real
 from operator import attrgetter
 from pathlib import Path
 from typing import Annotated, Any
@@ -240,7 +241,9 @@ def load(source: str | Path, tolerance: float | None = None) -> Study:
         With the file, the field and the remedy.
     """
     path = find(source)
-    if tolerance is not None and not 0 < tolerance < 1:
+    given: Any = tolerance  # Python gives what it likes
+    is_number = isinstance(given, Real) and not isinstance(given, bool)
+    if given is not None and not (is_number and 0 < given < 1):
         what = f"{tolerance!r} is not a relative error above 0 and below 1"
         raise InputError(
             what, "tolerance", f"0.05 allows tau_c to be 5 % off; or {NO_TOLERANCE}"

@@ -62,8 +62,7 @@ class Unit(NamedTuple):
 
 
 UNITS = (
-    Unit("grain.diameter", 0.1, 20.0, "{0:g} m: did you mean {0:g} mm", 1e-3),
-    Unit("grain.diameter", 20.0, math.inf, "{0:g} m: did you mean {0:g} um", 1e-6),
+    Unit("grain.diameter", 0.1, math.inf, "{0:g} m: did you mean {0:g} mm", 1e-3),
     Unit("grain.density", 1e-300, 30.0, "{0:g} kg/m3: did you mean {0:g} g/cm3", 1e3),
     Unit(
         "bed.slope_deg", 0.05, 0.55, "{0:g} deg: did you mean {0:g} rad", TO_SI["rad"]

@@ -1,14 +1,17 @@
 """The table of thresholds, as Python sees it."""
 
+from typing import get_args
+
 import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.calculator import PARAMETERS
+from orchestrator.calculator import LARGEST_DEPTH, PARAMETERS, QUANTITIES
 from orchestrator.calculator.table import thresholds
 from orchestrator.fidelity import limits
 from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import threshold, why_not
+from orchestrator.study.declare import Length
 from orchestrator.study.fields import FIELDS, PARTS
 from orchestrator.study.study import parse
 
@@ -83,3 +86,17 @@ def test_a_smooth_bed_has_the_wind_of_a_smooth_wall() -> None:
     z0 = 1e-4 / 30 + 5.5e-4 / (9 * ustar)
     assert mars["wind_1m_m_s"] == pytest.approx(ustar / 0.41 * np.log(1 + 1 / z0))
     assert mars["wind_1m_m_s"] == pytest.approx(44.3, abs=0.1)
+
+
+def test_a_quantity_that_nothing_makes_is_no_column(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A misspelt one had the density of the fluid."""
+    monkeypatch.setitem(QUANTITIES, "stres_pa", ("stres", "stres, Pa"))
+    with pytest.raises(KeyError, match="stres_pa"):
+        thresholds({"diameter": [1e-3]})
+
+
+def test_the_largest_depth_is_that_of_a_study() -> None:
+    (most,) = [each.le for each in get_args(Length)[1].metadata if hasattr(each, "le")]
+    assert most == LARGEST_DEPTH

@@ -221,8 +221,36 @@ def test_a_number_that_is_usual_in_another_unit_is_asked_about_and_answered(
         ([*D, "--law", "bridge"], ["--law", "did you mean bridged?", "paper"]),
         (["--diameter", "0.2"], ["no force law holds", "0.2 mm, --diameter 0.0002?"]),
         (
+            ["--diameter", "0.3", "--density", "2650", "--fluid", "water"],
+            ["bridged-gravel: particle Reynolds number", "not below 300000"],
+        ),
+        (["--diameter", "30"], ["30 m: did you mean 30 mm, --diameter 0.03?"]),
+        ([*D, "--slope", "-29:29:201"], ["--slope: below 0", "--bed-slope 0.005"]),
+        *(
+            ([*QUARTZ_IN_WATER, "--depth", depth], ["--depth", "deeper than 10000 m"])
+            for depth in ("inf", "1e308", "2e4")
+        ),
+        ([*QUARTZ_IN_WATER, "--depth", "nan"], ["--depth", "nan m does not cover"]),
+        (
+            [*QUARTZ_IN_WATER, "--bed-slope", "5e-324"],
+            ["--bed-slope", "deeper than 10000 m", "a steeper slope"],
+        ),
+        (
+            [
+                "--diameter",
+                "5e-4",
+                "--density",
+                "2650",
+                "--fluid",
+                "water",
+                "--bed-slope",
+                "-0.05",
+            ],
+            ["--bed-slope", "does not cover a grain of 0.0005 m", "a gentler slope"],
+        ),
+        (
             ["--diameter", "200"],
-            ["--diameter: 200 m: did you mean", "--diameter 0.0002? (else"],
+            ["--diameter: 200 m: did you mean 200 mm", "--diameter 0.2? (else"],
         ),
         ([*D, "--diameter", "0,25"], ["--diameter", "write 0.25"]),
         (
@@ -406,3 +434,29 @@ def test_a_river_has_a_depth_and_a_velocity(run: Run) -> None:
         assert code == 2
         assert said in err
     assert "a gas has no depth" in run(*D, "--bed-slope", "0.005")[2]
+
+
+def test_a_depth_by_the_slope_is_checked_as_one_that_is_given(run: Run) -> None:
+    """A river 0.46 mm deep moved sand of 0.5 mm, and none was laminar."""
+    sand = ["--diameter", "5e-4", "--density", "2650", "--fluid", "water"]
+    by_slope = _json(run(*sand, "--bed-slope", "0.005", "--json"))
+    of_law = by_slope["bridged"]
+    depth = of_law["stress"] / (999.1 * 9.81 * 0.005)
+    assert not of_law["valid"]
+    assert of_law["mean_velocity"] is None
+    given = _json(run(*sand, "--depth", str(depth), "--json"))["bridged"]
+    assert "laminar flow" in given["why_not"]
+    assert of_law["why_not"] == given["why_not"]
+    # of a table, the rows that are covered answer
+    sizes = ["--diameter", "5e-4:5e-2:3", *sand[2:]]
+    rows = _json(run(*sizes, "--bed-slope", "0.05", "--json"))
+    reasons = [row[row["answer"][0]]["why_not"] for row in rows]
+    assert "does not cover a grain of 0.0005 m" in reasons[0]
+    assert not reasons[-1]
+
+
+def test_a_negative_number_of_any_spelling_is_the_value_of_its_option(run: Run) -> None:
+    gravel = ["--diameter", "0.03", "--density", "2650", *WATER, "--json"]
+    found = [run(*gravel, "--bed-slope", text) for text in ("-5e-3", "-.005", "5e-3")]
+    assert [code for code, _, _ in found] == [0, 0, 0]
+    assert found[0][1] == found[1][1] == found[2][1]

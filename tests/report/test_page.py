@@ -18,7 +18,7 @@ import pytest
 import orchestrator
 from orchestrator import gallery, tables
 from orchestrator.errors import InputError, OrchestratorError
-from orchestrator.report import bed, style
+from orchestrator.report import bed, remarks, style
 from orchestrator.report import page as page_module
 from orchestrator.report.page import Section
 from orchestrator.report.results import Results
@@ -264,6 +264,17 @@ def test_a_study_of_another_version_costs_its_own_sentences(studies: Path) -> No
     html = gallery.write(studies).read_text(encoding="utf-8")
     assert html.count("another version of this program wrote them") == 1
     assert html.count("At which wind does a grain of 1 mm start to move?") == 1
+
+
+def test_a_fault_of_the_program_is_not_told_as_another_version(
+    studies: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def misspelt(_: object) -> object:
+        return dict[str, object]()["colour"]
+
+    monkeypatch.setattr(remarks, "remarks", misspelt)
+    with pytest.raises(KeyError, match="colour"):
+        _ = orchestrator.open(studies / "one").answer
 
 
 SPEED = "Speed & <accuracy>"

@@ -57,7 +57,7 @@ def test_cobbles_of_a_river_are_not_asked_about() -> None:
 ASKED = {
     # a study, the field and what it is asked, and whether another rule refuses the scene
     f"{QUARTZ}grain.diameter = 0.25\n{PILE}": "0.25 mm, grain.diameter = 0.00025?",
-    f"{QUARTZ}grain.diameter = 250.0": "250 um, grain.diameter = 0.00025?",
+    f"{QUARTZ}grain.diameter = 250.0": "250 mm, grain.diameter = 0.25?",
     f"{QUARTZ}grain.diameter = 0.12": "0.12 mm, grain.diameter = 0.00012?",
     "grain = { diameter = 1e-3, density = 2.65 }": "2.65 g/cm3, grain.density = 2650?",
     f"{WATER}grain = {{ diameter = 1e-3, density = 2.65 }}": "grain.density = 2650?",
