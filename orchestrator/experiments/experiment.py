@@ -10,7 +10,7 @@ import pandas as pd
 
 from orchestrator import pipeline
 from orchestrator.errors import InputError, OrchestratorError
-from orchestrator.fidelity.decision import written
+from orchestrator.fidelity.decision import with_criterion, written
 from orchestrator.pipeline import Finished
 from orchestrator.plan import Plan
 from orchestrator.report import page, style
@@ -209,7 +209,8 @@ def piles(study: Study) -> dict[Scene, PileBed]:
     Returns
     -------
     dict of Scene to PileBed
-        The scenes as they are written, with the method that answers, and their beds.
+        The scenes as they are written, with the method that answers and the criterion
+        by which a study answers them, and their beds.
 
     Raises
     ------
@@ -219,7 +220,7 @@ def piles(study: Study) -> dict[Scene, PileBed]:
     chosen = {}
     for scene in study.scenes:
         if isinstance(scene.bed, PileBed):
-            chosen[written(scene)] = scene.bed
+            chosen[written(with_criterion(scene))] = scene.bed
     if not chosen:
         remedy = 'give a group `bed.kind = "pile"`'
         raise InputError("there is no pile", where=study.name, remedy=remedy)

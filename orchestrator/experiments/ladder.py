@@ -8,7 +8,7 @@ one rung of each, show that the errors add up.
 import math
 import time
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -33,7 +33,7 @@ from orchestrator.experiments.experiment import (
     label,
     piles,
 )
-from orchestrator.fidelity import limits, spread
+from orchestrator.fidelity import domain, limits, spread
 from orchestrator.fidelity.classes import FLOW, GRAINS, LEVEL_BED, scene_class
 from orchestrator.fidelity.decision import Decision, on_fidelity
 from orchestrator.fidelity.fidelities import (
@@ -160,7 +160,9 @@ def experiment(study: Study, out: Path) -> Experiment:
         rows = compared.merge(means[["packing", *PAIR, "pareto"]], how="left")
         rows = rows.fillna({"pareto": False})
         known = known_errors(measured)
-        return {"points": rows, "errors": known}, _sections(means, known)
+        done = [pair for key, pair in pairs.items() if runs.are_done(key)]
+        tables = {"points": rows, "errors": known, "domain": measured_domain(done)}
+        return tables, _sections(means, known)
 
     return Experiment(
         name="ladder",
@@ -442,18 +444,46 @@ def known_errors(points: pd.DataFrame) -> pd.DataFrame:
         A row for each part, rung, class and fraction; `known.measured` reads it. The
         error is the largest over the scenes, infinite where only one of rung and
         reference reached the fraction, zero where neither did. The uncertainty is how
-        far the reference itself moved.
+        far the reference itself moved on `uncertainty_scenes`; empty where the
+        reference was not run with other numbers.
     """
     beside = np.where(points["class_flow"] == LEVEL_BED, FLAT.name, REFERENCE.name)
     grains = points[(points["flow_rung"] == beside) & (points["asked"] == "dem")]
     flow = points[(points["grain_rung"] == PEELING.name) & points["same_model"]]
     tables = [
-        # a finer flow is run on small piles alone, other grains on every pile
-        _known(grains, GRAINS, "grain_rung", AGAIN).fillna({"uncertainty": math.inf}),
-        _known(flow, FLOW, "flow_rung", FINER).fillna({"uncertainty": 0.0}),
+        _known(grains, GRAINS, "grain_rung", AGAIN),
+        _known(flow, FLOW, "flow_rung", FINER),
     ]
-    columns = [*KNOWN_BY, "error", "uncertainty", "cost_core_s", "scenes"]
-    return pd.concat(tables)[columns].sort_values(KNOWN_BY)
+    columns = ["error", "uncertainty", "uncertainty_scenes", "cost_core_s", "scenes"]
+    return pd.concat(tables)[[*KNOWN_BY, *columns]].sort_values(KNOWN_BY)
+
+
+def measured_domain(pairs: Iterable[Decision]) -> pd.DataFrame:
+    """Find over which scenes the known errors of some pairs of rungs were measured.
+
+    They are the scenes of which the reference is there.
+
+    Parameters
+    ----------
+    pairs
+        The pairs, by `decisions`, whose runs are done.
+
+    Returns
+    -------
+    DataFrame
+        The domain of each class, by `domain.of`.
+    """
+    scenes: dict[str, list[Scene]] = {FLOW: [], GRAINS: []}
+    for decision in pairs:
+        scene = decision.asked
+        pair = decision.fidelity
+        assert pair is not None
+        if (pair.flow, pair.grains) == (REFERENCE.flow, PEELING):
+            scenes[FLOW].append(scene)
+        best = pair.flow_over(scene) in (REFERENCE.flow, FLAT)
+        if best and pair.grains is REFERENCE.grains and scene.method.kind == "dem":
+            scenes[GRAINS].append(scene)
+    return domain.of(scenes)
 
 
 def _known(table: pd.DataFrame, part: str, rung: str, again: str) -> pd.DataFrame:
@@ -480,8 +510,11 @@ def _known(table: pd.DataFrame, part: str, rung: str, again: str) -> pd.DataFram
         scenes=("scene_id", "size"),
     ).reset_index()
     place = ["scene_class", "fraction"]
-    shift = known.loc[known["rung"] == again, [*place, "error"]]
-    return known.merge(shift.rename(columns={"error": "uncertainty"}), "left", place)
+    shift = known.loc[known["rung"] == again, [*place, "error", "scenes"]]
+    names = {"error": "uncertainty", "scenes": "uncertainty_scenes"}
+    known = known.merge(shift.rename(columns=names), "left", place)
+    count = known["uncertainty_scenes"].fillna(0).astype(int)
+    return known.assign(uncertainty_scenes=count)
 
 
 def _sections(pairs: pd.DataFrame, known: pd.DataFrame) -> list[Section]:

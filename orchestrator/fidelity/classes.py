@@ -9,11 +9,9 @@ import math
 
 from orchestrator.bed.line import of_bed
 from orchestrator.fidelity.fidelities import packing
-from orchestrator.study.closed_form import closed_form, outer_roughness
-from orchestrator.study.fields import default_of
+from orchestrator.study.closed_form import closed_form
 from orchestrator.study.parts import PileBed
-from orchestrator.study.scene import Scene, default_first_cell_height
-from orchestrator.study.study import value_of
+from orchestrator.study.scene import Scene
 
 FLOW, GRAINS = "flow", "grains"
 """The two parts of a known error."""
@@ -33,31 +31,6 @@ MOST_DISORDER = 0.2
 """Largest gaps of the class of other random gaps, d."""
 NEAR_ROWS = ("aligned", f"disordered up to {LEAST_DISORDER:g} d")
 CURVED_SHAPES = ("cosine", "gaussian", "rushil")
-LIFTED_TO = 1.235
-"""Largest lift over the weight normal to the bed that was measured."""
-SAME_CELL = 0.02
-"""Relative difference of the first cell that changes no known error."""
-AT_LEAST = (
-    "method.flow.lid",
-    "method.flow.upstream",
-    "method.flow.downstream",
-)  # as good where larger
-SETTINGS = (
-    *AT_LEAST,
-    "method.flow.turbulence_model",
-    "method.flow.convection_scheme",
-    "forces.averaging_length",
-    "forces.loaded_grains",
-    "forces.exposure",
-    "forces.sheltering",
-    "forces.drag",
-    "grain.cohesion",
-    "threshold.displacement",
-)
-
-
-DEFAULTS = {name: default_of(name) for name in SETTINGS}
-"""Fields that move an answer and that the ladder keeps at their defaults."""
 
 
 def scene_class(part: str, scene: Scene) -> str:
@@ -214,53 +187,3 @@ def lift_over_weight(scene: Scene) -> float:
     """
     normal = scene.weight * math.cos(math.radians(scene.bed.slope_deg))
     return float(closed_form(scene).lift) / normal
-
-
-def unmeasured(scene: Scene) -> str:
-    """Name the property of a pile for which nothing was measured.
-
-    Parameters
-    ----------
-    scene
-        The scene of a pile.
-
-    Returns
-    -------
-    str
-        The property in words; empty where there is none.
-    """
-    lift = lift_over_weight(scene)
-    if lift > LIFTED_TO:
-        return f"a lift of {lift:.3g} times the weight normal to the bed"
-    if scene.flow.gusts:
-        return f"flow.gusts = {scene.flow.gusts}"
-    is_solved = scene.method.flow.model == "solve"
-    for name, default in DEFAULTS.items():
-        if name.startswith("method.flow.") and not is_solved:
-            continue
-        value = value_of(scene, name)
-        is_other = value != default
-        if name in AT_LEAST:
-            is_other = value < default
-        if is_other:
-            return f"{name} = {value}"
-    if is_solved:
-        return _unmeasured_solve(scene)
-    return ""
-
-
-def _unmeasured_solve(scene: Scene) -> str:
-    """The number of a solved flow for which nothing was measured, in words."""
-    bed = scene.bed
-    roughness = scene.method.flow.roughness
-    assert isinstance(bed, PileBed)
-    default = default_first_cell_height(bed.relief, scene.solve_roughness)
-    if abs(scene.first_cell_height / default - 1) > SAME_CELL:
-        cell = scene.first_cell_height
-        return f"first cells of {cell:.3g} m in place of {default:.3g} m"
-    if not roughness:
-        return ""
-    for near in (bed.roughness, outer_roughness(scene) or bed.roughness):
-        if abs(math.log2(roughness / near)) <= 0.5 + 1e-6:
-            return ""
-    return f"method.flow.roughness = {roughness:.3g} m"

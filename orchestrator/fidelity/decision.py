@@ -7,12 +7,13 @@ other.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 
 from orchestrator.fidelity import spread
-from orchestrator.fidelity.classes import FLOW, GRAINS, scene_class, unmeasured
+from orchestrator.fidelity.classes import FLOW, GRAINS, scene_class
+from orchestrator.fidelity.domain import has_measured, unmeasured
 from orchestrator.fidelity.fidelities import FIDELITIES, LOCAL, Fidelity, fidelity_of
 from orchestrator.fidelity.known import UNKNOWN, Known, known
 from orchestrator.grains.loads import LONGEST_PACKED, Geometry, has_rows_along
@@ -29,6 +30,7 @@ LONG_BED = f"more than {LONGEST_PACKED:g} grains long"
 ALONG = f"{LONG_BED}: closed form along the bed, checked where motion starts"
 HOPS = "grains that go on: leaving and hopping have closed forms"
 ENDLESS = "the rows of the bed have no end: closed form along the bed"
+NOT_MET = "the tolerance cannot be met, no error is known"
 CHOSEN = FIDELITIES[:-1]
 """The fidelities that a choice may take: errors are measured against the last one."""
 KEPT = ("method.flow.speed", "method.flow.viscosity")
@@ -87,6 +89,24 @@ class Decision:
             return None
         return self.known.total
 
+    def error_at(self, fraction: float) -> float | None:
+        """Find the known error of one threshold of the scene.
+
+        Parameters
+        ----------
+        fraction
+            Fraction n/N of the counted grains.
+
+        Returns
+        -------
+        float or None
+            The known error with its uncertainty; None where it is not known, or was
+            measured at other fractions.
+        """
+        if not has_measured(self.scene, fraction):
+            return None
+        return self.error_estimate
+
     @property
     def is_along(self) -> bool:
         """Whether the closed form along the bed answers because the bed is long."""
@@ -98,7 +118,9 @@ class Decision:
     def is_unchecked(self) -> bool:
         """Whether it is a pile for which a fidelity without DEM was chosen."""
         is_pile = isinstance(self.scene.bed, PileBed)
-        return is_pile and self.is_chosen and self.scene.method.kind != "dem"
+        # rows without an end hold their grains by DEM: it is no check of places
+        is_by_grains = self.scene.method.kind not in ("dem", "local")
+        return is_pile and self.is_chosen and is_by_grains
 
 
 def decide(scene: Scene, tolerance: float | None) -> Decision:
@@ -135,18 +157,67 @@ def _going_on(scene: Scene, tolerance: float | None) -> Decision:
     A single grain is answered by the closed form, a bed whose rows have no end by the
     closed form along its line, and all others as those whose grains must leave.
     """
-    resolved = changed(scene, {"threshold.criterion": GOES_ON})
+    resolved = with_criterion(scene)
     if scene.method.kind != "auto":
         decision = _leaving(resolved, tolerance)
     elif not isinstance(scene.bed, PileBed):
         answer = changed(resolved, {"method.kind": "pivot"})
         return Decision(scene, answer, None, UNKNOWN, HOPS)
     elif has_endless_rows(scene):
-        answer = changed(resolved, {"method.kind": "local"})
-        return Decision(scene, answer, LOCAL, known(LOCAL, answer), ENDLESS)
+        decision = _along_the_bed(resolved, tolerance)
     else:
         decision = _leaving(resolved, tolerance)
     return replace(decision, asked=scene)
+
+
+def _along_the_bed(scene: Scene, tolerance: float | None) -> Decision:
+    """The decision on grains that go on over rows without an end.
+
+    They are answered in closed form. A tolerance chooses the mesh of the flow.
+    """
+    answer = changed(scene, {"method.kind": "local"})
+    written = Decision(scene, answer, LOCAL, known(LOCAL, answer), ENDLESS)
+    if tolerance is None or answer.method.flow.model == "flat":
+        return written
+    if answer.method.flow.model != "solve":
+        why = f"the study asks for the flow model {answer.method.flow.model}"
+        return replace(written, why=f"{ENDLESS}; {why}")
+    errors = {}
+    for one in CHOSEN:
+        if one.flow.takes(answer):
+            found = known(LOCAL, changed(answer, one.flow.changes(answer)))
+            if math.isfinite(found.total):
+                errors[one] = found
+    if not errors:
+        beyond = unmeasured(answer) or "such a bed"
+        return replace(written, why=f"{ENDLESS}; {NOT_MET} for {beyond}")
+    one, why = _cheapest(errors, tolerance)
+    return Decision(
+        scene,
+        changed(answer, one.flow.changes(answer)),
+        LOCAL,
+        errors[one],
+        f"{ENDLESS}, its flow by {why} within the tolerance",
+        is_chosen=True,
+    )
+
+
+def with_criterion(scene: Scene) -> Scene:
+    """A scene with the criterion by which a study answers it.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+
+    Returns
+    -------
+    Scene
+        The scene, whose grains must go on where its fluid and its forces decide so.
+    """
+    if not goes_on(scene):
+        return scene
+    return changed(scene, {"threshold.criterion": GOES_ON})
 
 
 def has_endless_rows(scene: Scene) -> bool:
@@ -374,9 +445,7 @@ def _best_model(scene: Scene) -> str:
 def _looked_up(scene: Scene, most: float) -> tuple[Fidelity | None, str]:
     """The fidelity that answers a pile with an error of at most `most`, and why it.
 
-    Where there is none, it is the cheapest whose error is below the uncertainty of the
-    reference: errors below that uncertainty cannot be ranked. No fidelity where no
-    error is known.
+    No fidelity where no error is known.
     """
     is_long = scene.method.kind == "auto" and _is_long(scene)
     errors: dict[Fidelity, Known] = {}
@@ -389,13 +458,22 @@ def _looked_up(scene: Scene, most: float) -> tuple[Fidelity | None, str]:
                 errors[one] = found
     if not errors:
         return None, "no error is known for such a bed"
+    return _cheapest(errors, most)
+
+
+def _cheapest(errors: Mapping[Fidelity, Known], most: float) -> tuple[Fidelity, str]:
+    """The cheapest fidelity with an error of at most `most`, and why it.
+
+    Where there is none, it is the cheapest whose error alone is no larger than that of
+    the best with its uncertainty: they cannot be told apart.
+    """
     for one, error in errors.items():
         if error.total <= most:
             return one, f"{one.name}, the cheapest fidelity"
     least = min(error.total for error in errors.values())
     alike = next(one for one, error in errors.items() if error.error <= least)
-    why = "the cheapest fidelity whose error is below the uncertainty of the reference"
-    return alike, f"{alike.name}, {why}: none is"
+    why = "the cheapest fidelity that cannot be told from the best, which is known to"
+    return alike, f"{alike.name}, {why} {least:.1%}: none is"
 
 
 def _check_group(scene: Scene) -> tuple[object, ...]:

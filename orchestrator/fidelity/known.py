@@ -1,7 +1,8 @@
 """Known errors of the fidelities: what `orchestrator ladder` measured, by class.
 
 ``calibration/errors.csv`` has the largest error over the scenes of each class. A class
-has a known error where at least `LEAST_SCENES` scenes were measured.
+has a known error where at least `LEAST_SCENES` scenes were measured, and a scene of it
+where it is within what they were (`orchestrator.fidelity.domain`).
 """
 
 import math
@@ -17,15 +18,15 @@ from orchestrator.fidelity.classes import (
     GRAINS,
     LEVEL_BED,
     scene_class,
-    unmeasured,
 )
+from orchestrator.fidelity.domain import unmeasured
 from orchestrator.fidelity.fidelities import (
     FIDELITIES,
     FLAT,
     LOCAL,
     OWN,
     OWN_NUMBERS,
-    QUICK,
+    REFERENCE,
     Fidelity,
     Rung,
 )
@@ -45,7 +46,8 @@ class Known(NamedTuple):
     error
         Largest relative difference from the reference.
     uncertainty
-        Change of the reference itself when its own numbers were changed.
+        Change of the reference itself when its own numbers were changed; NaN where
+        that was not tried.
     """
 
     error: float
@@ -53,11 +55,11 @@ class Known(NamedTuple):
 
     @property
     def total(self) -> float:
-        """Error and uncertainty together: the root of the sum of their squares."""
-        return math.hypot(self.error, self.uncertainty)
+        """Error and known uncertainty: the root of the sum of their squares."""
+        return math.hypot(self.error, float(np.nan_to_num(self.uncertainty)))
 
 
-UNKNOWN = Known(math.inf, 0.0)
+UNKNOWN = Known(math.inf, math.inf)
 
 
 def known(fidelity: Fidelity, scene: Scene) -> Known:
@@ -81,13 +83,16 @@ def known(fidelity: Fidelity, scene: Scene) -> Known:
     """
     if unmeasured(scene):
         return UNKNOWN
-    if fidelity is LOCAL and scene.threshold.criterion == "goes on":
+    if fidelity is LOCAL:
         return _of_flow(scene)
     flow = fidelity.flow_over(scene)
     grains = fidelity.grains
-    if fidelity in (OWN_NUMBERS, LOCAL):
+    if fidelity is REFERENCE:
+        # nothing finer was run beside its flow
+        flow = _no_finer(FLOW, fidelity.answer(scene))
+    elif fidelity is OWN_NUMBERS:
         flow = _no_finer(FLOW, scene)
-        grains = QUICK.grains if fidelity is LOCAL else _no_finer(GRAINS, scene)
+        grains = _no_finer(GRAINS, scene)
     return _of_classes(
         flow, grains, scene_class(FLOW, scene), scene_class(GRAINS, scene)
     )
@@ -104,9 +109,7 @@ def _of_flow(scene: Scene) -> Known:
     found = measured().get((FLOW, _no_finer(FLOW, scene).name, name))
     if found is None:
         return UNKNOWN
-    errors, uncertainties = found
-    worst = int(np.argmax(np.hypot(errors, uncertainties)))
-    return Known(float(errors[worst]), float(uncertainties[worst]))
+    return _worst(*found)
 
 
 def _no_finer(part: str, scene: Scene) -> Rung:
@@ -135,11 +138,18 @@ def _of_classes(flow: Rung, grains: Rung, flow_class: str, grain_class: str) -> 
     if not all(key in table for key in keys):
         return UNKNOWN
     # both parts at each fraction, and the worst fraction
-    squares = sum(table[key] ** 2 for key in keys)
-    errors, uncertainties = np.sqrt(squares)
-    worst = int(np.argmax(np.hypot(errors, uncertainties)))
-    found = Known(float(errors[worst]), float(uncertainties[worst]))
+    parts = np.array([table[key] for key in keys])
+    errors = np.hypot.reduce(parts[:, 0])
+    uncertainties = np.hypot.reduce(np.nan_to_num(parts[:, 1]))
+    found = _worst(errors, uncertainties)
     return found if found.total < UNBOUND else UNKNOWN
+
+
+def _worst(errors: FloatArray, uncertainties: FloatArray) -> Known:
+    """Error and uncertainty at the fraction where both together are largest."""
+    both = np.hypot(errors, np.nan_to_num(uncertainties))
+    worst = int(np.argmax(both))
+    return Known(float(errors[worst]), float(uncertainties[worst]))
 
 
 @cache
@@ -147,11 +157,18 @@ def measured() -> dict[tuple[str, str, str], FloatArray]:
     """The measured errors, by part, name of the rung and class of scene.
 
     Each is an array with the rows error and uncertainty, and a column for each
-    fraction. Classes of fewer than `LEAST_SCENES` scenes are left out.
+    fraction. What fewer than `LEAST_SCENES` scenes say is left out: a class, or an
+    uncertainty, which is NaN then. Without it nobody knows what the reference is worth:
+    of grains nothing is known of the class, of the flow nothing of the reference.
     """
     table = pd.read_csv(FOLDER / "errors.csv").sort_values("fraction")
+    is_tried = table["uncertainty_scenes"] >= LEAST_SCENES
+    table["uncertainty"] = table["uncertainty"].where(is_tried)
     found: dict[tuple[str, str, str], FloatArray] = {}
     for (part, rung, name), rows in table.groupby(["part", "rung", "scene_class"]):
+        is_bare = rows["uncertainty"].isna().any()
+        if is_bare and (part == GRAINS or rung == REFERENCE.name):
+            continue
         if rows["scenes"].min() >= LEAST_SCENES:
             numbers = rows[["error", "uncertainty"]].to_numpy(float).T
             found[str(part), str(rung), str(name)] = numbers

@@ -307,7 +307,7 @@ def _place(row: pd.Series, pile: Pile, results: Results) -> Number:
 def _places(row: pd.Series, results: Results) -> tuple[float, float]:
     """Ends of the places at which motion may start within the known error, m."""
     grains = results.tables.get("pile_grain", pd.DataFrame())
-    error = single.known(row["error_estimate"])
+    error = single.known(row["first_known_error"])
     if grains.empty or math.isnan(error):
         return math.nan, math.nan
     here = grains[grains["scene_id"] == row["scene_id"]]

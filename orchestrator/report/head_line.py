@@ -162,7 +162,7 @@ def _thresholds_along(
 
 def _band(ax: Axes, row: pd.Series, x: Any, ustar: Any, told: Quantity) -> None:
     """What is within the known error of the method at each place."""
-    error = single.known(row["error_estimate"])
+    error = single.known(row["first_known_error"])
     if not (math.isfinite(error) and error < 1):
         return
     least, most = within(1.0, error)

@@ -550,7 +550,8 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
         model = spread.spread(answer.decision.asked, fraction)
         value = shields(scene, found.tau)
         smooth = _smooth_bed(scene, found.ustar0)
-        low, high = _interval(scene, found, answer.decision.error_estimate, smooth)
+        error = answer.decision.error_at(fraction)
+        low, high = _interval(scene, found, error, smooth)
         yield {
             "scene_id": answer.scene_id,
             **place,
@@ -560,6 +561,7 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
             "shields": value,
             "shields_numerical_low": low,
             "shields_numerical_high": high,
+            "known_error": error,
             "smooth_bed": smooth,
             "shields_model_low": value * (1 - model.low),
             "shields_model_high": value * (1 + model.high),
@@ -585,7 +587,9 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
 def _starts(answer: Answer) -> Row:
     """Columns of where motion starts, by the method and by the pivots."""
     first_x, first_ustar0 = answer.first
-    low, high = _first_interval(answer)
+    # the first grain of all is a fraction, too
+    error = answer.decision.error_at(1 / answer.motion.count)
+    low, high = _first_interval(answer, error)
     pivot_x, pivot_ustar0 = answer.checked
     bed = answer.pile.bed
     return {
@@ -593,18 +597,18 @@ def _starts(answer: Answer) -> Row:
         "first_ustar0_m_s": first_ustar0,
         "first_ustar0_numerical_low_m_s": low,
         "first_ustar0_numerical_high_m_s": high,
+        "first_known_error": error,
         "pivot_x_m": float(bed.place(pivot_x)),
         "pivot_first_m_s": pivot_ustar0,
     }
 
 
-def _first_interval(answer: Answer) -> tuple[float, float]:
+def _first_interval(answer: Answer, error: float | None) -> tuple[float, float]:
     """Ends of the friction velocity at which motion starts, m/s.
 
     They hold the load step in which it starts and what is within the known error of the
     level; they are not known without a known error.
     """
-    error = answer.decision.error_estimate
     _, ustar0 = answer.first
     if error is None or np.isnan(ustar0):
         return np.nan, np.nan

@@ -252,7 +252,7 @@ def _reasons_of_pile(row: Mapping[Any, Any], tolerance: float | None) -> Iterato
     if row["share_carried_off"] > CARRIED_OFF:
         yield f"lift carried off {row['share_carried_off']:.0%} of the moved grains"
     yield from _reasons_of_bed(row)
-    error = row["error_estimate"]
+    error = row["known_error"]
     if pd.isna(error):
         yield "the error of its fidelity on such a bed is not known"
     elif tolerance and error > tolerance * (1 + 1e-9):
@@ -319,8 +319,8 @@ def _open_ends(row: Mapping[Any, Any]) -> Iterator[str]:
     low, high = (row.get(name, np.nan) for name in OF_PILE)
     if np.isnan(low) or not np.isnan(high) or np.isnan(row["shields"]):
         return
-    if row["error_estimate"] >= 1:
-        yield f"interval open above: the known error is {row['error_estimate']:.0%}"
+    if row["known_error"] >= 1:
+        yield f"interval open above: the known error is {row['known_error']:.0%}"
     elif row.get("scatter", 0.0) >= 1:
         yield f"interval open above: the scatter over seeds is {row['scatter']:.0%}"
     else:

@@ -33,7 +33,7 @@ SOUND = {
     **{
         "highest_fraction": 0.8,
         "share_carried_off": 0.0,
-        "error_estimate": 0.03,
+        "known_error": 0.03,
         "u_e_m_s": 10.0,
     },
     **{
@@ -76,7 +76,7 @@ UNREACHED = {"reynolds": NAN, "shields": NAN, "share_carried_off": NAN}
             {"share_carried_off": 0.76},
             ["lift carried off 76% of the moved grains"],
         ),
-        (None, {"error_estimate": NAN}, ["is not known"]),
+        (None, {"known_error": NAN}, ["is not known"]),
         (0.02, {}, ["known error 3.0% is above the tolerance of 0.02"]),
         (None, UNREACHED, ["not reached: at most 80% of 65 grains moved"]),
         (
@@ -96,7 +96,7 @@ UNREACHED = {"reynolds": NAN, "shields": NAN, "share_carried_off": NAN}
         ),
         (
             None,
-            {"shields_numerical_high": NAN, "error_estimate": 3.75},
+            {"shields_numerical_high": NAN, "known_error": 3.75},
             ["above: the known error is 375%"],
         ),
         (
