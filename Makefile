@@ -30,7 +30,7 @@ calibration: setup  ## measure known errors, maps and intervals anew, for the pa
 	$(PYTHON) -m orchestrator stability
 	$(PYTHON) -m orchestrator budget
 	$(PYTHON) -m orchestrator validate
-	cp results/ladder/tables/errors.csv results/stability/tables/maps.csv orchestrator/fidelity/calibration/
+	cp results/ladder/tables/errors.csv results/ladder/tables/domain.csv results/stability/tables/maps.csv orchestrator/fidelity/calibration/
 	cp results/budget/tables/budget.csv orchestrator/fidelity/calibration/
 	$(PYTHON) tools/tested.py results/validate/tables/measured.csv > tested.csv
 	mv tested.csv orchestrator/physics/tested.csv

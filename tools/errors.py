@@ -94,7 +94,11 @@ def _table(part: str, errors: pd.DataFrame, classes: list[str], first: str) -> s
             name = "uncertainty of the reference"
         cells = [f"{largest.loc[(rung, first), 'cost_core_s']:.2g}"]
         for scene_class in classes:
-            cells.append(f"{100 * largest.loc[(rung, scene_class), column]:.3g} %")
+            row = largest.loc[(rung, scene_class)]
+            cell = f"{100 * row[column]:.3g} %"
+            if column == "uncertainty" and row["uncertainty_scenes"] < FEWEST:
+                cell = f"not known ({row['uncertainty_scenes']:.0f} scenes)"
+            cells.append(cell)
         lines.append(f"| {name} | {' | '.join(cells)} |")
     counts = [f"{largest.loc[('quick', name), 'scenes']:.0f}" for name in classes]
     lines.append(f"| scenes | | {' | '.join(counts)} |")
@@ -122,12 +126,15 @@ def main() -> None:
 def _panel(axes: Axes, part: str, errors: pd.DataFrame) -> None:
     """The errors of the flow or of the grains, a line for each class."""
     known = errors[errors["scenes"] >= FEWEST]
-    largest = known.groupby(["scene_class", "rung"])[["error", "uncertainty"]].max()
+    columns = ["error", "uncertainty", "uncertainty_scenes"]
+    largest = known.groupby(["scene_class", "rung"])[columns].max()
     places = range(len(NAMES[part]))
     for place, scene_class in zip(places, NAMES[part], strict=True):
         of_class = largest.loc[scene_class]
-        uncertainty = 100 * of_class["uncertainty"].max()
-        axes.barh(place, uncertainty, color="0.9", height=0.8, zorder=0)
+        tried = of_class["uncertainty_scenes"].max() >= FEWEST
+        if tried:
+            uncertainty = 100 * of_class["uncertainty"].max()
+            axes.barh(place, uncertainty, color="0.9", height=0.8, zorder=0)
         for fidelity, (marker, colour) in FIDELITIES.items():
             label = fidelity if place == 0 else None
             error = 100 * of_class.loc[fidelity, "error"]

@@ -265,7 +265,7 @@ def _about(scene: Scene, pair: Fidelity, count: int) -> Row:
     packed = packing(scene)
     if scene.bed.is_level:
         packed += ", level bed"
-    floor = spread.floors().get(spread.model_class(scene), math.nan)
+    floor = spread.floors().get(spread.model_class(scene))
     return {
         "scene_id": scene.id,
         "scene": label(scene),
@@ -277,7 +277,7 @@ def _about(scene: Scene, pair: Fidelity, count: int) -> Row:
         "flow_rung": pair.flow.name,
         "grain_rung": pair.grains.name,
         "same_model": pair.flow.same_model and pair.grains.same_model,
-        "model_floor": floor,
+        "model_floor": floor.error if floor else math.nan,
     }
 
 
@@ -613,7 +613,13 @@ def _card(pairs: pd.DataFrame) -> Card:
         tuple(numbers),
         "Nothing is measured here: errors are those from the most costly models, the "
         "reference, at 10, 30, 50 and 70 % of the grains.",
-        Worth("good", "usable", "A tolerance in a study file chooses by these errors."),
+        Worth(
+            "good",
+            "usable",
+            "These errors are of these piles. A tolerance in a study file chooses by "
+            "those that the package has, from the preset `ladder`. To answer by a pair "
+            "of this page, write its numbers under `[method]`.",
+        ),
     )
 
 

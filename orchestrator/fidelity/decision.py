@@ -249,18 +249,35 @@ def _leaving(scene: Scene, tolerance: float | None) -> Decision:
     why_as_written = _why_as_written(scene, tolerance)
     if why_as_written is not None:
         return as_written(scene, why_as_written)
+    within = "within the tolerance"
     most = tolerance
     if most is None:
-        most = spread.floors()[spread.model_class(scene)]
+        floor = floor_of(scene)
+        most = floor.error
+        within = f"within the model's own spread of {floor}"
     fidelity, why = _looked_up(scene, most)
     if fidelity is None:
         return as_written(scene, why)
+    why = f"{why} {within}"
     if tolerance is None:
-        spread_ = f"within the model's own spread of {most:.0%}"
-        why = f"chosen by default: {why} {spread_}"
-    else:
-        why = f"{why} within the tolerance"
+        why = f"chosen by default: {why}"
     return on_fidelity(scene, fidelity, why, is_chosen=True)
+
+
+def floor_of(scene: Scene) -> spread.Floor:
+    """Find the error below which the model's own uncertainty hides the numerics.
+
+    Parameters
+    ----------
+    scene
+        The scene of a pile of a class that was measured.
+
+    Returns
+    -------
+    Floor
+        The error, and how many scenes it rests on.
+    """
+    return spread.floors()[spread.model_class(scene)]
 
 
 def as_written(scene: Scene, why: str = "") -> Decision:

@@ -236,7 +236,7 @@ SIMILAR: tuple[Quantity, ...] = (
     Quantity("grain.sizes.sigma_g", SIZES, _sigma),
     Quantity("grain.sizes.smallest", SIZES, _smallest),
     Quantity("grain.sizes.largest", SIZES, _largest),
-    Quantity("threshold.criterion", ("threshold.criterion",), _criterion),
+    Quantity("threshold.criterion", ("threshold.criterion", "fluid.kind"), _criterion),
     Quantity(FRACTIONS, (FRACTIONS,), lambda scene: scene.threshold.fractions),
 )
 """Quantities of several fields, without a unit, or of a field that is a table."""

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from orchestrator.digits import number
 from orchestrator.fidelity.known import FOLDER
 from orchestrator.study.closed_form import closed_form
 from orchestrator.study.parts import PileBed
@@ -136,19 +137,40 @@ def together(shares: pd.DataFrame, quantity: str = "shields") -> tuple[float, fl
     return min(low, 1.0), high
 
 
-@cache
-def floors() -> dict[str, float]:
-    """Error below which the model's uncertainty hides the numerics, by class.
+class Floor(NamedTuple):
+    """Error below which the model's uncertainty hides the numerics.
 
-    Half the interval of the choices that no study file states, the smallest over the
-    fractions.
+    Attributes
+    ----------
+    error
+        Half the interval of the choices that no study file states, the smallest over
+        the fractions.
+    scenes
+        The number of scenes that it was measured on.
+    """
+
+    error: float
+    scenes: int
+
+    def __str__(self) -> str:
+        return f"{self.error:.0%}, measured on {number(self.scenes, 'bed')}"
+
+
+@cache
+def floors() -> dict[str, Floor]:
+    """Find the errors below which the model's uncertainty hides the numerics, by class.
+
+    Returns
+    -------
+    dict of str to Floor
+        The floors, each with the few scenes that it rests on.
     """
     unstated = _budget()[~_budget()["choice"].isin(STATED)]
-    groups = unstated.groupby(["model_class", "fraction"])
-    halves = pd.Series({key: sum(together(part)) / 2 for key, part in groups})
-    return {
-        str(model): float(half) for model, half in halves.groupby(level=0).min().items()
-    }
+    found = {}
+    for model, rows in unstated.groupby("model_class"):
+        halves = [sum(together(part)) / 2 for _, part in rows.groupby("fraction")]
+        found[str(model)] = Floor(min(halves), int(rows["scenes"].min()))
+    return found
 
 
 @cache

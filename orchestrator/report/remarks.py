@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.digits import percent
-from orchestrator.fidelity import spread
+from orchestrator.fidelity.decision import floor_of
 from orchestrator.fidelity.limits import FROZEN_BED
 from orchestrator.physics.beside import ROW_HOLD
 from orchestrator.physics.velocity import log_law_speed
@@ -275,11 +275,21 @@ def _fidelity(results: Results) -> Iterator[Remark]:
     if not chosen or results.study.tolerance is not None:
         return
     names = dict.fromkeys(item.fidelity.name for item in chosen if item.fidelity)
+    floors = [floor_of(item.scene) for item in chosen]
+    totals = [item.known.total for item in chosen]
+    worst = int(np.argmax(totals))
+    beyond = [
+        total
+        for total, floor in zip(totals, floors, strict=True)
+        if total > floor.error
+    ]
     text = caption(
         "defaults",
         names=", ".join(names),
-        error=max(item.known.total for item in chosen),
-        floor=min(spread.floors()[spread.model_class(item.scene)] for item in chosen),
+        error=totals[worst],
+        floor=floors[worst],
+        beyond=len(beyond),
+        count=len(chosen),
     )
     yield Remark("The method was chosen by default.", text)
 

@@ -111,7 +111,8 @@ def _asked(bed: str = "", method: str = "", diameter: float = 1e-3) -> Scene:
 
 
 @pytest.mark.parametrize(
-    ("packing", "diameter"), [("aligned", 7e-4), ("aligned", 1e-3), ("disordered", 1e-3)]
+    ("packing", "diameter"),
+    [("aligned", 7e-4), ("aligned", 1e-3), ("disordered", 1e-3)],
 )
 def test_the_default_errs_less_than_the_model_is_worth(
     packing: str, diameter: float
@@ -125,7 +126,8 @@ def test_the_default_errs_less_than_the_model_is_worth(
     assert chosen.is_chosen
     assert chosen.scene.method.kind != "dem"
     assert chosen.scene.method.flow.model == "solve"
-    assert chosen.known.total <= floors()[model_class(scene)]
+    assert f"measured on {floors()[model_class(scene)].scenes} beds" in chosen.why
+    assert chosen.known.total <= floors()[model_class(scene)].error
 
 
 @pytest.mark.parametrize("packing", ["aligned", "horizontal", "disordered"])

@@ -31,7 +31,7 @@ SPANNED = {
         "bed.disorder",
         "bed.obstacles",
     ),
-    *("bed.counted", "threshold.criterion", "threshold.fractions"),
+    *("bed.counted", "threshold.criterion", "threshold.fractions", "fluid.kind"),
 }
 """Fields of which the calibration has more than one value."""
 UNTESTED = {
