@@ -12,7 +12,7 @@ from orchestrator import tables
 LISTED = Path(__file__).with_name("columns.csv")
 """The columns of each table, in their order."""
 TABLES = {
-    "scenes": "a scene: the values of its fields",
+    "scenes": "a scene: the values of its fields, and the groups that ask for it",
     "methods": "a scene: how it was answered, and why",
     "single_grain": "a single grain: its threshold",
     "pile_threshold": "a pile and a fraction n/N: its threshold",

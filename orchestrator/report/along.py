@@ -47,7 +47,9 @@ def draw(results: Results) -> Iterator[Figure]:
     is_local = any(pile.length == 0 for pile in piles)
     leads = is_local or bool(piles[0].bed.profile)
     text = caption("where", local=is_local)
-    yield Figure("where", "Where motion starts", text, names, figure, leads=leads)
+    title = "Where motion starts"
+    tables = ("pile_grain",)
+    yield Figure("where", title, text, names, figure, leads=leads, tables=tables)
 
 
 def _beds(results: Results, scenes: Mapping[str, pd.DataFrame]) -> Canvas:

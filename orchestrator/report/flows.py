@@ -164,7 +164,8 @@ def stress(results: Results) -> Iterator[Figure]:
     )
     title = "Friction velocity over the pile"
     draw = partial(_stress, results, piles)
-    yield Figure("wall-stress", title, text, names, draw, fold=True)
+    tables = ("wall_stress",)
+    yield Figure("wall-stress", title, text, names, draw, fold=True, tables=tables)
 
 
 def _stress(results: Results, piles: list[Pile]) -> Canvas:
@@ -541,7 +542,8 @@ def hills(results: Results) -> Iterator[Figure]:
     style.legends(figure, colours, style.samples(axes))
     cases = tuple(flows["flow_case"])
     title = "Hills that others measured"
-    yield Figure("hills", title, caption("hills"), cases, figure, leads=True)
+    text = caption("hills")
+    yield Figure("hills", title, text, cases, figure, leads=True, tables=("flow",))
 
 
 def _draw_hill(ax: Axes, results: Results, rows: pd.DataFrame) -> None:

@@ -82,6 +82,7 @@ def _fractions(results: Results, along: str, name: str, title: str) -> Iterator[
                 cases=case_names(sheet.rows),
                 drawing=partial(_draw_fractions, sheet, curves, by, colours, along),
                 fold=bool(sheet.name) or not is_first,
+                tables=("pile_curve",),
             )
 
 
@@ -176,6 +177,7 @@ def wear(results: Results) -> Iterator[Figure]:
             caption=caption("wear"),
             cases=tuple(cases),
             drawing=shields.legends(sheet, "d_m", colours),
+            tables=("bed_change",),
         )
 
 

@@ -112,6 +112,7 @@ def _bed(pile: Pile, grains: pd.DataFrame, norm: LogNorm) -> Figure:
         caption=caption("poured", width=packing.width, count=len(flows), method=method),
         cases=tuple(run.name for run in pile.runs),
         drawing=figure,
+        tables=("pile_grain",),
     )
 
 
@@ -186,6 +187,7 @@ def _pivots(results: Results, rows: pd.DataFrame) -> Figure:
         caption=caption("pivots"),
         cases=case_names(results.scenes),
         drawing=figure,
+        tables=("pile_grain",),
     )
 
 
@@ -214,6 +216,7 @@ def _hiding(rows: pd.DataFrame) -> Figure:
         caption=caption("hiding"),
         cases=case_names(rows),
         drawing=shields.legends(sheet, "fraction", colours),
+        tables=("size_class",),
     )
 
 

@@ -21,6 +21,8 @@ from orchestrator.study.scene import Scene
 
 MOST = 6
 """Remarks up to which those are added that are true of every study of a kind."""
+JUMP = 0.05
+"""Relative change of the ratio of the ends of an interval from which it is told."""
 PAPER_FLUID = Remark(
     "The gas is not quite air.",
     "The gas is that of the paper, of 1 kg/m³, in which a grain has moved when it has "
@@ -104,7 +106,8 @@ def over_ground(rows: pd.DataFrame) -> Remark:
     if not winds:
         return Remark(head, f"{weaker}. {unknown}")
     told = f"{ustar:#.3g} m/s is a wind of {here:#.3g} m/s at 10 m here"
-    return Remark(head, f"{weaker}. {told}, of {', and of '.join(winds)}. {unknown}")
+    text = f"{weaker}. {told}, of {', and of '.join(winds)}. {unknown}"
+    return Remark(head, f"{text}{_of_one(row, rows)}")
 
 
 def _of_laws(results: Results) -> Iterator[Remark]:
@@ -144,9 +147,19 @@ def _correction(results: Results, table: pd.DataFrame) -> Iterator[Remark]:
     text = (
         f"On a level bed of grains of {size} the force law {law} asks for a friction "
         f"velocity of {computed:#.3g} m/s; {who} found {measured:#.3g} m/s. The table "
-        "has both."
+        f"has both.{_of_one(row, rows)}"
     )
     yield Remark(head, text)
+
+
+def _of_one(row: pd.Series, rows: pd.DataFrame) -> str:
+    """That a remark is told of one of several beds or grains, and of which."""
+    shown = [name for name in ("fraction", "bed") if name in rows]
+    telling = labels.varying(rows, *shown)
+    if not telling:
+        return ""
+    told = ", ".join(labels.told(row, telling))
+    return f" This is told of one of them as an example: {told}."
 
 
 def _questions(results: Results) -> Iterator[Remark]:
@@ -174,6 +187,7 @@ def _of_piles(results: Results, piles: pd.DataFrame) -> Iterator[Remark]:
     for _, row in results.exemplars.head(1).iterrows():
         pile = results.plan.piles[str(row["scene_id"])]
         yield from _smoothing(row, pile.bed)
+        yield from _jumps(row, piles)
         grains = results.tables["pile_grain"]
         x = grains.loc[grains["scene_id"] == row["scene_id"], "x_m"]
         yield from _counted(pile.scene, pile.bed, x)
@@ -188,6 +202,21 @@ def _of_piles(results: Results, piles: pd.DataFrame) -> Iterator[Remark]:
         text = caption("checked", checks=results.tables["check"])
         yield Remark("Some beds were checked by DEM.", text)
     yield from _tolerance(results, piles)
+
+
+def _jumps(row: pd.Series, piles: pd.DataFrame) -> Iterator[Remark]:
+    """Where the tested interval of a bed has another width from one Re* to the next."""
+    here = piles[(piles["scene_id"] == row["scene_id"]) & (piles["tested_rows"] > 0)]
+    here = here.sort_values("reynolds", kind="stable")
+    width = (here["tested_high"] / here["tested_low"]).to_numpy(float)
+    reynolds = here["reynolds"].to_numpy(float)
+    for place in np.flatnonzero(np.abs(np.diff(np.log(width))) > JUMP):
+        text = (
+            f"From Re* {reynolds[place]:.3g} to {reynolds[place + 1]:.3g} the ratio of "
+            f"its ends goes from {width[place]:.2g} to {width[place + 1]:.2g}: other "
+            "measured thresholds are near. The bed itself does not change so."
+        )
+        yield Remark("The width of the interval changes with Re*.", text)
 
 
 def _smoothing(row: pd.Series, bed: PileBed) -> Iterator[Remark]:
@@ -264,6 +293,7 @@ def _model(row: pd.Series, results: Results) -> Iterator[Remark]:
     text = (
         f"Models with other choices of packing, forces and angles give Shields numbers "
         f"of {labels.interval(low, high)} for the {part}. {of_intervals}"
+        f"{_of_one(row, results.exemplars)}"
     )
     yield Remark(f"{str(choice).capitalize()} matters more than all else.", text)
 

@@ -254,9 +254,9 @@ def _sheet(rows: pd.DataFrame, keys: Sequence[str], name: str) -> Sheet:
         if column in ("fraction", "by") and not is_single:
             continue
         if head in frame and frame[head].nunique() == 1:
-            told = labels.told(rows.iloc[0], [column])
-            shared += told
             frame = frame.drop(columns=head)
+            if column != "fraction":  # it is told in words below
+                shared += labels.told(rows.iloc[0], [column])
     is_uniform = "usable" in frame and frame["usable"].nunique() == 1
     if is_uniform and len(frame) > 1 and " of " not in frame["usable"].iloc[0]:
         shared.append(f"usable: {frame['usable'].iloc[0]}")

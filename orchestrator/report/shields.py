@@ -570,8 +570,22 @@ def draw(results: Results) -> Iterator[Figure]:
         about={**about(scenes), "sloped": ""},
     )
     title = "Extended Shields diagram"
-    cases = case_names(piles, grains)
-    yield Figure(NAME, title, text, cases, canvas, data=points, leads=True)
+    yield Figure(
+        NAME,
+        title,
+        text,
+        case_names(piles, grains),
+        canvas,
+        data=points,
+        leads=True,
+        tables=_tables(piles, grains),
+    )
+
+
+def _tables(piles: pd.DataFrame, grains: pd.DataFrame) -> tuple[str, ...]:
+    """The tables of the rows that are drawn."""
+    rows = {"pile_threshold": piles, "single_grain": grains}
+    return tuple(name for name, drawn in rows.items() if len(drawn))
 
 
 def _fractions(piles: pd.DataFrame) -> list[float]:
@@ -854,6 +868,7 @@ def _diagrams(
             case_names(shown),
             partial(_draw_diagram, sheet, shown, narrow, by, colours),
             fold=is_further or by == "alpha_deg",
+            tables=("pile_threshold" if by == "fraction" else "single_grain",),
         )
 
 
@@ -967,6 +982,7 @@ def accuracy(results: Results) -> Iterator[Figure]:
             case_names(sheet.rows),
             partial(_draw_accuracy, sheet, rows, colours),
             fold=True,
+            tables=("single_grain",),
         )
 
 

@@ -127,6 +127,8 @@ class Figure:
         A number that others gave it, such as that of the paper.
     part
         Its width over that of the page.
+    tables
+        The tables that it is drawn from.
     """
 
     name: str
@@ -141,6 +143,7 @@ class Figure:
     wide: bool = False
     number: str = ""
     part: float = 1.0
+    tables: tuple[str, ...] = ()
 
     @cached_property
     def canvas(self) -> Canvas | None:

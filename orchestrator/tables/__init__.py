@@ -114,8 +114,7 @@ def with_methods(scenes: pd.DataFrame, methods: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     scenes
-        The table ``scenes``, in which a scene has a row for each group that asks for
-        it.
+        The table ``scenes``.
     methods
         The table ``methods``.
 
@@ -124,6 +123,7 @@ def with_methods(scenes: pd.DataFrame, methods: pd.DataFrame) -> pd.DataFrame:
     DataFrame
         The columns of both.
     """
+    # a directory of an earlier version has a row for each group
     once = scenes.drop_duplicates("scene_id")
     # one block: columns may be added to more than a hundred others
     return once.merge(methods, on="scene_id", how="left").copy()

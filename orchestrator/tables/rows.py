@@ -81,7 +81,7 @@ def point(scene: Scene) -> Row:
 
 
 def scenes(study: Study, plan: Plan) -> Iterator[Row]:
-    """List the scenes of each group: what they ask, and the cases that answer them.
+    """List the scenes: what they ask, the groups that ask it, the cases that answer it.
 
     Parameters
     ----------
@@ -93,28 +93,33 @@ def scenes(study: Study, plan: Plan) -> Iterator[Row]:
     Yields
     ------
     dict
-        A row for each scene of each group, in the study's order.
+        A row for each scene, in the study's order.
     """
     cell_of = {scene.id: cell.name for cell in plan.cells for scene in cell.scenes}
+    groups: dict[str, dict[str, None]] = {}
+    scenes_by_id = {}
     for group in study.groups:
         for asked in group.scenes:
-            decision = plan.decisions[asked.id]
-            scene = decision.scene
-            case = cell_of.get(scene.id)
-            flow_case = None
-            pile = plan.piles.get(asked.id)
-            if pile:
-                case = pile.last_run
-                if pile.model.cases:
-                    flow_case = pile.flow.name
-            yield {
-                "scene_id": asked.id,
-                "group": group.name,
-                **fields.question(asked),
-                "law_holds": law_holds(asked),
-                "case": case if scene.method.kind == "dem" else None,
-                "flow_case": flow_case,
-            }
+            scenes_by_id[asked.id] = asked
+            groups.setdefault(asked.id, {})[group.name] = None
+    for asked in scenes_by_id.values():
+        decision = plan.decisions[asked.id]
+        scene = decision.scene
+        case = cell_of.get(scene.id)
+        flow_case = None
+        pile = plan.piles.get(asked.id)
+        if pile:
+            case = pile.last_run
+            if pile.model.cases:
+                flow_case = pile.flow.name
+        yield {
+            "scene_id": asked.id,
+            "group": "; ".join(groups[asked.id]),
+            **fields.question(asked),
+            "law_holds": law_holds(asked),
+            "case": case if scene.method.kind == "dem" else None,
+            "flow_case": flow_case,
+        }
 
 
 def methods(plan: Plan) -> Iterator[Row]:
