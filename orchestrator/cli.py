@@ -284,12 +284,16 @@ def _surface_study(options: Namespace) -> "SurfaceStudy | None":
 def _experiment(options: Namespace, experiment: "Experiment", out: Path) -> int:
     """Run an experiment, or say what it would run."""
     from orchestrator import plan
+    from orchestrator.runs import workspace
 
+    beside = workspace.beside(out, Path("results")) if experiment.shares_cases else ()
     if options.plan:
+        experiment.check(out)
         cases = out.absolute() / "cases"
-        print(*plan.expected(experiment.planned, cases, options.workers), sep="\n")
+        planned = experiment.planned
+        print(*plan.expected(planned, cases, options.workers, beside), sep="\n")
         return 0
-    return _end(experiment.run(out, workers=options.workers))
+    return _end(experiment.run(out, workers=options.workers, beside=beside))
 
 
 def _surface(options: Namespace, study: "SurfaceStudy") -> int:
@@ -301,7 +305,8 @@ def _surface(options: Namespace, study: "SurfaceStudy") -> int:
     for question in study.questions:
         warnings.warn(question, stacklevel=1)
     module = import_module(OF_SURFACES[options.command])
-    out = options.out or Path("results") / study.name
+    name = study.name if options.command == "study" else options.command
+    out = options.out or Path("results") / name
     return _experiment(options, module.experiment(study, out), out)
 
 

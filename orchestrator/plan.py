@@ -4,7 +4,7 @@ import time
 import timeit
 import warnings
 from collections import Counter
-from collections.abc import Collection, Container, Iterable, Iterator, Mapping
+from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
@@ -314,7 +314,9 @@ def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
     yield from expected(plan, directory, workers)
 
 
-def expected(plan: Plan, directory: Path, workers: int) -> Iterator[str]:
+def expected(
+    plan: Plan, directory: Path, workers: int, beside: Sequence[Path] = ()
+) -> Iterator[str]:
     """Say how long the cases of a plan take.
 
     Parameters
@@ -325,16 +327,22 @@ def expected(plan: Plan, directory: Path, workers: int) -> Iterator[str]:
         The directory of the cases.
     workers
         How many cases run at a time.
+    beside
+        Other directories of results, from which finished cases are taken.
 
     Yields
     ------
     str
         Lines of text: cases by kind, expected time and disk.
     """
-    missing = plan.missing(directory, plan.done(directory)).values()
+    found = reuse.elsewhere(plan.cases, directory, beside)
+    done = {*plan.done(directory), *found}
+    missing = plan.missing(directory, done).values()
     kinds = _counted(case.kind for case in plan.cases.values()) or "none"
     todo = _counted(case.kind for case in missing) or "none"
     yield f"{number(len(plan.cases), 'case')}: {kinds}; to run: {todo}"
+    for root, count in Counter(cases.parent for cases in found.values()).items():
+        yield f"  {count} done in {root}"
     # a chain of cases takes at least the sum of its times, however many run beside it
     walls = {case.name: case.cost_s / min(case.ranks, workers) for case in missing}
     longest_s = 0.0

@@ -386,6 +386,7 @@ def experiment(study: Study, out: Path) -> Experiment:
         results=results,
         limit_s=study.time_limit_s,
         source=study.source,
+        shares_cases=True,
     )
 
 

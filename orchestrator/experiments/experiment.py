@@ -1,5 +1,6 @@
 """An experiment: scenes in, runs, tables, one page of figures."""
 
+import sys
 import tomllib
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
@@ -9,6 +10,7 @@ from typing import Any
 import pandas as pd
 
 from orchestrator import pipeline
+from orchestrator.digits import number
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.fidelity.decision import with_criterion, written
 from orchestrator.pipeline import Finished
@@ -16,7 +18,7 @@ from orchestrator.plan import Plan
 from orchestrator.report import page, style
 from orchestrator.report.card import lines
 from orchestrator.report.page import Section
-from orchestrator.runs import case
+from orchestrator.runs import case, reuse
 from orchestrator.runs.files import Folder
 from orchestrator.runs.workspace import EXPERIMENT, Workspace, claimed
 from orchestrator.study.parts import PileBed
@@ -106,6 +108,9 @@ class Experiment:
         The study file that it is on; None for scenes of its own.
     files
         Makes files beside the page, by their paths; None for no file.
+    shares_cases
+        Whether cases that are done in another directory of results are taken from
+        there: the experiment asks for runs that others ask for, too.
     """
 
     name: str
@@ -117,8 +122,29 @@ class Experiment:
     failing: Container[str] | None = None
     source: Source | None = None
     files: Callable[[Runs], Mapping[str, bytes]] | None = None
+    shares_cases: bool = False
 
-    def run(self, out: Path, *, workers: int) -> Finished:
+    def check(self, out: Path) -> None:
+        """Refuse a directory that holds something else, as `run` does.
+
+        Parameters
+        ----------
+        out
+            The directory, in which nothing is written.
+
+        Raises
+        ------
+        InputError
+            If it holds something else, or this experiment on another file.
+        """
+        space = Workspace(out.absolute())
+        space.check(EXPERIMENT, self.name, self._source_of(space))
+
+    def _source_of(self, space: Workspace) -> Mapping[str, object]:
+        """The study file of the experiment as a directory notes it."""
+        return self.source.described(space.root) if self.source else {}
+
+    def run(self, out: Path, *, workers: int, beside: Sequence[Path] = ()) -> Finished:
         """Run what is missing, and write tables and page.
 
         Parameters
@@ -127,6 +153,8 @@ class Experiment:
             The directory.
         workers
             Number of cases at a time.
+        beside
+            Other directories of results, from which finished cases are taken.
 
         Returns
         -------
@@ -141,8 +169,12 @@ class Experiment:
         space = Workspace(out.absolute())
         with claimed(space.root, EXPERIMENT, self.name) as folder:
             # all experiments of a name have one directory by default
-            source = self.source.described(space.root) if self.source else {}
+            source = self._source_of(space)
             space.describe(EXPERIMENT, self.name, self.planned.cases, source)
+            taken = reuse.taken(self.planned.cases, space.cases, beside)
+            if taken:
+                what = f"{number(taken, 'case')} of other results taken"
+                print(f"{what}; no solver was started for them", file=sys.stderr)
             todo = self._todo(space.cases)
             failed = pipeline.complete(
                 todo, space, workers=workers, limit_s=self.limit_s

@@ -111,6 +111,7 @@ def experiment(study: SurfaceStudy, out: Path) -> Experiment:
         study.time_limit_s,
         source=study.source,
         files=lambda runs: files(answers(runs)),
+        shares_cases=True,
     )
 
 

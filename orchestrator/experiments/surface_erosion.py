@@ -10,6 +10,7 @@ import pandas as pd
 
 from orchestrator import plan
 from orchestrator.digits import number
+from orchestrator.errors import InputError
 from orchestrator.experiments import erosion, surface, surface_answer, surface_card
 from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs
 from orchestrator.flow.mesh3 import wind_axes
@@ -237,14 +238,16 @@ def experiment(study: SurfaceStudy, out: Path) -> Experiment:
     Raises
     ------
     InputError
-        If the threshold is no number that a wind can reach, nor a material of AP-42, or
-        the rose blows from where no flow is.
+        If the threshold is no number that a wind can reach, nor a material of AP-42, if
+        the rose blows from where no flow is, or if the fluid is a liquid.
     """
     del out
     least, source = erosion.given_threshold(study.erosion.threshold, study.file)
     flows = {scene: surface.flow_of(scene) for scene in study.scenes}
     members = surface.alike(study.scenes)
     roses = surface.roses_of(study, members)
+    for scene in members:
+        _check_wind(scene, study.file)
 
     def results(runs: Runs) -> Results:
         found = []
@@ -268,7 +271,16 @@ def experiment(study: SurfaceStudy, out: Path) -> Experiment:
         results,
         study.time_limit_s,
         source=study.source,
+        shares_cases=True,
     )
+
+
+def _check_wind(scene: SurfaceScene, where: str) -> None:
+    """Refuse a liquid, whose current takes no dust."""
+    if surface.ground_of(scene, None).stream is surface_answer.CURRENT:
+        what = f"a fluid of {scene.fluid.density:g} kg/m3 is no wind"
+        remedy = "the losses of AP-42 are of wind; `orchestrator study` has the current"
+        raise InputError(what, f"{where}: fluid.density", remedy)
 
 
 def _winds(

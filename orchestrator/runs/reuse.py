@@ -9,7 +9,9 @@ tables are made anew of its results.
 
 import contextlib
 import os
+import shutil
 import tempfile
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from orchestrator.errors import OrchestratorError
@@ -20,9 +22,10 @@ from orchestrator.runs.case import (
     IDENTITY,
     Case,
     code_digest,
+    done_state,
     inputs_written,
 )
-from orchestrator.runs.files import read_json
+from orchestrator.runs.files import Folder, read_json
 
 
 def is_as_made_now(case: Case, cases: Path) -> bool:
@@ -80,3 +83,75 @@ def _is_made_alike(case: Case, cases: Path, beside: Path) -> bool:
     case.collect(folder)
     made = [folder / name for name in tables]
     return bool(files.digest_files(made, root=folder) == tables)
+
+
+def elsewhere(
+    cases: Mapping[str, Case], here: Path, beside: Sequence[Path]
+) -> dict[str, Path]:
+    """Find cases that are done in other directories of results and not in one.
+
+    Parameters
+    ----------
+    cases
+        The cases by their names.
+    here
+        The directory of cases in which they are wanted.
+    beside
+        Other directories of results.
+
+    Returns
+    -------
+    dict of str to Path
+        The directory of cases in which each was found first, by its name.
+    """
+    found = {}
+    for name, case in cases.items():
+        if not beside or done_state(case, here):
+            continue
+        for root in beside:
+            if done_state(case, root / here.name):
+                found[name] = root / here.name
+                break
+    return found
+
+
+def taken(cases: Mapping[str, Case], here: Path, beside: Sequence[Path]) -> int:
+    """Copy cases that are done in other directories of results.
+
+    What is copied is checked as all finished cases are. Bulky files stay behind, as if
+    they were pruned.
+
+    Parameters
+    ----------
+    cases
+        The cases by their names.
+    here
+        The directory of cases in which they are wanted, whose holder calls this.
+    beside
+        Other directories of results.
+
+    Returns
+    -------
+    int
+        How many were copied.
+    """
+    count = 0
+    for name, source in elsewhere(cases, here, beside).items():
+        bulky = read_json(source / name / DONE).get("bulky", ())
+        place = Folder(here.parent).clear(f"{here.name}/{name}")
+        # whatever cannot be copied is run
+        with contextlib.suppress(OSError):
+            here.mkdir(parents=True, exist_ok=True)
+            _copy(source / name, place, bulky)
+        count += done_state(cases[name], here) is not None
+    return count
+
+
+def _copy(source: Path, place: Path, but: Collection[str]) -> None:
+    """Copy a directory without some files, with its times; links stay links."""
+
+    def left(folder: str, names: list[str]) -> list[str]:
+        inside = Path(folder).relative_to(source)
+        return [name for name in names if (inside / name).as_posix() in but]
+
+    shutil.copytree(source, place, symlinks=True, ignore=left)

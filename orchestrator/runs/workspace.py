@@ -196,6 +196,25 @@ class Workspace(Folder):
             return isinstance(error, BlockingIOError)
         return False
 
+    def check(self, kind: Kind, name: str, source: Mapping[str, object]) -> None:
+        """Refuse a directory that `claimed` or `describe` refuse; write nothing.
+
+        Parameters
+        ----------
+        kind, name
+            Kind and name of the contents that are wanted.
+        source
+            What they are read from: `study.source.Source.described`.
+
+        Raises
+        ------
+        InputError
+            If it holds something else, or the same of another study file.
+        """
+        if self.root.is_dir():
+            _check(self, kind, name)
+            self._check_file(kind, name, source.get("file"))
+
     def describe(
         self,
         kind: Kind,
@@ -232,12 +251,9 @@ class Workspace(Folder):
         before = read_marker(self.root, kind)
         asked_before = {key: before.get(key, question[key]) for key in question}
         changed = asked_before != question
-        other = self._file_of_another(before, source.get("file"))
         is_same = bool(question) and not changed
-        if other and not is_same:
-            holds = f"the directory holds the {kind.word} {name}"
-            what = f"{holds} of another file, {other}"
-            raise InputError(what, str(self.root), "choose another with --out")
+        if not is_same:
+            self._check_file(kind, name, source.get("file"))
         value = {
             "orchestrator": __version__,
             "kind": kind.word,
@@ -249,6 +265,14 @@ class Workspace(Folder):
         if before != value:
             self.note(kind.marker, files.text_of(value))
         return changed
+
+    def _check_file(self, kind: Kind, name: str, file: object) -> None:
+        """Refuse a directory of another study file, which is still there."""
+        other = self._file_of_another(read_marker(self.root, kind), file)
+        if other:
+            holds = f"the directory holds the {kind.word} {name}"
+            what = f"{holds} of another file, {other}"
+            raise InputError(what, str(self.root), "choose another with --out")
 
     def _file_of_another(self, before: Mapping[str, Any], file: object) -> str:
         """The study file in a marker, if it is there and not the one asked for."""
@@ -380,6 +404,28 @@ def _code_digest() -> str:
                 key = f"{root.name}/{path.relative_to(root)}"
                 digests[key] = files.digest_file(path)
     return digest_text(canonical_json(digests))
+
+
+def beside(root: Path, *parents: Path) -> tuple[Path, ...]:
+    """List the other directories of studies and experiments beside one.
+
+    Parameters
+    ----------
+    root
+        The directory.
+    *parents
+        Directories that hold some, beside the one in which it lies.
+
+    Returns
+    -------
+    tuple of Path
+        Their absolute paths, sorted.
+    """
+    own = root.absolute()
+    found: set[Path] = set()
+    for parent in (own.parent, *(each.absolute() for each in parents)):
+        found.update(marker.parent for marker in parent.glob(f"*/{STUDY.marker}"))
+    return tuple(sorted(found - {own}))
 
 
 def files_of(root: Path) -> list[str]:

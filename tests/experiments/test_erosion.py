@@ -1,11 +1,13 @@
 """Erosion of stockpiles: the rules of AP-42 by hand, a flat bed, and the preset as it is run."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from orchestrator.cli import main
 from orchestrator.errors import InputError
 from orchestrator.experiments import erosion
 from orchestrator.study import study
@@ -204,3 +206,30 @@ def test_another_file_has_another_directory(tmp_path: Path) -> None:
     first.unlink()
     run[1](out, workers=1)
     assert page.read_bytes() != before
+
+
+def test_flows_that_were_solved_are_taken_and_the_plan_refuses_what_the_run_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("heap", "heap2"):
+        Path(f"{name}.toml").write_text(_text('"bed.obstacles" = [[]]'))
+    assert main(["erosion", "heap.toml"]) == 0
+    first = capsys.readouterr().out
+    # a second file has the default directory neither by the plan nor by the run
+    for more in (["--plan"], []):
+        assert main(["erosion", "heap2.toml", *more]) != 0
+        assert "the experiment erosion of another file" in capsys.readouterr().err
+    elsewhere = str(tmp_path / "far" / "away")
+    assert main(["erosion", "heap2.toml", "--out", elsewhere, "--plan"]) == 0
+    assert "to run: none" in capsys.readouterr().out
+    assert main(["erosion", "heap2.toml", "--out", elsewhere]) == 0
+    captured = capsys.readouterr()
+    assert "1 case of other results taken" in captured.err
+    assert captured.out.splitlines()[:-1] == first.splitlines()[:-1]
+    # a copy that is damaged is no result: the flow is solved
+    (table,) = (tmp_path / "results").glob("erosion/cases/*/bed_flow.csv")
+    table.write_text(table.read_text() + "\n")
+    shutil.rmtree(elsewhere)
+    assert main(["erosion", "heap2.toml", "--out", elsewhere, "--plan"]) == 0
+    assert "to run: flow 1" in capsys.readouterr().out

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from orchestrator.errors import InputError
 from orchestrator.experiments import surface, surface_card, surface_erosion
 from orchestrator.experiments.experiment import Experiment, Results, Runs
 from orchestrator.flow.surface_case import SURFACE_STRESS
@@ -315,3 +316,15 @@ def test_a_calm_rose_takes_nothing(tmp_path: Path) -> None:
     assert card.numbers[2].value == 0
     assert card.numbers[2].note == "none of them reaches the threshold"
     assert "No wind of the rose reaches the threshold" in said
+
+
+def test_a_current_takes_no_dust(tmp_path: Path) -> None:
+    study_of(tmp_path)
+    path = tmp_path / "heaps.toml"
+    path.write_text(path.read_text().replace('"air"', '"water"'))
+    study = surface_study.load(path)
+    assert study is not None
+    with pytest.raises(
+        InputError, match=r"fluid.density: a fluid of \d+ kg/m3 is no wi"
+    ):
+        surface_erosion.experiment(study, tmp_path)

@@ -147,14 +147,29 @@ def test_maps_lie_where_the_surface_lies(folder: Path) -> None:
 
 
 def test_erosion_of_a_cone_stands_beside_that_of_ap42(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = folder.parent / "cone.toml"
-    shutil.copytree(folder / "cases", tmp_path / "out" / "cases")
-    assert main(["erosion", str(file), "--out", str(tmp_path / "out")]) == 0
-    said = capsys.readouterr().out
+    # the directory of the study is not that of its erosion: the plan says so, too
+    for more in (["--plan"], []):
+        assert main(["erosion", str(file), "--out", str(folder), *more]) != 0
+        assert "the directory holds the experiment surface" in capsys.readouterr().err
+    # one beside it takes the flow that the study has solved
+    out = folder.parent / "erosion"
+    assert main(["erosion", str(file), "--out", str(out), "--plan"]) == 0
+    plan = capsys.readouterr().out
+    assert "1 case: surface 1; to run: none" in plan
+    assert f"1 done in {folder}" in plan
+    assert not out.exists()
+    assert main(["erosion", str(file), "--out", str(out)]) == 0
+    captured = capsys.readouterr()
+    assert "1 case of other results taken" in captured.err
+    (case,) = (folder / "cases").iterdir()
+    done = out / "cases" / case.name / "done.json"
+    assert done.read_bytes() == (case / "done.json").read_bytes()
+    said = captured.out
     assert "g/m²" in said.partition("of dust by the solved flow, with a wind")[0]
-    rows = pd.read_csv(tmp_path / "out" / "tables" / "erosion.csv")
+    rows = pd.read_csv(out / "tables" / "erosion.csv")
     own = rows[rows["surface"] == "wind from 270°"]
     parts = own[own["part"] != "all"]
     assert parts["share, %"].sum() == pytest.approx(100.0)
