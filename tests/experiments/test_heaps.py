@@ -324,5 +324,5 @@ def test_a_current_takes_no_dust(tmp_path: Path) -> None:
     path.write_text(path.read_text().replace('"air"', '"water"'))
     study = surface_study.load(path)
     assert study is not None
-    with pytest.raises(InputError, match="fluid.density: a fluid of .* is no wind"):
+    with pytest.raises(InputError, match=r"fluid.density: a fluid of .* is no wind"):
         surface_erosion.experiment(study, tmp_path)
