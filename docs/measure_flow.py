@@ -5,7 +5,6 @@
 
 import re
 import sys
-import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,7 +23,7 @@ HEIGHT = 0.02
 ROUGHNESS = (3.3e-6, 3.333e-5, 1e-4)
 SLOPES = (10.0, 15.0, 20.0, 25.0, 30.0, 35.0)
 GRAIN = 1e-3
-LEVELS = {
+LEVELS: dict[str, dict[str, object]] = {
     "80 cells a face": {"cells_per_face": 80},
     "40, the standard": {},
     "growth 1.15": {"expansion_ratio": 1.15},
@@ -32,7 +31,7 @@ LEVELS = {
     "growth 1.4": {"expansion_ratio": 1.4},
     "20 cells a face": {"cells_per_face": 20},
 }
-MODELS = (
+MODELS: tuple[dict[str, object], ...] = (
     {},
     {"turbulence_model": "RNGkEpsilon"},
     {"turbulence_model": "realizableKE"},
@@ -56,8 +55,8 @@ def other(one: FlowCase, **settings: object) -> FlowCase:
 
 def solved(one: FlowCase, cases: Path) -> WallStress:
     """The stress of a case, run if it has not been."""
-    if not case.is_done(one, cases):
-        engine.execute(one, cases, 3600.0, threading.Event())
+    if not case.done_state(one, cases):
+        engine.execute(one, cases, 3600.0)
     return WallStress.from_csv(cases / one.name / WALL_STRESS)
 
 
