@@ -49,7 +49,7 @@ Table = dict[str, NDArray[Any]]
 OF_PAPER = (PAPER, *LAWS_OF["transition"])
 """Laws of the paper, which are of grains that leave their pockets."""
 NO_START = f"not reached: no flow up to a Shields number of {saltation.MOST:g} does it"
-NO_END = "not reached: hops have no end, or go on without a flow"
+NO_END = "not known: hops have no end"
 """Why a grain has no threshold of going on."""
 
 

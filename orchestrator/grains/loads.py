@@ -50,6 +50,7 @@ which no grain is packed where no method is asked for."""
 MARGIN = 20.0
 """Fixed bed before and behind the grains of such a range, d: twice the way of a grain
 that goes."""
+NO_END = "their hops have no end"
 LOOSE = 1e-4
 """Threshold over that of the scene's grain, below which a grain lies loose: at the
 limiting slope round-off leaves it 1e-8. Tables of forces begin there."""
@@ -178,7 +179,7 @@ def on_slopes(scene: Scene, slopes_deg: FloatArray) -> FloatArray:
     grains = [replace(grain, slope_deg=slope) for slope in slopes.tolist()]
     found = thresholds_of(scene.forces.law, grains)
     peaks = np.array([each.friction_velocity for each in found], float)
-    speeds = np.nan_to_num(peaks, nan=0.0, posinf=np.inf) / np.sqrt(scene.gust)
+    speeds = peaks / np.sqrt(scene.gust)
     is_loose = speeds < LOOSE * float(closed_form(scene).friction_velocity)
     return np.where(is_loose, 0.0, speeds)[place]
 
@@ -809,16 +810,25 @@ class Loads:
         flows, over
             Undisturbed friction velocities of the mean flow, m/s, and the friction
             velocity of the gust in which a grain leaves over that of the mean flow,
-            shape (N,). A grain that cannot hop has no gust, and goes on when it leaves.
+            shape (N,). A grain that cannot hop has no gust, and goes on when it leaves;
+            one that hops on in any flow has 0, and one that never does infinity.
+
+        Raises
+        ------
+        InputError
+            If hops of a grain have no end: its threshold is not known.
         """
         scene = self.geometry.scene
         packed = self.geometry.packing
         sizes = packed.sizes[packed.windward]
         found, can_hop = hopping_on(scene, self._slopes_deg, sizes)
         excess = (scene.grain.density / scene.fluid.density - 1) * scene.fluid.gravity
-        # a trajectory without an end has no threshold: the grain is not reached
-        known = np.where(np.isnan(found), np.inf, found)
-        shields = np.where(can_hop, known, 0.0)
+        endless = int(np.count_nonzero(can_hop & np.isnan(found)))
+        if endless:
+            what = f"from which flow on {endless} grains go on is not known: {NO_END}"
+            where = f"scene {scene.id}: threshold.criterion"
+            raise InputError(what, where, 'choose "leaves"')
+        shields = np.where(can_hop, found, 0.0)
         ustar = np.sqrt(shields * excess * scene.grain.diameter * sizes)
         # the loads have the scene's own gusts already
         over = np.where(can_hop, np.sqrt(peak_of(scene) / scene.gust), 1.0)

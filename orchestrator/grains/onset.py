@@ -158,8 +158,7 @@ def goes_on(
 
     It is that of the mean flow, whose gusts have `saltation.PEAK` times its stress, on
     the slope along the stress, beyond the ends of the table of thresholds that of its
-    end. Where a grain cannot hop, or no threshold is known, it is that at which the
-    grain leaves without a gust.
+    end. Where a grain cannot hop it is that at which the grain leaves without a gust.
 
     Parameters
     ----------
@@ -173,7 +172,8 @@ def goes_on(
     Returns
     -------
     FloatArray
-        Friction velocities, m/s, shape (F,).
+        Friction velocities, m/s, shape (F,): infinite where no flow makes it hop on,
+        NaN where that is not known.
     """
     ends = saltation.SLOPE_NODES_DEG
     along = np.clip(slope_along_deg(slope_deg, heading_deg), ends[0], ends[-1])
@@ -188,7 +188,7 @@ def goes_on(
     excess = (grain.density / grain.fluid_density - 1) * grain.gravity
     unit = np.sqrt(excess * grain.diameter)
     going = saltation.tabulated(grains).initiation(saltation.PEAK)
-    can = saltation.hops(grains) & np.isfinite(going)
+    can = saltation.hops(grains)
     found = saltation.motion((leaving / unit) ** 2, going, can)
     return np.asarray(np.sqrt(found.shields) * unit)
 

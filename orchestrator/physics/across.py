@@ -8,7 +8,6 @@ J. Hydraul. Div. ASCE 89 (HY3), 1963; W. Wu, Computational River Dynamics, 2007,
 Eq. 3.46. Lift, torque and cohesion are added here as the pivot of Eq. 1 has them.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -128,7 +127,8 @@ def threshold_across(
     -------
     FloatArray
         Threshold friction velocity, m/s, of the broadcast shape: 0 on a slope down
-        which the grain rolls without a flow, infinite where no flow moves it.
+        which the grain rolls without a flow, infinite where no flow moves it, NaN where
+        that is not known.
 
     Examples
     --------
@@ -168,14 +168,18 @@ def threshold_across(
 def _first(moments: _Moments) -> FloatArray:
     """The least friction velocities at which the moments along the bed win, m/s."""
     unit = moments.exposure.viscosity / moments.exposure.diameter
-    is_loose = moments.excess(np.zeros_like(unit)) >= 0
+    at_rest = moments.excess(np.zeros_like(unit))
+    is_loose = at_rest >= 0
     found = np.where(is_loose, 0.0, np.inf)
+    found[np.isnan(at_rest)] = np.nan
     low = np.zeros_like(unit)
     high = np.full_like(unit, np.nan)
     left = np.flatnonzero(~is_loose)
     for rung in RUNGS:
         ustar = rung * unit[left]
-        is_reached = moments.at(left).excess(ustar) >= 0
+        excess = moments.at(left).excess(ustar)
+        found[left[np.isnan(excess)]] = np.nan
+        is_reached = excess >= 0
         high[left[is_reached]] = ustar[is_reached]
         left = left[~is_reached]
         low[left] = rung * unit[left]
@@ -183,6 +187,5 @@ def _first(moments: _Moments) -> FloatArray:
             break
     solved = np.flatnonzero(np.isfinite(high))
     if len(solved):
-        excess: Callable[[FloatArray], FloatArray] = moments.at(solved).excess
-        found[solved] = root(excess, low[solved], high[solved])
+        found[solved] = root(moments.at(solved).excess, low[solved], high[solved])
     return found

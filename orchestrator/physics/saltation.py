@@ -680,8 +680,9 @@ class _Hopping:
 class Thresholds:
     """Shields numbers of the mean flow at which grains go on, arrays of shape (n,).
 
-    Infinite is a threshold that no flow up to `MOST` reaches, NaN one whose
-    trajectories do not end, or that lies below `LEAST`.
+    A threshold of 0 lies below `LEAST`: such grains go on in any flow. Infinite is one
+    that no flow up to `MOST` reaches, NaN one that is not known, since trajectories do
+    not end.
 
     Attributes
     ----------
@@ -950,8 +951,9 @@ def least(
     Returns
     -------
     FloatArray
-        Shields numbers, shape (n,): infinite where the largest, `MOST`, is too small,
-        NaN where a trajectory does not end or the least, `LEAST`, is enough.
+        Shields numbers, shape (n,): 0 where the least, `LEAST`, is enough, infinite
+        where the largest, `MOST`, is too small, NaN, not known, where a trajectory does
+        not end.
 
     Examples
     --------
@@ -977,6 +979,7 @@ def least(
     shields = np.where(is_between, np.exp((low + high) / 2), np.nan)
     shields[at_ends[1] == STOPS] = np.inf
     shields[~is_ended] = np.nan
+    shields[at_ends[0] == GOES_ON] = 0.0
     return shields
 
 
@@ -1097,8 +1100,9 @@ def _interpolated(table: FloatArray, grains: Grains) -> FloatArray:
                 slope.node + steeper,
             ]
             weight = galileo.weight(further) * density.weight(denser)
-            # an infinite or missing threshold counts only where it has a weight
-            logarithm += np.where(weight > 0, weight * value, 0.0)
+            # a threshold of 0, of infinity or not known counts only with a weight
+            with np.errstate(invalid="ignore"):
+                logarithm += np.where(weight > 0, weight * value, 0.0)
         at_slopes.append(np.exp(logarithm))
     gentle, steep = at_slopes
     with np.errstate(invalid="ignore"):
@@ -1192,4 +1196,5 @@ def _table() -> FloatArray:
     """
     shape = (len(GALILEO_NODES), len(DENSITY_NODES), len(SLOPE_NODES_DEG))
     both = np.loadtxt(TABLE, delimiter=",", skiprows=1, unpack=True)
-    return np.log(both.reshape(4, *shape))
+    with np.errstate(divide="ignore"):  # of 0, below `LEAST`
+        return np.log(both.reshape(4, *shape))

@@ -212,34 +212,39 @@ class _Balances:
             target=self.target[places],
         )
 
-    def first_rungs(self) -> tuple[FloatArray, FloatArray]:
+    def first_rungs(self) -> tuple[FloatArray, FloatArray, BoolArray]:
         """Friction velocities of `RUNGS` between which each first root lies, m/s.
 
-        The upper one is NaN where no rung reaches the target, or none is needed. Rungs
-        are climbed from below, since the sum need not rise everywhere if a weight is
-        negative.
+        The upper one is NaN where no rung reaches the target, or none is needed; the
+        truth values tell where a force was not known on the way. Rungs are climbed from
+        below, since the sum need not rise everywhere if a weight is negative.
         """
+        is_unknown = np.isnan(self.target)
         low = np.zeros_like(self.target)
         high = np.full_like(self.target, np.nan)
         unit = self.exposure.viscosity / self.exposure.diameter
         left = np.flatnonzero(self.target > 0)
         for rung in RUNGS:
             ustar = rung * unit[left]
-            is_reached = self.at(left).excess(ustar) >= 0
+            excess = self.at(left).excess(ustar)
+            is_unknown[left[np.isnan(excess)]] = True
+            is_reached = excess >= 0
             high[left[is_reached]] = ustar[is_reached]
             left = left[~is_reached]
             low[left] = ustar[~is_reached]
             if not len(left):
                 break
-        return low, high
+        return low, high, is_unknown
 
     def roots(self) -> FloatArray:
         """The least local friction velocities that reach the targets, m/s.
 
-        NaN where none is needed, and infinite where none does.
+        0 where none is needed, infinite where none does, and NaN where the forces are
+        not known.
         """
-        found = np.where(self.target > 0, np.inf, np.nan)
-        low, high = self.first_rungs()
+        found = np.where(self.target > 0, np.inf, 0.0)
+        low, high, is_unknown = self.first_rungs()
+        found[is_unknown] = np.nan
         solved = np.flatnonzero(np.isfinite(high))
         if len(solved):
             excess = self.at(solved).excess
@@ -283,9 +288,9 @@ def friction_velocity_at(
     Returns
     -------
     FloatArray
-        Undisturbed friction velocity, m/s, of the broadcast shape: NaN where the target
-        is not positive, since such a grain needs no flow, and infinite where no flow
-        reaches it.
+        Undisturbed friction velocity, m/s, of the broadcast shape: 0 where the target
+        is not positive, since such a grain needs no flow, infinite where no flow
+        reaches it, NaN where that is not known.
 
     Examples
     --------
@@ -293,7 +298,7 @@ def friction_velocity_at(
     ...     diameter=1e-3, roughness=1e-3 / 30, fluid_density=1000.0, viscosity=1e-6
     ... )
     >>> print(friction_velocity_at(LAWS["bridged"], sand, [1e-6, 0.0]).round(5))
-    [0.01028     nan]
+    [0.01028 0.     ]
     """
     local = np.asarray(speed_up, float)
     direction = np.sign(local)
@@ -310,8 +315,9 @@ def friction_velocity_at(
     of_grains = Exposure(**dict(zip(exposure.fields, fields, strict=True)))
     balances = _Balances(law, of_grains, along, outward, turning, target)
     found = balances.roots()
-    with np.errstate(divide="ignore"):
-        undisturbed = found / ratio
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # without a local flow a grain goes that needs none, and no other
+        undisturbed = np.where(found == 0, 0.0, found / ratio)
     return np.asarray(undisturbed.reshape(given[0].shape))
 
 
@@ -348,7 +354,8 @@ def root(
     Returns
     -------
     FloatArray
-        The roots, of the same shape, right to the last digits.
+        The roots, of the same shape, right to the last digits; NaN, not known, where
+        none is found in `MOST_STEPS` steps, or the function is NaN.
 
     Examples
     --------
@@ -375,7 +382,8 @@ def root(
                 break
             part = _next_part(newest, opposite, outside)
             part = np.clip(part, least_part, 1 - least_part)
-    return best
+    is_known = is_found & np.isfinite(newest.y) & np.isfinite(opposite.y)
+    return np.where(is_known, best, np.nan)
 
 
 def _next_part(newest: _Points, opposite: _Points, outside: _Points) -> FloatArray:
@@ -432,8 +440,9 @@ def threshold(
     Returns
     -------
     Threshold
-        The threshold, of the broadcast shape. A resistance that is not positive gives
-        NaN, and a grain that no flow moves an infinite friction velocity.
+        The threshold, of the broadcast shape. Where the resistance is not positive the
+        friction velocity is 0, where no flow moves the grain infinite, where it is not
+        known NaN. Only a friction velocity above 0 is valid.
 
     Examples
     --------
@@ -473,7 +482,7 @@ def threshold(
             shields=np.asarray(stress_area * np.pi / 6 / submerged),
             drag=law.drag(ustar, exposure),
             lift=lift,
-            valid=law.valid(ustar, exposure) & rolls,
+            valid=law.valid(ustar, exposure) & rolls & (ustar > 0),
         )
 
 

@@ -21,6 +21,7 @@ from orchestrator.physics.saltation import (
     Thresholds,
     fate,
     hops,
+    least,
     on_layer,
     settling,
     submerged,
@@ -162,7 +163,7 @@ def test_what_no_flow_reaches_is_infinite() -> None:
     syrup = thresholds(Grains(1e-3, 2.65))
     assert syrup.steady[0] == np.inf
     assert syrup.cessation[0] == np.inf
-    assert np.isnan(thresholds(Grains(127.0, 2.65, slope_deg=-80.0)).cessation[0])
+    assert thresholds(Grains(127.0, 2.65, slope_deg=-80.0)).cessation[0] == 0
 
 
 @pytest.mark.long
@@ -461,3 +462,13 @@ def test_alike_grains_beyond_the_table_are_followed_once(
         assert found.cessation.tolist() == [80.0, 100.0, 80.0, 80.0]
     assert counts == [2]
     saltation._of_unlike.cache_clear()
+
+
+def test_the_table_knows_zero_from_what_is_not_known() -> None:
+    """Its empty nodes were grains that go on in any flow."""
+    steep = Grains([500.0, 500.0], [1e5, 9e4], slope_deg=[-30.0, -29.0])
+    found = tabulated(steep)
+    assert np.isfinite([found.steady, found.cessation]).all()
+    assert found.cessation[0] == 0
+    endless = least(steep, lambda g, theta: np.full(len(g), ENDLESS))
+    assert np.isnan(endless).all()

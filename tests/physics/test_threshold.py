@@ -8,14 +8,17 @@ from numpy.typing import ArrayLike
 
 from orchestrator.physics import curves
 from orchestrator.physics import threshold as physics
+from orchestrator.physics.across import threshold_across
 from orchestrator.physics.constants import LIFT_COEFFICIENT
-from orchestrator.physics.laws import LAWS, Exposure
+from orchestrator.physics.laws import LAWS, Bridged, Exposure
 from orchestrator.physics.threshold import (
     Threshold,
     friction_velocity_at,
+    root,
     shields_at,
     threshold,
 )
+from orchestrator.types import FloatArray
 
 few = settings(max_examples=30, deadline=None)
 every_law = pytest.mark.parametrize("name", LAWS)
@@ -164,7 +167,7 @@ def test_thresholds_rise_with_slope_weight_and_the_depth_of_the_pocket(
     assert float(of_air(name, d, ratio, 0, beta - 4, 1e-5).friction_velocity) > up[0]
 
 
-def test_without_resistance_there_is_no_threshold() -> None:
+def test_without_resistance_a_grain_moves_at_once() -> None:
     found = threshold(
         LAWS["bridged"],
         Exposure(diameter=1e-3, roughness=1e-4, fluid_density=1000.0, viscosity=1e-6),
@@ -172,15 +175,16 @@ def test_without_resistance_there_is_no_threshold() -> None:
         slope_deg=np.array([-50.0, 0.0, 0.0, 0.0]),
         entrainment_angle_deg=45.0,
     )
-    np.testing.assert_array_equal(np.isnan(found.shields), [True, True, False, True])
+    ustar = found.friction_velocity
+    np.testing.assert_array_equal(ustar == 0, [True, True, False, False])
+    np.testing.assert_array_equal(np.isnan(ustar), [False, False, False, True])
     np.testing.assert_array_equal(found.valid, [False, False, True, False])
 
 
 @every_law
-def test_a_grain_without_resistance_has_no_threshold_under_any_law(name: str) -> None:
+def test_a_grain_without_resistance_moves_at_once_under_any_law(name: str) -> None:
     found = of_air(name, 1e-3, 0.1, -60.0, 45.0, 1e-5)
-    assert np.isnan(float(found.friction_velocity))
-    assert np.isnan(float(found.drag))
+    assert float(found.friction_velocity) == float(found.drag) == 0
     assert not bool(found.valid)
 
 
@@ -249,14 +253,14 @@ class TestFrictionVelocityAt:
         back = friction_velocity_at(law, self.where, 1e-6, speed_up=-0.7, **mirrored)
         assert float(back) == pytest.approx(float(forth), rel=1e-14)
 
-    def test_unreached_is_infinite_and_no_need_of_flow_is_not_a_number(self) -> None:
+    def test_unreached_is_infinite_and_no_need_of_flow_is_zero(self) -> None:
         given = {
             "along": np.array([-1.0, 1.0, 1.0, 1.0]),
             "speed_up": np.array([1, 0, 1, 1.0]),
         }
         target = np.array([1e-6, 1e-6, 0.0, -1e-6])
         found = friction_velocity_at(LAWS["bridged"], self.where, target, **given)
-        np.testing.assert_array_equal(found, [np.inf, np.inf, np.nan, np.nan])
+        np.testing.assert_array_equal(found, [np.inf, np.inf, 0.0, 0.0])
 
     def test_of_several_roots_it_is_the_least(self) -> None:
         # lift against drag: the lift is above a quarter of the drag for Re* of about 2 to 1000
@@ -318,3 +322,39 @@ def test_a_torque_and_a_lift_both_lower_the_threshold() -> None:
     )
     lifted = water(3e-4).friction_velocity
     assert float(lifted) < float(without_lift.friction_velocity)
+
+
+def test_a_root_that_is_not_found_is_not_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The last place tried was told as the root."""
+
+    def cubes(x: FloatArray) -> FloatArray:
+        return np.where(x > 1, np.nan, x**3 - [0.5, 8.0])
+
+    low, high = np.zeros(2), np.array([1.0, 4.0])
+    with np.errstate(invalid="ignore"):
+        found = root(cubes, low, high)
+    assert found[0] == pytest.approx(0.5 ** (1 / 3), rel=1e-12)
+    assert np.isnan(found[1])
+    monkeypatch.setattr(physics, "MOST_STEPS", 3)
+    assert np.isnan(root(lambda x: x**3 - 0.5, low[:1], high[:1])).all()
+
+
+class Blind(Bridged):
+    """A law that does not know its drag above a friction velocity."""
+
+    def drag(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
+        u = np.asarray(ustar, float)
+        return np.asarray(np.where(u > 0.2, np.nan, super().drag(u, at)))
+
+
+def test_what_a_law_does_not_know_is_neither_never_nor_at_once() -> None:
+    sand = Exposure(diameter=1e-3, roughness=1e-4, fluid_density=1.2, viscosity=1.5e-5)
+    grain = {"density": 2650.0, "entrainment_angle_deg": 60.0}
+    slopes = np.array([0.0, -29.9, -40.0])  # not known, known, at once
+    law = Blind()
+    along = threshold(law, sand, slope_deg=slopes, **grain).friction_velocity
+    across = threshold_across(law, sand, slope_deg=-slopes, heading_deg=180.0, **grain)
+    for found in (along, across):
+        assert np.isnan(found[0])
+        assert 0 < found[1] < 0.2
+        assert found[2] == 0

@@ -11,7 +11,7 @@ from orchestrator.calculator.table import thresholds
 from orchestrator.errors import InputError
 from orchestrator.fidelity.decision import decide
 from orchestrator.grains.motion import Motion
-from orchestrator.grains.pile import PileCase
+from orchestrator.grains.pile import Pile, PileCase
 from orchestrator.study import study
 from orchestrator.study.criterion import goes_on, of_single_grain
 from orchestrator.study.scene import Scene
@@ -306,3 +306,22 @@ def test_a_law_has_one_criterion_in_a_study_and_in_threshold(law: str) -> None:
     scene = _scene(f'{SAND}{WATER}[forces]\nlaw = "{law}"\n')
     rows = orchestrator.threshold(3.5e-4, density=2650.0, fluid="water", law=law)
     assert ("decides" in rows) is goes_on(scene)
+
+
+def test_steeper_lee_slopes_of_dry_sand_move_earlier(tmp_path: Path) -> None:
+    """Grains that go on in any flow were told as such that never do."""
+    found = []
+    for slope in (25.0, 28.0, 30.0, 31.0, 33.0):
+        bed = f"kind = 'dune'\nslope_deg = 15.0\nlee_slope_deg = {slope}\n"
+        scene = _scene(
+            "[grain]\ndensity = 2650.0\ndiameter = 2.5e-4\n"
+            f"[fluid]\nkind = 'air'\n[bed]\n{bed}counted = 'all'\nheight = 0.01\n"
+            "[method]\nkind = 'pivot'\nflow = { model = 'flat' }\n"
+        )
+        flows = Pile(decide(scene, None).scene, tmp_path).motion(tmp_path).flows
+        assert np.isfinite(flows).all()
+        found.append(np.quantile(flows, 0.1))
+    assert (np.diff(found) < 0).all()
+    # of 33 deg they hop on in any flow that the program looks at
+    assert found[0] < 0.2
+    assert found[-1] == 0
