@@ -1,5 +1,6 @@
 """The table of thresholds, as Python sees it."""
 
+from pathlib import Path
 from typing import get_args
 
 import numpy as np
@@ -9,7 +10,9 @@ import pytest
 from orchestrator.calculator import LARGEST_DEPTH, PARAMETERS, QUANTITIES
 from orchestrator.calculator.table import thresholds
 from orchestrator.fidelity import limits
+from orchestrator.physics.fluids import numbers_of
 from orchestrator.physics.laws import LAWS, Exposure
+from orchestrator.physics.saltation import Grains, hops
 from orchestrator.physics.threshold import threshold, why_not
 from orchestrator.study.declare import Length
 from orchestrator.study.fields import FIELDS, PARTS
@@ -100,3 +103,18 @@ def test_a_quantity_that_nothing_makes_is_no_column(
 def test_the_largest_depth_is_that_of_a_study() -> None:
     (most,) = [each.le for each in get_args(Length)[1].metadata if hasattr(each, "le")]
     assert most == LARGEST_DEPTH
+
+
+def test_pages_name_the_size_from_which_quartz_hops_in_water() -> None:
+    sizes = np.arange(4.0e-4, 6.0e-4, 1e-5)
+    water = numbers_of({"kind": "water"})
+    grains = Grains.of(
+        sizes,
+        density=2650.0,
+        fluid_density=water["density"],
+        viscosity=water["viscosity"],
+    )
+    first = 1e3 * sizes[hops(grains)][0]
+    docs = Path(__file__).parents[2] / "docs"
+    for page in ("model.md", "threshold.md"):
+        assert f"below {first:.2f} mm" in (docs / page).read_text(encoding="utf-8")
