@@ -233,7 +233,7 @@ def _study(options: Namespace) -> int:
     if not options.plan:
         answered = finished(options)
         if answered:
-            print("every case was done already; no solver was started", file=sys.stderr)
+            print("it was answered already; no solver was started", file=sys.stderr)
             print(*answered, sep="\n")
             return 0
     of_surface = _surface_study(options)

@@ -104,8 +104,10 @@ def run(
         failures = _with_advice(failed, planned)
         if todo:
             states |= planned.done(space.cases, but=states)
-        else:
+        elif planned.cases:
             print("every case was done already; no solver was started", file=sys.stderr)
+        else:
+            print("its answer needs no case; no solver was started", file=sys.stderr)
         answer = space.answer(planned.ids)
         undrawn: Sequence[str] = ()
         if todo or answer is None:

@@ -217,3 +217,24 @@ def test_any_failure_has_a_message_of_one_printable_line() -> None:
         assert words in str(of_exception(failure, "case"))
     assert of_exception(KeyboardInterrupt()).exit_code == 130
     assert isinstance(of_exception(ZeroDivisionError("x"), "case"), Fault)
+
+
+def test_a_study_without_cases_does_not_say_that_they_were_done(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "waves.toml"
+    file.write_text(
+        "fluid = { kind = 'air' }\ngrain = { diameter = 1e-3 }\n"
+        "bed = { kind = 'pile', shape = 'dune', slope_deg = 10.0, height = 0.05 }\n"
+        "method = { kind = 'local', flow = { model = 'waves' } }\n"
+    )
+    words = ["study", str(file), "--out", str(tmp_path / "out")]
+    assert cli.main(words) == 0
+    first = capsys.readouterr()
+    assert "its answer needs no case; no solver was started" in first.err
+    assert "done already" not in first.err
+    assert cli.main(words) == 0
+    again = capsys.readouterr()
+    assert "done already" not in again.err
+    assert "no solver was started" in again.err
+    assert again.out == first.out

@@ -6,7 +6,7 @@ u_s/u_r, the speed 25 cm above a pile over that at 10 m, from a wind tunnel (Bil
 Arya, EPA/600/S3-85/059).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import log
 from pathlib import Path
@@ -25,6 +25,7 @@ from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs
 from orchestrator.fidelity import limits
 from orchestrator.flow.model import FlowModel
 from orchestrator.flow.stress import WallStress
+from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.physics.threshold import thresholds_of
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.report import labels, style
@@ -34,7 +35,7 @@ from orchestrator.report.page import Section
 from orchestrator.report.style import Figure
 from orchestrator.study import fields
 from orchestrator.study.closed_form import single_grain
-from orchestrator.study.parts import PileBed
+from orchestrator.study.parts import Fluid, PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
 from orchestrator.types import FloatArray, Row
@@ -360,12 +361,15 @@ def experiment(study: Study, out: Path) -> Experiment:
     ------
     InputError
         If the threshold is neither a number that a wind can reach nor a material of
-        AP-42, if the study has no pile, or if the flow over one cannot be solved.
+        AP-42, if the study has no pile or one in a liquid, or if the flow over one
+        cannot be solved.
     """
     winds = study.erosion.fastest_mile
     where = study.file or study.name
     least, source = given_threshold(study.erosion.threshold, where)
-    flows = {scene: FlowModel(scene) for scene in piles(study)}
+    asked = piles(study)
+    check_winds((scene.fluid for scene in asked), where)
+    flows = {scene: FlowModel(scene) for scene in asked}
     for scene in flows:
         limits.check(scene, where, grains=False)
 
@@ -426,6 +430,29 @@ def given_threshold(asked: str | float | None, where: str) -> tuple[float | None
         remedy = f"a value in m/s up to {MOST_USTAR_T:g}, or one of: {materials}"
         raise InputError(what, f"{where}: erosion.threshold", remedy)
     return least, source
+
+
+def check_winds(fluids: Iterable[Fluid], where: str) -> None:
+    """Refuse liquids, whose current takes no dust.
+
+    Parameters
+    ----------
+    fluids
+        The fluids of a study.
+    where
+        The study file, for messages.
+
+    Raises
+    ------
+    InputError
+        If one of them is a liquid.
+    """
+    for fluid in fluids:
+        if fluid.density >= GAS_BELOW:
+            what = f"a fluid of {fluid.density:g} kg/m3 is no wind"
+            remedy = "the losses of AP-42 are of wind"
+            remedy += "; `orchestrator study` has the current"
+            raise InputError(what, f"{where}: fluid.density", remedy)
 
 
 def _results(found: Sequence[Pile], winds: Sequence[float], source: str) -> Results:

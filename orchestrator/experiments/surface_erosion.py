@@ -10,7 +10,6 @@ import pandas as pd
 
 from orchestrator import plan
 from orchestrator.digits import number
-from orchestrator.errors import InputError
 from orchestrator.experiments import erosion, surface, surface_answer, surface_card
 from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs
 from orchestrator.flow.mesh3 import wind_axes
@@ -242,12 +241,11 @@ def experiment(study: SurfaceStudy, out: Path) -> Experiment:
         the rose blows from where no flow is, or if the fluid is a liquid.
     """
     del out
+    erosion.check_winds((scene.fluid for scene in study.scenes), study.file)
     least, source = erosion.given_threshold(study.erosion.threshold, study.file)
     flows = {scene: surface.flow_of(scene) for scene in study.scenes}
     members = surface.alike(study.scenes)
     roses = surface.roses_of(study, members)
-    for scene in members:
-        _check_wind(scene, study.file)
 
     def results(runs: Runs) -> Results:
         found = []
@@ -273,14 +271,6 @@ def experiment(study: SurfaceStudy, out: Path) -> Experiment:
         source=study.source,
         shares_cases=True,
     )
-
-
-def _check_wind(scene: SurfaceScene, where: str) -> None:
-    """Refuse a liquid, whose current takes no dust."""
-    if surface.ground_of(scene, None).stream is surface_answer.CURRENT:
-        what = f"a fluid of {scene.fluid.density:g} kg/m3 is no wind"
-        remedy = "the losses of AP-42 are of wind; `orchestrator study` has the current"
-        raise InputError(what, f"{where}: fluid.density", remedy)
 
 
 def _winds(

@@ -28,6 +28,7 @@ from orchestrator.study.surface import (
     Tags,
     checked,
 )
+from orchestrator.study.units import number
 from orchestrator.types import FloatArray
 
 if TYPE_CHECKING:
@@ -188,7 +189,7 @@ def _without(heights: FloatArray, empty: str) -> FloatArray:
     """
     if not _is_number(empty):
         return heights
-    is_empty = np.isclose(heights, float(empty), rtol=NEAR_EMPTY, atol=0.0)
+    is_empty = np.isclose(heights, number(empty), rtol=NEAR_EMPTY, atol=0.0)
     return np.where(is_empty, np.nan, heights)
 
 
@@ -246,15 +247,15 @@ def _numbers(lines: list[str], before: int, empty: str, where: str) -> list[floa
     The word of empty cells is NaN.
     """
     values: list[float] = []
-    for number, line in enumerate(lines, before + 1):
+    for count, line in enumerate(lines, before + 1):
         words = line.split()
         if empty and not _is_number(empty):
             words = ["nan" if word == empty else word for word in words]
         try:
-            values.extend(map(float, words))
+            values.extend(map(number, words))
         except ValueError:
             bad = next(word for word in words if not _is_number(word))
-            place = f"{where}: line {number}"
+            place = f"{where}: line {count}"
             remedy = "numbers with a decimal point, spaces between them"
             raise InputError(f"{bad!r} is no number", place, remedy) from None
     return values
@@ -263,7 +264,7 @@ def _numbers(lines: list[str], before: int, empty: str, where: str) -> list[floa
 def _is_number(word: str) -> bool:
     """Whether a word is a number."""
     try:
-        float(word)
+        number(word)
     except ValueError:
         return False
     return True
@@ -273,7 +274,7 @@ def _number(word: str, where: str) -> float:
     """The number that a word is; an `InputError` for any other word."""
     if not _is_number(word):
         raise InputError(f"{word!r} is no number", where, "with a decimal point")
-    return float(word)
+    return number(word)
 
 
 def _of_triangles(path: Path, where: str) -> Raster:
@@ -434,7 +435,7 @@ def _in_metres(
     found = {}
     for role, usual in (("scale", "1"), ("offset", "0")):
         text = metadata.get(role, usual)
-        value = float(text) if _is_number(text) else np.nan
+        value = number(text) if _is_number(text) else np.nan
         if not np.isfinite(value) or (role == "scale" and not value):
             what = f"its {role} is {text!r}"
             raise InputError(what, where, f"GDAL's {role} of a band is a number")

@@ -13,7 +13,9 @@ from orchestrator.errors import InputError
 from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.physics.fluids import ALIKE, NUMBERS_OF_PAPER
 
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?|[+-]?inf|nan", re.ASCII | re.I)
+NUMBER = re.compile(
+    r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?|[+-]?(inf|nan)", re.ASCII | re.I
+)
 DECIMAL_COMMA = re.compile(r"([+-]?\d+),(\d+(?:e[+-]?\d+)?)", re.ASCII | re.I)
 WITH_UNIT = re.compile(r"([+-]?[\d.]+(?:e[+-]?\d+)?)\s*([^\d\s.+-].*)", re.ASCII | re.I)
 TO_SI: Mapping[str, float] = {

@@ -74,6 +74,10 @@ def test_what_is_wrong_is_said_in_one_message(tmp_path: Path) -> None:
         ("erosion.threshold = 112.0", "m/s"),
         ("erosion.thresold = 1.0", "did you mean threshold"),
         ('bed.kind = "grain"', "there is no pile"),
+        (
+            'erosion.threshold = 0.6\nfluid.kind = "water"',
+            "fluid.density: .* is no wind",
+        ),
     ):
         text = "grain.diameter = 1e-3\n" + PILE * ("erosion" in asked) + asked
         with pytest.raises(InputError, match=words):

@@ -327,6 +327,20 @@ def test_a_head_that_contradicts_itself_is_refused(
     refused(tmp_path, grid(head), "heap.asc")
 
 
+@pytest.mark.parametrize("word", ["1_0", "\u0661", "0,5"])
+def test_numbers_of_a_grid_are_those_of_all_files(tmp_path: Path, word: str) -> None:
+    def with_word(text: str) -> str:
+        return text.replace("0.00", word, 1)
+
+    line = grid("cellsize 1\n", change=with_word).splitlines()
+    number = next(place for place, text in enumerate(line, 1) if word in text)
+    said = refused(tmp_path, grid("cellsize 1\n", change=with_word), "heap.asc")
+    assert f"line {number}" in said
+    assert repr(word) in said
+    said = refused(tmp_path, grid(f"cellsize {word}\n"), "heap.asc")
+    assert f"cellsize: {word!r} is no number" in said
+
+
 def test_exchanged_counts_of_a_grid_are_refused(tmp_path: Path) -> None:
     def exchanged(text: str) -> str:
         head = f"ncols {COLUMNS}\nnrows {ROWS}\n"
