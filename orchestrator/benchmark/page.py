@@ -170,6 +170,7 @@ def _card(theirs: pd.DataFrame) -> Card:
         "Nothing is measured here: levels 1 and 2 are exact answers, levels 3 to 5 our "
         "own runs.",
         worth,
+        heads=("What is expected", "Are the answers right?"),
     )
 
 

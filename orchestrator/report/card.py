@@ -220,9 +220,11 @@ class Card:
     numbers
         At most three large figures.
     source
-        What measurement says: where the measured values are from.
+        Where the measured values are from.
     worth
         What the answer is worth, and what to do.
+    heads
+        Heads of the source and of the worth.
     """
 
     question: str
@@ -230,6 +232,7 @@ class Card:
     numbers: tuple[Number, ...]
     source: str
     worth: Worth
+    heads: tuple[str, str] = ("What measurement says", "Can it be used?")
 
     def __post_init__(self) -> None:
         if len(self.numbers) > MOST_NUMBERS:

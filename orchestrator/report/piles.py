@@ -78,7 +78,9 @@ def _fractions(results: Results, along: str, name: str, title: str) -> Iterator[
             yield Figure(
                 name=f"{name}-alpha{alpha:g}{sheet.name}",
                 title=f"{title}, {slope}{sheet.title}",
-                caption=caption("fractions", about=shields.about(sheet.rows)),
+                caption=caption(
+                    "fractions", about=shields.about(sheet.rows), along=along
+                ),
                 cases=case_names(sheet.rows),
                 drawing=partial(_draw_fractions, sheet, curves, by, colours, along),
                 fold=bool(sheet.name) or not is_first,

@@ -136,6 +136,19 @@ def test_fractions_are_those_of_the_holds(
     assert ax.get_ylim() == (0, 1)
 
 
+def test_captions_of_fractions_say_what_is_drawn(results: Results) -> None:
+    of_stress, of_reynolds = (
+        next(draw(results)) for draw in (piles.fractions, piles.fractions_by_reynolds)
+    )
+    for figure, x in ((of_stress, "τ"), (of_reynolds, "Re*")):
+        said = " ".join(figure.caption.split())
+        assert f"grains that had moved, against {x} of the mean wall stress" in said
+        # no range of these panels is shaded
+        assert not [ax for ax in axes_of(figure) if ax.patches]
+        assert "shaded" not in said
+        assert "Between the two neither holds" in said
+
+
 def test_extended_diagram_shows_each_fraction_that_was_reached(
     results: Results, heaps: dict[str, list[Axes]]
 ) -> None:
