@@ -307,11 +307,31 @@ def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
     reasons = Counter(answer.why for answer in plan.decisions.values())
     for why, times in reasons.most_common():
         yield f"  {times} answered: {why}"
+    for why, times in Counter(_not_usable(plan, study.tolerance)).most_common():
+        yield f"  {times} will not be usable: {why}"
+    if plan.checks:
+        yield f"  {number(len(plan.checks), 'check')} by DEM of answers without it"
     if plan.smoothings:
         noisy = number(len(plan.smoothings), "noisy profile")
         other = "half and twice the smoothing, and with what it needs"
         yield f"  {noisy}: also with {other}"
     yield from expected(plan, directory, workers)
+
+
+def _not_usable(plan: Plan, tolerance: float | None) -> Iterator[str]:
+    """Why piles will not be usable whatever their runs give: a reason for each."""
+    for answer in plan.decisions.values():
+        scene = answer.scene
+        bed = scene.bed
+        if not isinstance(bed, PileBed):
+            continue
+        error = answer.error_estimate
+        if scene.is_poured and not bed.width and scene.grain.sizes is None:
+            yield "equal spheres in one plane settle into a crystal"
+        elif error is None:
+            yield "the error of their fidelity on such beds is not known"
+        elif tolerance is not None and error > tolerance * (1 + 1e-9):
+            yield "no fidelity is known to be within the tolerance"
 
 
 def expected(

@@ -567,7 +567,8 @@ def _of_scene(
     name = str(shared["scene"].iloc[0])
     chart = Figure(figure, ALONE, SCENE_TEXT, (), tornado(largest))
     told = _in_words(name, fraction, theta, ustar0)
-    section = Section("", told, [chart], card=_card(name, fraction, theta, ustar0))
+    said = f"{name}; criterion: a grain {'goes on' if base.goes_on else 'leaves'}"
+    section = Section("", told, [chart], card=_card(said, fraction, theta, ustar0))
     return _row(name, theta, ustar0), section
 
 

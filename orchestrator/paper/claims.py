@@ -111,7 +111,7 @@ class Judged:
                 if one.is_decisive and one.verdict == "no data":
                     lacking.append(one.name)
             names = "; ".join(lacking) or "any of its comparisons"
-            return f"The study has no scenes for: {names}."
+            return f"This study, by its methods, has nothing to compare for: {names}."
         there = f"on the preset `paper` without a tolerance it is {self.claim.verdict}"
         return f"Not explained: {there}."
 
@@ -202,7 +202,8 @@ def card(judged: Sequence[Judged], tables: Tables) -> Card:
     which = f"claim {', '.join(numbers)}" if numbers else "no claim is refuted"
     lacking = counts["no data"]
     if lacking:
-        which += f"; {lacking} could not be judged: the study has no scenes for them"
+        which += f"; {lacking} could not be judged: this study has nothing to compare, "
+        which += "since it lacks the scenes, or its methods lack the load steps"
     told: tuple[tuple[Verdict, str, str], ...] = (
         ("reproduced", "claims reproduced", "in at least 95 % of the comparisons"),
         ("partly", "claims that hold in part", "the reason stands under each claim"),
