@@ -27,6 +27,7 @@ from orchestrator.study import fields
 from orchestrator.study.study import Study
 from orchestrator.tables import rows
 from orchestrator.tables.check import contradictions, with_agreement
+from orchestrator.tables.quoted import of_classes
 from orchestrator.tables.usable import with_scatter, with_usable
 from orchestrator.types import Row
 
@@ -90,6 +91,7 @@ def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
     thresholds = with_scatter(_listed(rows.pile_threshold, answers), asked)
     checks = with_agreement(pd.DataFrame(rows.check(plan, cases, done)), thresholds)
     against = contradictions(checks)
+    beds = with_usable(thresholds, asked, study.tolerance, against)
     stress = [rows.wall_stress(pile, cases) for pile in flows.values()]
     made = {
         "scenes": scenes,
@@ -99,8 +101,8 @@ def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
         "flow": pd.DataFrame([rows.flow(pile, cases) for pile in flows.values()]),
         "pile_grain": _stacked(map(rows.pile_grain, answers)),
         "pile_curve": _stacked(map(rows.pile_curve, answers)),
-        "pile_threshold": with_usable(thresholds, asked, study.tolerance, against),
-        "size_class": _listed(rows.size_class, answers),
+        "pile_threshold": beds,
+        "size_class": of_classes(_listed(rows.size_class, answers), beds),
         "bed_change": _stacked(rows.bed_changes(answers)),
         "form": _listed(rows.forms, answers),
         "check": checks,

@@ -110,6 +110,38 @@ def quoted(rows: pd.DataFrame, twins: "pd.Series[int] | None" = None) -> dict[st
     return columns
 
 
+def of_classes(classes: pd.DataFrame, thresholds: pd.DataFrame) -> pd.DataFrame:
+    """Widen the intervals of the size classes of beds by those of the beds.
+
+    Parameters
+    ----------
+    classes
+        Thresholds of size classes, whose intervals are of load steps and chance alone.
+    thresholds
+        Those of the beds with their intervals.
+
+    Returns
+    -------
+    DataFrame
+        The classes with ends that hold, relative to the threshold, the interval of the
+        bed; empty where that is open.
+    """
+    if classes.empty:
+        return classes
+    keys = ["scene_id", "fraction"]
+    of_bed = ["shields", "shields_low", "shields_high"]
+    beds = thresholds[[*keys, *of_bed]].drop_duplicates(keys)
+    beside = classes[keys].merge(beds, on=keys, how="left", validate="many_to_one")
+    value = classes["shields_own"].to_numpy(float)
+    changed = {}
+    for end, outer in (("low", np.minimum), ("high", np.maximum)):
+        own = classes[f"shields_own_{end}"].to_numpy(float)
+        over = (beside[f"shields_{end}"] / beside["shields"]).to_numpy(float)
+        # an end that either of the two leaves open is not known
+        changed[f"shields_own_{end}"] = outer(own, value * over)
+    return classes.assign(**changed)
+
+
 def _first(rows: pd.DataFrame, twins: "pd.Series[int] | None") -> dict[str, FloatArray]:
     """The flow that moves the first grain of each bed, with its ends, by column."""
     first = rows["first_ustar0_m_s"].to_numpy(float)

@@ -1,5 +1,6 @@
 """The one interval of a threshold: how it is made, and that all that is shown has it."""
 
+import math
 import re
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from orchestrator.report import (
 )
 from orchestrator.report.card import lines
 from orchestrator.report.results import Results, seeds_as_one
-from orchestrator.tables.quoted import MEASURED, NUMERICAL, SEEDS, quoted
+from orchestrator.tables.quoted import MEASURED, NUMERICAL, SEEDS, of_classes, quoted
 from tests import small_study
 
 NAN = float("nan")
@@ -256,3 +257,24 @@ def test_two_beds_of_which_one_does_not_reach_the_fraction_stay_two(
     # nor is the lost bed drawn as one that differs in chance alone
     row = results.exemplars.iloc[0]
     assert len(head_share._curves(row, results)) == 1
+
+
+def test_the_interval_of_a_size_class_holds_that_of_its_bed() -> None:
+    """Ten grains of one bed are not known better than the bed."""
+    bed = {"scene_id": "a", "fraction": 0.3, "shields": 0.05}
+    beds = pd.DataFrame([{**bed, "shields_low": 0.035, "shields_high": 0.1}])
+    few = {"scene_id": "a", "fraction": 0.3, "shields_own": 0.04}
+    classes = pd.DataFrame(
+        [
+            {**few, "shields_own_low": 0.039, "shields_own_high": 0.042},
+            {**few, "shields_own_low": 0.010, "shields_own_high": 0.200},
+            {**few, "shields_own_low": math.nan, "shields_own_high": 0.042},
+        ]
+    )
+    wider = of_classes(classes, beds)
+    assert wider["shields_own_low"].tolist() == pytest.approx(
+        [0.028, 0.010, math.nan], nan_ok=True
+    )
+    assert wider["shields_own_high"].tolist() == pytest.approx([0.08, 0.2, 0.08])
+    unknown = of_classes(classes, beds.assign(shields_high=math.nan))
+    assert unknown["shields_own_high"].isna().all()
