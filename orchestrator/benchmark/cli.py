@@ -87,7 +87,7 @@ def _add_compare(parts: Any) -> None:
     _add_scenes(command)
     text = "holds SCENE/answer.csv; unless run wrote it, its name is the solver's"
     command.add_argument("results", type=Path, nargs="+", metavar="RESULTS", help=text)
-    text = "or results/benchmark-NAME of the pack"
+    text = "or results/comparison-NAME of the pack"
     text = f"default: the only RESULTS, if run wrote them, {text}"
     command.add_argument("--out", type=Path, metavar="DIR", help=text)
 

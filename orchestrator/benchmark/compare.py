@@ -28,6 +28,7 @@ from orchestrator.tables import csv as text_of_table
 
 NUMBERS = "comparison.csv"
 VERDICTS = "verdicts.csv"
+QUANTITIES = "quantities.csv"
 LOG = "log.txt"
 LOG_BYTES = 64 * MIB
 """Largest output of a solver, bytes."""
@@ -202,7 +203,7 @@ def compare(
         The directory of each solver, which is named by `run`, or else by the directory.
     out
         The directory of the page, by default the only one of the results, if `run`
-        wrote them, or else ``results/benchmark-NAME`` of the pack.
+        wrote them, or else ``results/comparison-NAME`` of the pack.
     options
         The scenes that are chosen.
 
@@ -233,7 +234,8 @@ def compare(
     is_of_run = len(results) == 1 and about.get("kind") == workspace.RESULTS.word
     if out is None and is_of_run:
         out = results[0]
-    out = _place(out, chosen)
+    # beside results/benchmark-NAME, which holds the results of a solver
+    out = _place(out, chosen, "comparison")
     kind = workspace.COMPARISON
     name = chosen.root.name
     if is_of_run and out == results[0].absolute():
@@ -287,10 +289,10 @@ def _note_pack(folder: Folder, chosen: Pack) -> None:
     folder.note(workspace.COMPARISON.marker, text_of({**about, "at": at}))
 
 
-def _place(out: Path | None, chosen: Pack) -> Path:
+def _place(out: Path | None, chosen: Pack, kind: str = "benchmark") -> Path:
     """The directory of the results, which is not in the pack."""
     if out is None:
-        out = Path("results") / f"benchmark-{chosen.root.name}"
+        out = Path("results") / f"{kind}-{chosen.root.name}"
     if out.resolve().is_relative_to(chosen.root.resolve()):
         raise InputError("the results may not lie in the pack", str(out), "use --out")
     return out.absolute()
@@ -394,6 +396,8 @@ def _written(
     with folder.renewed():
         of_theirs = numbers[numbers["solver"] != OURS]
         folder.put(NUMBERS, text_of_table(_solver_first(of_theirs), "%.9g"))
+        by_quantity = judge.by_quantity(numbers)
+        folder.put(QUANTITIES, text_of_table(by_quantity, "%.6g"))
         folder.put(VERDICTS, text_of_table(_solver_first(theirs), "%.6g"))
         page.write(chosen, numbers, verdicts, folder, notes)
     lines = []
@@ -403,7 +407,8 @@ def _written(
         lines[LISTED:] = [f"and {len(lines) - LISTED} more: see {VERDICTS}"]
     table = judge.summary(theirs).dropna(axis=1, how="all")
     text = table.to_string(index=False, na_rep="", float_format="{:.3g}".format)
-    summary = "\n".join([text, *notes, *judge.in_words(theirs)])
+    said = [*notes, *judge.patterns(numbers), *judge.in_words(theirs)]
+    summary = "\n".join([text, *said])
     return Outcome(lines, summary, folder.root / page.PAGE)
 
 

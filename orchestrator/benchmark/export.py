@@ -22,6 +22,7 @@ from orchestrator.runs import case, engine, process
 from orchestrator.runs.workspace import Workspace
 from orchestrator.solvers import liggghts
 from orchestrator.study import fields, study
+from orchestrator.study.criterion import GOES_ON
 from orchestrator.study.profile import Files
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Group, Study
@@ -149,13 +150,14 @@ def _check_exportable(asked: Study, planned: Plan, where: str) -> None:
             f"{remedy} into another directory",
         )
     remedy = "run the study without it into another directory"
-    for pile in planned.piles.values():
-        if pile.goes_on:
+    for decision in planned.decisions.values():
+        if decision.scene.threshold.criterion == GOES_ON:
             raise InputError(
                 "threshold.criterion: a pack asks when grains leave their pockets",
                 where,
                 'write threshold.criterion = "leaves", run it into another directory',
             )
+    for pile in planned.piles.values():
         if pile.scene.threshold.update or pile.bed.width:
             what = "a pack holds one flow over each bed, in its plane"
             fields_of_it = "threshold.update or bed.width"
@@ -223,8 +225,8 @@ def _of_grains(
             yield scenes.closed_form(name, scene)
         if "pivot" in kinds and scenes.has_pivot(scene):
             problem = scenes.pivot(name, scene, ustar.get(scene.id, np.nan))
-            if scene.id in ustar:
-                answered = planned.decisions[scene.id].scene
+            answered = planned.decisions[scene.id].scene
+            if answered.id in cells and scene.id in ustar:
                 problem = replace(problem, runs=(cells[answered.id],))
             yield problem
 

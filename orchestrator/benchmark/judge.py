@@ -34,8 +34,17 @@ ROUND = 1e-8
 LARGEST_ERROR = 1e300
 """Relative errors beyond it are cut to it: the error of 1e308 against 1e-9 is no
 double, and neither are the percentage and the mean of two such errors."""
+ALIKE = 2e-3
+"""Relative spread of factors, or of shifts, up to which they are one."""
+ALIKE_FROM = 3
+"""Different expected values from which answers may be off alike."""
+OTHER = 1e-2
+"""Relative difference up to which an answer is the value of another quantity."""
 DECLINED = "it ended with 2(:|$)"
 """Message of a solver that does not know a kind of scene."""
+
+NOT_RUN = "it was not run"
+"""Message of a solver that has no directory for a scene."""
 
 Key = tuple[str, str, str]
 """Scene, quantity and `place_of` of a question."""
@@ -130,6 +139,8 @@ class Answers:
                     given = _answer(place / name / ANSWER)
                 except FileNotFoundError:
                     message = f"it wrote no {ANSWER}"
+                    if not (place / name).is_dir():
+                        message = NOT_RUN
                 except (OSError, ValueError) as fault:
                     message = f"{ANSWER}: {fault}"
             for (quantity, at), number in given.items():
@@ -216,6 +227,8 @@ def judge(
         answers another scene, ``declined``; ``message``, errors and times.
     """
     expected = chosen.expected[chosen.expected["scene"].isin(names)]
+    kinds = {name: chosen.scenes[name]["kind"] for name in names}
+    expected = expected.assign(kind=expected["scene"].map(kinds))
     numbers = []
     verdicts = []
     for place in results:
@@ -223,12 +236,13 @@ def judge(
         ours = Answers.read(place / OURS, names)
         table = _compared(expected, name_of(place), theirs, ours)
         numbers.append(table)
-        verdicts.append(_verdicts(chosen, names, table, theirs.used, ours.used))
+        verdict = _verdicts(chosen, names, table, theirs, ours.used)
+        verdicts.append(verdict)
     again = Answers.read(results[0] / OURS, names)
     table = _compared(expected, OURS, None, again)
     numbers.append(table)
-    used = again.used.assign(message="")
-    verdicts.append(_verdicts(chosen, names, table, used, again.used))
+    of_ours = Answers({}, again.used.assign(message=""))
+    verdicts.append(_verdicts(chosen, names, table, of_ours, again.used))
     return pd.concat(numbers, ignore_index=True), pd.concat(verdicts, ignore_index=True)
 
 
@@ -262,19 +276,21 @@ def _verdicts(
     chosen: Pack,
     names: Sequence[str],
     table: pd.DataFrame,
-    used: pd.DataFrame,
+    theirs: Answers,
     ours: pd.DataFrame,
 ) -> pd.DataFrame:
     """The verdict of each scene from the `_compared` table of a solver and times."""
+    unasked = _unasked(table, theirs.numbers)
     judged = table[table["tolerance"].notna()]
     of_scene = dict(iter(table.groupby("scene")))
     off_in = dict(iter(judged[~judged["within"]].groupby("scene")))
     messages = []
     answered = []
     for name in names:
-        message = used["message"][name]
+        message = theirs.used["message"][name]
         if not message:
             message = _incomplete(of_scene[name], chosen.scenes[name].get("count"))
+        message = message or unasked.get(name, "")
         answered.append(not message)
         if not message and name in off_in:
             message = _off(off_in[name])
@@ -285,27 +301,35 @@ def _verdicts(
     for key in ("level", "kind"):
         verdict[key] = [chosen.scenes[name][key] for name in names]
     verdict["message"] = messages
-    verdict = verdict.join(used.drop(columns="message"))
+    verdict = verdict.join(theirs.used.drop(columns="message"))
     verdict = verdict.join(ours[["seconds", "cpu_s", STEPS]].add_prefix("ours_"))
     verdict["answered"] = answered
-    verdict["passed"] = verdict["message"] == ""
-    is_of_another_kind = verdict["message"].str.match(DECLINED)
-    verdict["declined"] = is_of_another_kind & any(answered)
-    verdict["failed"] = ~(verdict["passed"] | verdict["declined"])
+    verdict = verdict.join(_outcomes(verdict["message"], any(answered)))
 
     is_answered = judged["scene"].map(verdict["answered"])
     is_count = judged["quantity"].isin(COUNTS)
     errors = judged["error"].where(is_answered)[~is_count]
-    scene_of = judged["scene"]
-    sizes = errors.abs().groupby(scene_of)
+    sizes = errors.abs().groupby(judged["scene"])
     verdict["error"] = sizes.median()
     verdict["worst"] = sizes.max()
-    verdict["bias"] = errors.groupby(scene_of).median()
+    verdict["bias"] = errors.groupby(judged["scene"]).median()
     for ratio, time in (("ratio", "seconds"), ("cpu_ratio", "cpu_s")):
         over = verdict[time] / verdict[f"ours_{time}"]
         # of times that were noted by another program the ratio may be no double
-        over = over.where(verdict["answered"] & np.isfinite(over))
-        verdict[ratio] = over
+        verdict[ratio] = over.where(verdict["answered"] & np.isfinite(over))
+    return verdict
+
+
+def _outcomes(messages: "pd.Series[str]", has_answered: bool) -> pd.DataFrame:
+    """Whether each scene passed, was declined or not run, or else failed."""
+    is_known = messages.str.match(DECLINED) & has_answered
+    is_left = messages == NOT_RUN
+    if is_left.all():  # a solver that has no scene at all has failed
+        is_left = is_left & False
+    verdict = pd.DataFrame(
+        {"passed": messages == "", "declined": is_known, "not_run": is_left}
+    )
+    verdict["failed"] = ~verdict.any(axis=1)
     return verdict
 
 
@@ -330,6 +354,22 @@ def _incomplete(rows: pd.DataFrame, count: float | None) -> str:
         counted = f"{moved:g} moved and {rest:g} not, of {total:g}"
         return f"the counts do not make N: {counted}"
     return ""
+
+
+def _unasked(table: pd.DataFrame, numbers: Mapping[Key, float]) -> dict[str, str]:
+    """By scene, an answer to no question of it, or steps that are no number of them."""
+    places = table["at"].map(place_of)
+    asked = set(zip(table["scene"], table["quantity"], places, strict=True))
+    found = {}
+    for key, number in numbers.items():
+        scene, quantity, at = key
+        if (quantity, at) == (STEPS, ""):
+            if number < 0 or number != math.floor(number):
+                found[scene] = f"{STEPS} is {number:.6g}, no number of time steps"
+        elif key not in asked:
+            row = {"quantity": quantity, "at": at}
+            found[scene] = f"{ANSWER} has {_question(row)}, which was not asked"
+    return found
 
 
 def _off(rows: pd.DataFrame) -> str:
@@ -382,6 +422,114 @@ def failures(verdicts: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["solver", "scenes", "kind", "why"])
 
 
+def by_quantity(numbers: pd.DataFrame) -> pd.DataFrame:
+    """Sum up the answers of solvers to each quantity, and name what is off in all.
+
+    Parameters
+    ----------
+    numbers
+        The numbers of `judge`.
+
+    Returns
+    -------
+    DataFrame
+        A row for each solver but ours, level, kind and quantity that was answered: how
+        many answers, how many are outside, the median of their signed errors, that of
+        answer over expected value, and ``looks like``: a constant factor, a shift, or
+        another quantity; empty where nothing is off or the answers have no such form.
+    """
+    theirs = numbers[numbers["answer"].notna() & (numbers["solver"] != OURS)]
+    level = theirs["scene"].map(lambda name: str(name).partition("-")[0])
+    kind = theirs["kind"]
+    groups = theirs.groupby(["solver", level, kind, "quantity"], sort=False)
+    rows = []
+    for (solver, of_level, of_kind, quantity), group in groups:
+        is_off = ~group["within"] & group["tolerance"].notna()
+        same = theirs[(theirs["solver"] == solver) & (kind == of_kind)]
+        ratio = group["answer"] / group["value"].where(group["value"] != 0)
+        rows.append(
+            {
+                "solver": solver,
+                "level": of_level,
+                "kind": of_kind,
+                "quantity": quantity,
+                "answers": len(group),
+                "outside": int(is_off.sum()),
+                "error, %": 100 * float(group["error"].median()),
+                "over expected": float(ratio.median()),
+                "looks like": _pattern(group, same) if is_off.any() else "",
+            }
+        )
+    columns = ["solver", "level", "kind", "quantity", "answers", "outside"]
+    columns += ["error, %", "over expected", "looks like"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def patterns(numbers: pd.DataFrame) -> list[str]:
+    """Say of which quantities all answers are off alike.
+
+    Parameters
+    ----------
+    numbers
+        The numbers of `judge`.
+
+    Returns
+    -------
+    list of str
+        A line for each solver, kind of scene and quantity.
+    """
+    table = by_quantity(numbers)
+    return [
+        f"{row['solver']}: {row['quantity']} of {row['kind']}: {row['looks like']}"
+        for row in table.to_dict("records")
+        if row["looks like"]
+    ]
+
+
+def _pattern(rows: pd.DataFrame, same: pd.DataFrame) -> str:
+    """How all answers to a quantity are off alike; empty if they are not.
+
+    `same` has all answers of the solver to scenes of the kind.
+    """
+    value = rows["value"].to_numpy(float)
+    answer = rows["answer"].to_numpy(float)
+    if len(np.unique(value)) < ALIKE_FROM:
+        return ""
+    other = _exchanged(rows, same)
+    if other:
+        return f"the expected {other}: exchanged columns?"
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        ratio = answer / value
+        factor = float(np.median(ratio))
+        is_factor = np.isfinite(factor) and np.ptp(ratio) <= ALIKE * abs(factor)
+        apart = answer - value
+        shift = float(np.median(apart))
+        is_shift = np.isfinite(shift) and np.ptp(apart) <= ALIKE * abs(shift)
+    if is_factor:
+        power = math.log10(factor) if factor > 0 else math.nan
+        is_unit = abs(power - round(power)) < ALIKE if power == power else False
+        return f"a constant factor, {factor:.4g}{': unit?' if is_unit else ''}"
+    if is_shift:
+        return f"a shift, {shift:+.4g}"
+    return ""
+
+
+def _exchanged(rows: pd.DataFrame, same: pd.DataFrame) -> str:
+    """The other quantity whose expected values the answers are; empty if none is."""
+    asked = rows.set_index(["scene", "at"])["answer"]
+    for quantity, others in same.groupby("quantity", sort=False):
+        if quantity == rows["quantity"].iloc[0]:
+            continue
+        value = others.set_index(["scene", "at"])["value"]
+        both = asked.index.intersection(value.index)
+        if len(both) < len(asked):
+            continue
+        is_it = np.isclose(asked[both], value[both], rtol=OTHER, atol=0)
+        if is_it.all():
+            return str(quantity)
+    return ""
+
+
 def summary(verdicts: pd.DataFrame) -> pd.DataFrame:
     """Sum up the verdicts.
 
@@ -402,6 +550,7 @@ def summary(verdicts: pd.DataFrame) -> pd.DataFrame:
         "passed": groups["passed"].sum(),
         "failed": groups["failed"].sum(),
         "declined": groups["declined"].sum(),
+        "not run": groups["not_run"].sum(),
         "error, %": 100 * groups["error"].median(),
         "bias, %": 100 * groups["bias"].median(),
         "largest, %": 100 * groups["worst"].max(),
@@ -431,5 +580,7 @@ def in_words(verdicts: pd.DataFrame) -> list[str]:
         passed, failed, declined = scenes[["passed", "failed", "declined"]].sum()
         word = "FAILED" if failed else "PASSED"
         counts = f"{passed} passed, {failed} failed, {declined} declined"
+        if scenes["not_run"].any():
+            counts += f", {scenes['not_run'].sum()} not run"
         lines.append(f"{word} {solver}: of {len(scenes)} scenes {counts}")
     return lines

@@ -48,6 +48,11 @@ ERRORS = (
     " median of the scenes.\nEvery number is in comparison.csv beside this page, every"
     " scene in verdicts.csv. The programs below\ngave the expected answers."
 )
+QUANTITIES = (
+    "Errors are signed: the median over all answers to a quantity. Where all are off"
+    " alike, the last column says how.\nThe rows are in quantities.csv beside this"
+    " page."
+)
 THRESHOLDS = (
     "Threshold Shields numbers. One with a * is outside the interval of the"
     " expected\nanswer, one with ** also beyond its tolerance: it fails."
@@ -123,6 +128,7 @@ def write(
         sections = [
             Section("", said, (), (judge.summary(theirs),), card=_card(theirs)),
             Section("What failed", tables=(judge.failures(theirs),)),
+            Section("By quantity", QUANTITIES, tables=(judge.by_quantity(numbers),)),
             of_beds,
             Section("Time and error", ERRORS, _speed(verdicts), (scenes,), LIMITS),
         ]
@@ -149,18 +155,20 @@ def _card(theirs: pd.DataFrame) -> Card:
     """The answer card: how many scenes passed, failed and were declined."""
     of = len(theirs)
     passed, failed, declined = theirs[["passed", "failed", "declined"]].sum().tolist()
+    left = declined + int(theirs["not_run"].sum())
+    gaps = "scenes declined" if left == declined else "scenes declined or not run"
     names = list(theirs["solver"].unique())
     within = "within the tolerance of each"
     which = "the list below says which and why"
     numbers = (
         Number.counted(passed, of, "scenes passed", within, "good"),
-        Number.counted(declined, of, "scenes declined", "no answer was given", "care"),
+        Number.counted(left, of, gaps, "no answer was given", "care"),
         Number.counted(failed, of, "scenes failed", which, "bad"),
     )
     worth = Worth("good", "passed", "No scene is beyond its tolerance.")
     if failed:
         worth = Worth("bad", "failed", "Read first what failed.")
-    elif declined:
+    elif declined or theirs["not_run"].any():
         worth = Worth("care", "passed, with gaps", "Some scenes were not answered.")
     who = printable(", ".join(names))
     return Card(

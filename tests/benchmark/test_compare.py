@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
@@ -411,3 +412,135 @@ def test_one_line_on_a_terminal_says_how_far_it_is(
             assert text.count("\n") <= 1
         else:
             assert text == "level 1: 2 scenes\nlevel 4: 1 scene\n"
+
+
+LEVEL_1 = Options((1,), seconds=60.0)
+
+
+def _answers(pack_of: Path, place: Path, changed: Callable[..., float]) -> Path:
+    """The expected answers of level 1, each changed by quantity and scene."""
+    expected = pack.read(pack_of).expected
+    of_level = expected[expected["scene"].str.startswith("1-")]
+    for name, rows in of_level.groupby("scene"):
+        lines = []
+        for _, part in rows.groupby("at"):
+            values = part.set_index("quantity")["value"]
+            for row in part.itertuples():
+                answer = changed(row.quantity, values)
+                lines.append(f"{row.quantity},{row.at},{answer!r}\n")
+        (place / str(name)).mkdir(parents=True)
+        (place / str(name) / "answer.csv").write_text(
+            "quantity,at,value\n" + "".join(lines)
+        )
+    return place
+
+
+EXCHANGED = {"drag_n": "lift_n", "lift_n": "drag_n"}
+
+
+@pytest.mark.parametrize(
+    ("changed", "quantity", "looks_like"),
+    [
+        (
+            lambda name, values: (
+                float(values[name]) * (1.03 if name == "drag_n" else 1)
+            ),
+            "drag_n",
+            "a constant factor, 1.03",
+        ),
+        (
+            lambda name, values: float(values[name]) * (1e3 if name == "lift_n" else 1),
+            "lift_n",
+            "a constant factor, 1000: unit?",
+        ),
+        (
+            lambda name, values: float(values[EXCHANGED.get(name, name)]),
+            "lift_n",
+            "the expected drag_n: exchanged columns?",
+        ),
+        (
+            lambda name, values: (
+                float(values[name]) + (0.02 if name == "ustar_m_s" else 0)
+            ),
+            "ustar_m_s",
+            "a shift, +0.02",
+        ),
+        (lambda name, values: float(values[name]), "drag_n", ""),
+    ],
+)
+def test_what_is_off_in_all_answers_to_a_quantity_is_named(
+    formulas: Path,
+    tmp_path: Path,
+    changed: Callable[..., float],
+    quantity: str,
+    looks_like: str,
+) -> None:
+    theirs = _answers(formulas, tmp_path / "theirs", changed)
+    out = tmp_path / "page"
+    outcome = compare.compare(formulas, [theirs], out, LEVEL_1)
+    table = pd.read_csv(out / "quantities.csv", keep_default_na=False)
+    row = table.set_index("quantity").loc[quantity]
+    assert row["looks like"] == looks_like
+    numbers = pd.read_csv(out / "comparison.csv")
+    error = numbers.loc[numbers["quantity"] == quantity, "error"].median()
+    assert row["error, %"] == pytest.approx(100 * error, rel=1e-4, abs=1e-9)
+    said = f"theirs: {quantity} of closed-form: {looks_like}"
+    assert (said in outcome.summary) is bool(looks_like)
+    assert (
+        looks_like in (out / "comparison.html").read_text("utf-8")
+    ) or not looks_like
+
+
+def test_scenes_that_were_not_run_are_no_failures(
+    formulas: Path, tmp_path: Path
+) -> None:
+    theirs = _answers(
+        formulas, tmp_path / "theirs", lambda name, all_: float(all_[name])
+    )
+    outcome = compare.compare(formulas, [theirs], tmp_path / "page", Options())
+    names = pack.read(formulas).scenes
+    done = sum(name.startswith("1-") for name in names)
+    assert outcome.failures == []
+    line = f"PASSED theirs: of {len(names)} scenes {done} passed, 0 failed, 0 declined"
+    assert f"{line}, {len(names) - done} not run" in outcome.summary
+    # a scene that was run and has no answer has failed, and so has who ran none
+    (theirs / "2-incline-5").mkdir()
+    outcome = compare.compare(formulas, [theirs], tmp_path / "page", Options())
+    assert outcome.failures == ["theirs: 2-incline-5: it wrote no answer.csv"]
+    (tmp_path / "none").mkdir()
+    outcome = compare.compare(
+        formulas, [tmp_path / "none"], tmp_path / "page", Options()
+    )
+    assert "0 passed" in outcome.summary
+    assert outcome.failures
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ("steps,,-3", "steps is -3, no number of time steps"),
+        ("steps,,2.5", "steps is 2.5, no number of time steps"),
+        ("mass_kg,,1", "answer.csv has mass_kg, which was not asked"),
+        ("steps,,12", ""),
+    ],
+)
+def test_an_answer_to_no_question_is_refused(
+    formulas: Path, tmp_path: Path, line: str, why: str
+) -> None:
+    body = AFTER + f"out.write_text(text + {line!r} + chr(10))\nsys.exit(code)\n"
+    outcome = run(formulas, tmp_path, body)
+    assert [one.rpartition(": ")[2] for one in outcome.failures] == (
+        [why] if why else []
+    )
+
+
+def test_two_solvers_are_compared_where_one_was_run_by_default(
+    formulas: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    first = compare.run(formulas, RIGHT, None, SCENE)
+    others = compare.run(formulas, RIGHT, tmp_path / "b", SCENE._replace(name="b"))
+    assert not first.failures + others.failures
+    both = [first.page.parent, others.page.parent]
+    outcome = compare.compare(formulas, both, None, SCENE)
+    assert outcome.page.parent == tmp_path / "results" / f"comparison-{formulas.name}"

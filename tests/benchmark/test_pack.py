@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator import cli
+from orchestrator import cli, pipeline
 from orchestrator.bed.deck import DIAMETER, WEIGHT
 from orchestrator.benchmark import pack, scenes
 from orchestrator.benchmark.export import export
@@ -225,6 +225,35 @@ def test_what_cannot_be_exported(fields: str, named: str, tmp_path: Path) -> Non
     (tmp_path / "thesis.tex").write_text("\\end")
     with pytest.raises(InputError, match="holds the study"):
         export(tmp_path, None, ())
+
+
+GRAINS = """
+fluid.kind = "water"
+grain.density = 2650.0
+axes."grain.diameter" = [5e-4, 2e-3]
+"""
+
+
+def test_single_grains_that_no_dem_has_answered_are_exported(tmp_path: Path) -> None:
+    text = GRAINS + 'threshold.criterion = "leaves"\nmethod.kind = "pivot"\n'
+    asked = study.parse(text, name="grains", where="grains.toml")
+    pipeline.run(asked, tmp_path / "study", workers=1)
+    export(tmp_path / "pack", tmp_path / "study", ())
+    chosen = pack.read(tmp_path / "pack")
+    pivots = chosen.expected[chosen.expected["scene"].str.startswith("2-grain")]
+    assert len(pivots) == 2
+    assert pivots["ours"].isna().all()
+    assert pivots["value"].gt(0).all()
+
+
+@pytest.mark.parametrize("levels", [(), (1,), (2,)])
+def test_single_grains_that_go_on_are_no_questions_of_a_pack(
+    levels: tuple[int, ...], tmp_path: Path
+) -> None:
+    asked = study.parse(GRAINS, name="grains", where="grains.toml")
+    pipeline.run(asked, tmp_path / "study", workers=1)
+    with pytest.raises(InputError, match="a pack asks when grains leave"):
+        export(tmp_path / "pack", tmp_path / "study", levels)
 
 
 def _edit(path: Path, **changed: Any) -> None:
