@@ -14,6 +14,9 @@ answers the piles and the single grains of the article by Bravo, Ortiz and Pére
 minutes on two cores. The page draws the article's figures under their numbers and judges its claims. With `--tolerance 0.2` it takes a
 third of the runs, and the claims about DEM are judged as far as they can be.
 
+Figs. 15 and 16 are drawn with the stress on the wall at every slope. The paper computes the stress by its Eq. 10; piles by Eq. 10 are here
+at 15° alone, so that those of 20° and 25° are not reproduced as the paper computed them.
+
 The verdicts below are those of the preset without a tolerance. [benchmark/paper](../benchmark/paper/README.md) has its thresholds as tables.
 This page is written by `python docs/paper.py` from the descriptions in the program.
 

@@ -4,6 +4,8 @@ import ast
 import copy
 import re
 import runpy
+import subprocess
+import sys
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
@@ -11,13 +13,18 @@ from typing import Any
 
 import nbclient
 import nbformat
+import numpy as np
 import pandas as pd
 import pytest
+from PIL import Image
 
 import orchestrator
 from orchestrator import __version__, cli, plan, tables
+from orchestrator.experiments import erosion
+from orchestrator.physics import beside
 from orchestrator.report.results import Results
 from orchestrator.study import study
+from orchestrator.study.parts import PileBed
 from tests.conftest import Command
 
 ROOT = Path(__file__).parents[1]
@@ -260,3 +267,59 @@ def test_a_question_is_answered_as_its_page_says(
         0
     ]
     assert orchestrator(*command.split()).stdout.replace(str(tmp_path), "…") == said
+
+
+def test_the_script_of_a_flow_shows_the_pile(results: Results, tmp_path: Path) -> None:
+    text = (ROOT / "docs" / "paraview.md").read_text(encoding="utf-8")
+    (script,) = re.findall(r"(?s)```python\n(.*?)```", text)
+    (tmp_path / "look.py").write_text(script, encoding="utf-8")
+    (flow,) = results.cases.glob("flow-*")
+    words = [sys.executable, "look.py", str(flow)]
+    ended = subprocess.run(
+        words, cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert re.fullmatch(r"\d+ cells, fastest \d+\.\d+ m/s\n", ended.stdout)
+    with Image.open(tmp_path / "flow.png") as picture:
+        white = (np.asarray(picture.convert("RGB")) == 255).all(axis=2)
+    # the first row of each column that is not air: the bed
+    ground = np.where(white.any(axis=0), white.argmax(axis=0), len(white))
+    is_pile = ground < ground.max() - 5
+    assert np.ptp(ground) > 0.1 * len(white)
+    assert is_pile.mean() > 0.3
+
+
+def test_the_page_on_intervals_names_the_strips_that_were_tested() -> None:
+    kinds = pd.read_csv(beside.TABLE)["kind"]
+    strips = kinds[kinds.str.contains("strip")]
+    page = (ROOT / "docs" / "how-sure.md").read_text(encoding="utf-8")
+    for part, said in {
+        r"(\d+) d deep": "`poured_depth = {}`",
+        r"(\d+) d wide": "`width = {}`",
+        r"sigma_g ([\d.]+),": "σ_g = {}",
+        r"phi (\d+)": "φ = {}°",
+    }.items():
+        (value,) = set(strips.str.extract(part, expand=False))
+        assert said.format(value) in page
+    assert set(strips.str.extract(r"(\d+) layers", expand=False)) == {"4"}
+    assert set(strips.str.extract(r"n/N ([\d.]+)", expand=False)) == {"0.1"}
+    assert "four mobile layers" in page
+    assert "n/N = 10 %" in page
+    default = PileBed.model_fields["poured_depth"].default
+    assert f"of the default {default:g} none was tested" in page
+
+
+def test_the_page_on_stockpiles_has_every_material() -> None:
+    page = (ROOT / "docs" / "stockpile.md").read_text(encoding="utf-8")
+    words = " ".join(page.split())
+    assert [name for name in erosion.USTAR_T if f"`{name}`" not in words] == []
+
+
+def test_pages_say_what_is_not_answered() -> None:
+    """The words that people look for; what stands there is read by a person."""
+    for name, words in {
+        "questions.md": ["bends", "bank slopes", "turbulence that structures"],
+        "own-profile.md": ["A fence is solid"],
+        "paper.md": ["Figs. 15 and 16", "Eq. 10", "15° alone"],
+    }.items():
+        page = (ROOT / "docs" / name).read_text(encoding="utf-8")
+        assert [word for word in words if word not in page] == []

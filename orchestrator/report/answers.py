@@ -540,8 +540,8 @@ def _of_mixture(row: pd.Series, results: Results) -> Card:
         "Pa",
         f"stress that moves {percent(row['fraction'])} of the finest size, and of the "
         "coarsest",
-        f"{sizes[0]:.3g} mm and {sizes[-1]:.3g} mm; measured: Wilcock and Crowe 2003, "
-        "at the measured stress of d50",
+        f"{sizes[0]:.3g} mm and {sizes[-1]:.3g} mm; beside it: the function that "
+        "Wilcock and Crowe (2003) fitted to transport, at the measured stress of d50",
         last=float(stress[-1]),
         measured=beside[0],
         measured_last=beside[-1],

@@ -138,8 +138,9 @@ def sizes(row: pd.Series, results: Results) -> Head:
     title = "The stress that moves each size of the mixture"
     caption = (
         "Orange: computed, with the interval that so few grains leave; rings: fewer "
-        "than ten grains. Squares: Wilcock and Crowe (2003), at the measured stress of "
-        "d50. An interval that reaches the frame is open."
+        "than ten grains. Squares: the function that Wilcock and Crowe (2003) fitted "
+        "to transport, at the measured stress of d50. An interval that reaches the "
+        "frame is open."
     )
     found = _stresses_of_sizes(row, results)
     name = f"Stress that moves {percent(row['fraction'])} of a size, Pa"

@@ -35,6 +35,11 @@ DRY_GRAINS = Remark(
     "Dry, round grains without cohesion.",
     "Moisture, crusts and fine dust between the grains make them harder to move.",
 )
+SOLID_FENCE = Remark(
+    "A fence is solid.",
+    "Nothing flows through it. Fences that collect sand or dust are about half porous "
+    "and shelter the bed behind them otherwise, which is not computed.",
+)
 FIRST_MOTION = Remark(
     "First motion, not transport.",
     "The answer is when grains start to move, not how many are carried on or how far.",
@@ -193,6 +198,9 @@ def _of_piles(results: Results, piles: pd.DataFrame) -> Iterator[Remark]:
         yield from _counted(pile.scene, pile.bed, x)
         yield from _closed_form(row, pile.bed)
         yield from _model(row, results)
+    fences = [scene for scene in results.study.scenes if _has_fence(scene)]
+    if fences:
+        yield SOLID_FENCE
     beyond = piles[piles["frozen_bed"] > FROZEN_BED]
     if len(beyond):
         text = caption("frozen", beyond=beyond, count=len(piles), limit=FROZEN_BED)
@@ -217,6 +225,11 @@ def _jumps(row: pd.Series, piles: pd.DataFrame) -> Iterator[Remark]:
             "measured thresholds are near. The bed itself does not change so."
         )
         yield Remark("The width of the interval changes with Re*.", text)
+
+
+def _has_fence(scene: Scene) -> bool:
+    """Whether a fence stands on the bed of a scene."""
+    return any(obstacle.kind == "fence" for obstacle in scene.obstacles)
 
 
 def _smoothing(row: pd.Series, bed: PileBed) -> Iterator[Remark]:

@@ -285,7 +285,7 @@ SPANS_OF_SIZES = {
     "stress on the bed, Pa": ["pa"],
     "interval, Pa": ["pa_low", "pa_high"],
     "stress over that of d50": ["hiding"],
-    "measured (Wilcock & Crowe 2003)": ["hiding_wilcock_crowe"],
+    "fitted (Wilcock & Crowe 2003)": ["hiding_wilcock_crowe"],
     USTAR_HEAD: ["ustar0_m_s"],
     "Shields number of its own size": ["shields_own"],
 }

@@ -34,6 +34,8 @@ from orchestrator.types import BoolArray, FloatArray
 
 SHAPES = "os^DvP<X>p8hd*"
 """Markers, in the order in which rows take them."""
+MOST_LOOKS = 7
+"""Markers that a reader tells apart; what would need more is named beside them."""
 SHAPE = "marker"
 """The column that holds a row's marker."""
 LABEL = "label"
@@ -150,13 +152,17 @@ def parted(table: pd.DataFrame, *shown: str) -> tuple[list[str], pd.DataFrame]:
         The columns that part panels: those of what is asked.
     rows : pandas.DataFrame
         The table with a marker and its label for each force law and each combination
-        of how scenes are answered.
+        of how scenes are answered. At more than `MOST_LOOKS` of these the last fields
+        have no markers; the labels name those that differ.
     """
     columns = labels.varying(table, *shown)
     panels = [name for name in columns if name in fields.OF_QUESTION]
     looks = [name for name in columns if name not in panels]
     while looks and _combinations(table, looks).ngroups > len(SHAPES):
         panels.append(looks.pop(0))
+    together = []
+    while looks and _combinations(table, looks).ngroups > MOST_LOOKS:
+        together.append(looks.pop())
     if looks:
         shape = _combinations(table, looks).ngroup()
     else:
@@ -165,11 +171,23 @@ def parted(table: pd.DataFrame, *shown: str) -> tuple[list[str], pd.DataFrame]:
     names = {}
     for number, group in table.groupby(shape):
         law = labels.value("force_law", group["force_law"].iloc[0])
-        told = (labels.methods(group), law, *labels.told(group.iloc[0], looks))
+        told = [labels.methods(group), law, *labels.told(group.iloc[0], looks)]
+        told += [f"several {_name_of(one)}" for one in together if _differs(group[one])]
         names[number] = ", ".join(dict.fromkeys(told))
     markers = dict(enumerate(SHAPES))
     added = {SHAPE: shape.map(markers), LABEL: shape.map(names)}
     return panels, table.assign(**added)
+
+
+def _differs(column: pd.Series) -> bool:
+    """Whether a column has more than one value."""
+    return column.nunique(dropna=False) > 1
+
+
+def _name_of(column: str) -> str:
+    """The symbol of a column, or its label where it has none."""
+    info = labels.words(column)
+    return info.symbol or info.label
 
 
 def _combinations(table: pd.DataFrame, looks: list[str]) -> Any:

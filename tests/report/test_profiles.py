@@ -120,6 +120,13 @@ def test_beds_that_are_compared_count_the_same_metres(fenced: Results) -> None:
     assert (of_fence >= of_bare).all()
 
 
+def test_the_page_of_a_fence_says_that_it_is_solid(
+    fenced: Results, results: Results
+) -> None:
+    assert remarks.SOLID_FENCE in remarks.remarks(fenced)
+    assert remarks.SOLID_FENCE not in remarks.remarks(results)
+
+
 def test_a_comparison_says_where_each_bed_starts(fenced: Results) -> None:
     rows = fenced.joined("pile_threshold").drop_duplicates("scene_id")
     sheet = sheets.short(fenced)

@@ -65,6 +65,35 @@ def test_what_is_asked_parts_panels_and_what_answers_has_markers(
     ]
 
 
+def test_markers_are_few_enough_to_be_told_apart(table: pd.DataFrame) -> None:
+    """Beyond seven the last fields have none, and labels say which of them differ."""
+    base = table.iloc[:1].assign(method="dem")
+    for count, labels_of in ((4, 4), (12, 1)):
+        copies = [base.assign(mobile_layers=i + 1) for i in range(count)]
+        panels, rows = shields.parted(pd.concat(copies, ignore_index=True), *SHOWN)
+        assert panels == []
+        assert rows[SHAPE].nunique() == rows[LABEL].nunique() == labels_of
+    assert rows[LABEL].iloc[0].endswith("several mobile layers")
+    many = [
+        base.assign(method=method, mobile_layers=i + 1)
+        for method, count in (("dem", 6), ("pivot", 1), ("peeling", 1))
+        for i in range(count)
+    ]
+    _, rows = shields.parted(pd.concat(many, ignore_index=True), *SHOWN)
+    assert rows.groupby(LABEL)["method"].unique().str.len().tolist() == [1, 1, 1]
+    named = rows[LABEL].str.contains("several mobile layers")
+    assert named.tolist() == [True] * 6 + [False] * 2
+
+
+def test_a_fitted_function_is_not_called_measured() -> None:
+    (head,) = (
+        head
+        for head, columns in sheets.SPANS_OF_SIZES.items()
+        if "hiding_wilcock_crowe" in columns
+    )
+    assert head == "fitted (Wilcock & Crowe 2003)"
+
+
 def test_page_lists_every_parameter(results: Results) -> None:
     rows = {row[2]: row[3:] for row in sheets.parameters(results).to_numpy().tolist()}
     used = [column for column in fields.COLUMNS if results.scenes[column].notna().any()]
