@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -139,6 +139,7 @@ def complete(
     limit_s: float,
     queue: Queue | None = None,
     after_s: float = 0.0,
+    failing: Container[str] | None = None,
 ) -> Failures:
     """Run cases, and show their progress.
 
@@ -156,6 +157,8 @@ def complete(
         The queue of a cluster, which runs the cases in place of this machine.
     after_s
         Time that is expected after the runs, s.
+    failing
+        Names of the cases of which it is told why they failed; None for all.
 
     Returns
     -------
@@ -166,7 +169,7 @@ def complete(
         return {}
     pools = partial(cluster.pool, queue) if queue else engine.local
     opened = pools(space.cases, workers=workers, limit_s=limit_s)
-    shown = engine.Display(todo.values(), space.cases, workers, after_s)
+    shown = engine.Display(todo.values(), space.cases, workers, after_s, failing)
     with opened as pool, shown as display:
         return engine.run(todo, pool, display, display.watch)
 

@@ -177,13 +177,22 @@ class Experiment:
                 print(f"{what}; no solver was started for them", file=sys.stderr)
             todo = self._todo(space.cases)
             failed = pipeline.complete(
-                todo, space, workers=workers, limit_s=self.limit_s
+                todo,
+                space,
+                workers=workers,
+                limit_s=self.limit_s,
+                failing=self.failing,
             )
             sections = self._write(folder, space, failed)
         failures = {}
         for name, error in failed.items():
             if self.failing is None or name in self.failing:
                 failures[name] = error
+        sought = len(failed) - len(failures)
+        if sought:
+            what = f"{number(sought, 'case')} failed, which is an answer here"
+            where = f"`orchestrator status {out}` names each with its cause"
+            print(f"{what}; {where}", file=sys.stderr)
         said = []
         for section in sections:
             if section.card is not None:

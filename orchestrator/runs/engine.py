@@ -7,7 +7,7 @@ import math
 import sys
 import threading
 import time
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Container, Iterator, Mapping
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from functools import partial
@@ -422,6 +422,8 @@ class Display:
         Number of cores that the cases share.
     after_s
         Time that is expected after the last case, s.
+    failing
+        Names of the cases of which it is told why they failed; None for all.
 
     Attributes
     ----------
@@ -440,6 +442,7 @@ class Display:
         cases: Path,
         workers: int,
         after_s: float,
+        failing: Container[str] | None = None,
     ) -> None:
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn
@@ -447,6 +450,7 @@ class Display:
         self._cases = cases
         self._workers = workers
         self._after_s = after_s
+        self._failing = failing
         # costs of all cases, and of those that have not ended
         self._whole_s = sum(case.cost_s for case in todo)
         self._left_s = self._whole_s
@@ -499,7 +503,8 @@ class Display:
         left = self._show()
         line = f"[{self._ended}/{self._count}] {state}  {case.name}  {left}"
         self._console.print(line)
-        if error is not None:
+        is_told = self._failing is None or case.name in self._failing
+        if error is not None and is_told:
             self._console.print(f"  {error}")
 
     def watch(self, running: Collection[Case]) -> None:

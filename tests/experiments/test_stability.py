@@ -10,6 +10,7 @@ from matplotlib.patches import Rectangle
 from orchestrator.experiments import stability
 from orchestrator.experiments.stability import FOLDER, NOTICED, Map
 from orchestrator.fidelity import known, limits
+from orchestrator.runs import workspace
 
 SMALL = """
 title = "Small"
@@ -40,9 +41,24 @@ def test_a_maps_file_spans_its_axes(path: Path) -> None:
 
 
 @pytest.mark.long
-def test_verdicts_are_those_of_real_runs(tmp_path: Path) -> None:
+def test_verdicts_are_those_of_real_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "small.toml").write_text(SMALL)
-    stability.experiment(tmp_path / "out", tmp_path).run(tmp_path / "out", workers=2)
+    out = tmp_path / "out"
+    stability.experiment(out, tmp_path).run(out, workers=2)
+    said = capsys.readouterr().err
+    (line,) = (line for line in said.splitlines() if "is an answer here" in line)
+    assert line.startswith("1 case failed, which is an answer here; ")
+    assert f"`orchestrator status {out}` names each with its cause" in line
+    listed, has_failed = workspace.status(out)
+    assert has_failed
+    assert "failed: pile-" in listed
+    assert "overlap" in listed
+    # no other line says why
+    assert len([line for line in said.splitlines() if "failed" in line]) == 2
+    assert "exploded" not in said
+    assert "noisy" not in said
     table = pd.read_csv(tmp_path / "out" / "tables" / "maps.csv")
     good, bad = table.sort_values("x").to_dict("records")
     assert good["verdict"] == "good"

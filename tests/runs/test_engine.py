@@ -134,6 +134,19 @@ def test_the_time_left_follows_the_pace_of_the_cases_so_far(tmp_path: Path) -> N
     assert display.done == pytest.approx(1 - 20 / 235)
 
 
+def test_failures_that_are_an_answer_are_counted_and_not_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sought, other = Step(1.0), Step(2.0)
+    display = Display([sought, other], tmp_path, 2, 0.0, failing={other.name})
+    for step in (sought, other):
+        display(step, 1.0, SolverError(f"{step.name} died"))
+    said = capsys.readouterr().err
+    assert f"{sought.name} died" not in said
+    assert f"{other.name} died" in said
+    assert "[1/2] failed" in said
+
+
 def test_a_large_solver_is_served_before_those_that_ask_later() -> None:
     cores, served = Cores(2), []
 
