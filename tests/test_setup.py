@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import venv
+import zipfile
 from hashlib import sha256
 from pathlib import Path
 
@@ -58,3 +59,32 @@ def test_set_up_installs_the_command_of_the_checkout(
     link.symlink_to(command)
     (checkout / "orchestrator/__init__.py").write_text('__version__ = "changed"\n')
     assert says(command) == says(link) == "changed\n"
+
+
+def test_set_up_says_what_it_installs_in_one_line(
+    checkout: Path, tmp_path: Path
+) -> None:
+    info = "sample-1.0.dist-info"
+    contents = {
+        "sample.py": "",
+        f"{info}/METADATA": "Metadata-Version: 2.1\nName: sample\nVersion: 1.0\n",
+        f"{info}/WHEEL": "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
+        f"{info}/RECORD": "",
+    }
+    with zipfile.ZipFile(tmp_path / "sample-1.0-py3-none-any.whl", "w") as wheel:
+        for name, text in contents.items():
+            wheel.writestr(name, text)
+    (checkout / "requirements.lock").write_text("sample==1.0\n")
+    ended = subprocess.run(
+        ["sh", checkout / "tools/setup.sh", "run"],
+        env={**os.environ, "PIP_NO_INDEX": "1", "PIP_FIND_LINKS": str(tmp_path)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=True,
+    )
+    assert list(checkout.glob(".venv/lib/python3*/site-packages/sample.py"))
+    assert ended.stdout.splitlines() == [
+        "setup: making .venv",
+        "setup: installing what requirements.lock pins",
+    ]

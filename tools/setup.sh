@@ -119,7 +119,8 @@ install_venv() {
         python3 -m venv "$environment" || die "$(command -v python3) -m venv failed, see above"
     fi
     for file in $lacking; do
-        pip_install --no-deps -r "$file" || die "pip failed, see above.  Call make again to go on."
+        say "installing what $file pins"
+        pip_install --quiet --no-deps -r "$file" || die "pip failed, see above.  Call make again to go on."
     done
     sha256sum "$@" >"$stamp.new"
     mv "$stamp.new" "$stamp"
