@@ -446,7 +446,9 @@ def by_quantity(numbers: pd.DataFrame) -> pd.DataFrame:
     for (solver, of_level, of_kind, quantity), group in groups:
         is_off = ~group["within"] & group["tolerance"].notna()
         same = theirs[(theirs["solver"] == solver) & (kind == of_kind)]
-        ratio = group["answer"] / group["value"].where(group["value"] != 0)
+        with np.errstate(over="ignore"):
+            ratio = group["answer"] / group["value"].where(group["value"] != 0)
+        ratio = ratio.clip(-LARGEST_ERROR, LARGEST_ERROR)
         rows.append(
             {
                 "solver": solver,
