@@ -11,11 +11,12 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from orchestrator.fidelity import limits
-from orchestrator.study import fields, profile, question, scene, surface_study
+from orchestrator.study import fields, profile, question, scene
 from orchestrator.study.fidelities import AUTO, WRITTEN
 from orchestrator.study.fields import Quantity
 from orchestrator.study.reading import TIME_LIMIT_S
 from orchestrator.study.study import BED
+from orchestrator.surface import study as surface_study
 
 HEAD = f"""# Study files
 

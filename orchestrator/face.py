@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from orchestrator import paper, pipeline, report, tables
+from orchestrator import guests, pipeline, report, tables
 from orchestrator.calculator import BY_FLUID, PARAMETERS
 from orchestrator.calculator.asked import thresholds_and_questions
 from orchestrator.calculator.cli import OPTIONS
@@ -383,7 +383,9 @@ class Opened:
     @property
     def answer(self) -> str:
         """The answer, in words and a short table."""
-        return report.said(self._results, paper.cards(self._results.study, self.tables))
+        return report.said(
+            self._results, guests.cards(self._results.study, self.tables)
+        )
 
     def __repr__(self) -> str:
         """The study in five lines."""

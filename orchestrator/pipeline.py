@@ -8,7 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from orchestrator import paper, plan, report, tables
+from orchestrator import guests, plan, report, tables
+from orchestrator.command import say
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.plan import Plan
 from orchestrator.report.results import Results
@@ -47,6 +48,25 @@ class Finished(NamedTuple):
     failures: Failures
     answer: str = ""
     undrawn: Sequence[str] = ()
+
+    def tell(self) -> int:
+        """Print the answer, the failures, and last the page.
+
+        Returns
+        -------
+        int
+            The exit code of the command.
+        """
+        if self.answer:
+            print(self.answer)
+        for name, error in self.failures.items():
+            say(f"{name} failed: {error}")
+        if self.undrawn:
+            say("the page lacks a figure; the same command draws it again")
+        print(self.page)
+        if self.failures:
+            return 3
+        return 1 if self.undrawn else 0
 
 
 def run(
@@ -297,13 +317,13 @@ def _draw(
     results = Results(study, planned, made, space.cases)
     times = tables.timings(planned, states)
     causes = {name: str(error) for name, error in failures.items()}
-    guests = paper.cards(study, made)
+    cards = guests.cards(study, made)
     with space.renewed():
         tables.write(made, space, "tables")
         tables.write({"timings": times}, space, "timings")
-        answer = report.said(results, guests)
+        answer = report.said(results, cards)
         try:
-            undrawn = report.write(results, causes, space, guests, every)
+            undrawn = report.write(results, causes, space, cards, every)
         except BaseException:
             # no memory for a picture, or an interrupt: the answer is found
             print(answer, file=sys.stderr)

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import orchestrator
+from orchestrator.guests import GUESTS
 
 PACKAGE = Path(orchestrator.__file__).parent
 PAGE = PACKAGE.parent / "docs" / "architecture.md"
@@ -93,6 +94,17 @@ def _reached(start: str, graph: dict[str, set[str]]) -> set[str]:
                 reached.add(other)
                 todo.append(other)
     return reached
+
+
+def test_no_module_of_the_core_imports_a_guest() -> None:
+    guests = set(GUESTS)
+    rooms = _rooms()
+    assert set(rooms[-len(GUESTS) :]) == guests, "they are the last of the document"
+    inward = []
+    for name, other in _arrows():
+        if _room(other) in guests and _room(name) not in guests:
+            inward.append(f"{name} imports {other}")
+    assert inward == []
 
 
 def test_no_modules_import_each_other_in_a_circle() -> None:

@@ -20,9 +20,9 @@ from PIL import Image
 
 import orchestrator
 from orchestrator import __version__, cli, plan, tables
-from orchestrator.experiments import erosion
 from orchestrator.physics import beside
 from orchestrator.report.results import Results
+from orchestrator.stockpile import erosion
 from orchestrator.study import study
 from orchestrator.study.parts import PileBed
 from tests.conftest import Command
@@ -58,7 +58,8 @@ def test_the_index_has_every_page_that_a_page_links() -> None:
 
 def test_the_page_of_commands_has_every_command_and_preset() -> None:
     text = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
-    assert [name for name in cli.COMMANDS if f"| `{name}" not in text] == []
+    names = [command.name for command in cli.commands()]
+    assert [name for name in names if f"| `{name}" not in text] == []
     presets = {path.stem for path in (ROOT / "orchestrator").glob("*/presets/*.toml")}
     _, listed = text.split("## Presets")
     named = {

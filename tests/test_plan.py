@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator import plan
-from orchestrator.experiments import budget
+from orchestrator.lab import budget
 from orchestrator.study import study
 
 PILE = """

@@ -14,7 +14,7 @@ from unittest.mock import patch
 import numpy as np
 import pandas as pd
 
-from orchestrator.experiments.validate import FOLDER, hoppers
+from orchestrator.lab.validate import FOLDER, hoppers
 from orchestrator.physics import saltation
 from orchestrator.physics.laws import SphereDrag
 from orchestrator.types import FloatArray

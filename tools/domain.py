@@ -8,7 +8,7 @@ field of study files is new, this is enough: every scene had its default.
 
 import sys
 
-from orchestrator.experiments import ladder
+from orchestrator.lab import ladder
 from orchestrator.study import study
 from orchestrator.tables import csv
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.cli import main
-from orchestrator.study.raster import geotiff
+from orchestrator.surface.raster import geotiff
 
 PICTURE = Path(__file__).parents[1] / "docs" / "figures" / "surface.png"
 EAST, NORTH = 512_300.0, 5_640_800.0

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from orchestrator.experiments import validate
-from orchestrator.experiments.strips import FEWEST, MOVED, ROUGH, Strips
 from orchestrator.grains import threshold
 from orchestrator.grains.loads import Geometry
+from orchestrator.lab import validate
+from orchestrator.lab.strips import FEWEST, MOVED, ROUGH, Strips
 from orchestrator.runs import case as cases
 from orchestrator.runs import engine
 from orchestrator.study import study

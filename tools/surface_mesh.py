@@ -10,9 +10,9 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-from orchestrator.flow import mesh3
-from orchestrator.flow.mesh3 import Columns, Level, Sizes
 from orchestrator.runs.case import templates
+from orchestrator.surface import mesh
+from orchestrator.surface.mesh import Columns, Level, Sizes
 from orchestrator.types import FloatArray
 
 HEIGHT, RADIUS = 10.0, 30.0
@@ -30,22 +30,22 @@ def hill(x: FloatArray, y: FloatArray) -> FloatArray:
     return np.asarray(HEIGHT * np.cos(np.pi / 2 * away) ** 2)
 
 
-def mesh() -> Columns:
+def columns() -> Columns:
     """The mesh over the hill."""
     form = Sizes(-RADIUS, RADIUS, -RADIUS, RADIUS)
-    x, y = mesh3.grid_lines(form, HEIGHT, RADIUS / LEVEL.per_radius, LEVEL)
-    count = mesh3.rows(HEIGHT, FIRST_CELL, LEVEL)
+    x, y = mesh.grid_lines(form, HEIGHT, RADIUS / LEVEL.per_radius, LEVEL)
+    count = mesh.rows(HEIGHT, FIRST_CELL, LEVEL)
     return Columns.over(hill, x, y, height=HEIGHT, first_cell=FIRST_CELL, count=count)
 
 
 def write(path: Path) -> None:
     """Write the mesh as gmsh does, which gmshToFoam reads."""
-    columns = mesh()
-    patches = columns.patches
+    made = columns()
+    patches = made.patches
     quads = [faces.reshape(-1, 4) for faces, _ in patches.values()]
     numbers = np.arange(1, len(patches) + 1)
     on_quads = np.repeat(numbers, [len(each) for each in quads])
-    in_cells = np.full(columns.cells, len(patches) + 1)
+    in_cells = np.full(made.cells, len(patches) + 1)
     tags = {
         name: np.array([number, 2])
         for name, number in zip(patches, numbers, strict=True)
@@ -53,8 +53,8 @@ def write(path: Path) -> None:
     tags["air"] = np.array([len(patches) + 1, 3])
     tagged = [on_quads, in_cells]
     whole = meshio.Mesh(
-        columns.corners.reshape(-1, 3),
-        [("quad", np.concatenate(quads)), ("hexahedron", columns.hexahedra)],
+        made.corners.reshape(-1, 3),
+        [("quad", np.concatenate(quads)), ("hexahedron", made.hexahedra)],
         cell_data={"gmsh:physical": tagged, "gmsh:geometrical": tagged},
         field_data=tags,
     )

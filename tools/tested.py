@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from orchestrator.experiments.strips import MOVED
-from orchestrator.experiments.validate import (
+from orchestrator.lab.strips import MOVED
+from orchestrator.lab.validate import (
     EVENTS,
     FOLDER,
     GUST,

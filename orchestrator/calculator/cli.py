@@ -4,7 +4,6 @@ import argparse
 import itertools
 import math
 import sys
-from typing import Any
 
 from orchestrator.calculator import (
     BY_FLUID,
@@ -15,6 +14,7 @@ from orchestrator.calculator import (
 )
 from orchestrator.calculator.asked import Value, thresholds_and_questions
 from orchestrator.calculator.printed import as_json, as_text, print_csv
+from orchestrator.command import Parser
 from orchestrator.errors import InputError
 from orchestrator.physics.fluids import KINDS, PAPER, STANDARD_DEG_C
 from orchestrator.study.units import meant, number
@@ -51,16 +51,15 @@ BED_SLOPE_HELP = (
 )
 
 
-def add(commands: Any) -> None:
-    """Add ``threshold`` to the parser of the program.
+def options(command: Parser) -> None:
+    """Add the options of the command.
 
     Parameters
     ----------
-    commands
-        The subparsers of the program, as `argparse` makes them.
+    command
+        Its parser.
     """
-    about = "compute when one grain starts to move, closed form, at once"
-    command = commands.add_parser("threshold", help=about, epilog=RANGES)
+    command.epilog = RANGES
     for name in PARAMETERS:
         command.add_argument(
             OPTIONS[name],
@@ -85,7 +84,6 @@ def add(commands: Any) -> None:
     form.add_argument("--json", action="store_true", help=text)
     text = "a row for each point and law"
     form.add_argument("--csv", action="store_true", help=text)
-    command.set_defaults(run=_run)
 
 
 def _help(name: str) -> str:
@@ -103,7 +101,7 @@ def _help(name: str) -> str:
     return "; ".join(parts)
 
 
-def _run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Print the thresholds that the options ask for, and questions on them."""
     axes: dict[str, list[Value]] = {}
     for name in PARAMETERS:

@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from orchestrator.guests import Offer
+
 if TYPE_CHECKING:
     from orchestrator.report.page import Guest
     from orchestrator.study.study import Study
@@ -38,3 +40,6 @@ def cards(study: "Study", tables: "Tables") -> "list[Guest]":
     if all(one.verdict == "no data" for one in judged):
         return []
     return [claims.guest(judged, tables, CLAIMS)]
+
+
+OFFER = Offer(cards=cards)

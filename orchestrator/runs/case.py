@@ -26,7 +26,7 @@ MAKERS = (
     "bed",
     "digits.py",
     "errors.py",
-    "experiments/surface_truth.py",
+    "experiments/truth.py",
     "flow",
     "grains",
     "physics",

@@ -26,8 +26,8 @@ from orchestrator.study.heads import (
     more_cells,
     name_of,
 )
-from orchestrator.study.surface import FEWEST, MOST_NODES, Raster
 from orchestrator.study.units import number
+from orchestrator.surface.heights import FEWEST, MOST_NODES, Raster
 from orchestrator.types import FloatArray, IntArray
 
 AXES = {"x": EAST, "y": NORTH, "z": HEIGHT}

@@ -48,7 +48,7 @@ from orchestrator.study.reading import (
 from orchestrator.study.scene import Scene, roughness_length
 from orchestrator.study.shapes import SHAPES
 from orchestrator.study.source import Source, decoded, find, presets, read_bytes
-from orchestrator.study.surface_study import TABLES as IN_SPACE
+from orchestrator.surface.study import TABLES as IN_SPACE
 
 BED = {"kind": "grain", "roughness": "d/30"}
 """Fields of a bed that a file may leave out."""

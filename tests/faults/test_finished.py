@@ -13,6 +13,7 @@ import pytest
 
 import orchestrator as face
 from orchestrator import cli, plan
+from orchestrator.commands.study import finished
 from orchestrator.errors import InputError
 from orchestrator.report import shields
 from orchestrator.report.results import Results
@@ -171,7 +172,7 @@ LINES = EDITED.splitlines(keepends=True)
 
 def _is_finished(file: Path, out: Path, tolerance: float | None = None) -> bool:
     options = Namespace(source=str(file), out=out, tolerance=tolerance)
-    return bool(cli.finished(options))
+    return bool(finished(options))
 
 
 @pytest.fixture(scope="module")

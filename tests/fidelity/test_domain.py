@@ -6,13 +6,13 @@ from io import StringIO
 import pandas as pd
 import pytest
 
-from orchestrator.experiments import ladder
-from orchestrator.experiments.experiment import piles
+from orchestrator.experiment import piles
 from orchestrator.fidelity import domain
 from orchestrator.fidelity.classes import FLOW, GRAINS, scene_class
 from orchestrator.fidelity.decision import decide
 from orchestrator.fidelity.fidelities import FIDELITIES, named
 from orchestrator.fidelity.known import FOLDER, UNKNOWN, known
+from orchestrator.lab import ladder
 from orchestrator.study import study
 from orchestrator.study.fields import FIELDS
 from orchestrator.study.scene import Scene

@@ -5,7 +5,6 @@ import re
 import pytest
 
 from orchestrator.errors import InputError
-from orchestrator.experiments.ladder import RUNGS
 from orchestrator.fidelity.fidelities import (
     FIDELITIES,
     FLAT,
@@ -16,6 +15,7 @@ from orchestrator.fidelity.fidelities import (
     fidelity_of,
     named,
 )
+from orchestrator.lab.ladder import RUNGS
 from orchestrator.study import study
 from orchestrator.study.closed_form import closed_form
 from orchestrator.study.scene import Scene

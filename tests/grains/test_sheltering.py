@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from orchestrator.bed.packing import Packing, Places
-from orchestrator.experiments import validate
-from orchestrator.experiments.sphere import sphere
 from orchestrator.grains import peeling, sheltering
 from orchestrator.grains.loads import Geometry
 from orchestrator.grains.peeling import ForceTable, Loading
+from orchestrator.lab import validate
+from orchestrator.lab.sphere import sphere
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import threshold

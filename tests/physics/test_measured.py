@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.experiments.validate import FOLDER
+from orchestrator.lab.validate import FOLDER
 from orchestrator.physics import curves
 from orchestrator.physics.beside import FIELD, MEASURED, beside, sentences
 from orchestrator.physics.measured import (

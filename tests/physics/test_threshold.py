@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike
 
 from orchestrator.physics import curves
 from orchestrator.physics import threshold as physics
-from orchestrator.physics.across import threshold_across
 from orchestrator.physics.constants import LIFT_COEFFICIENT
 from orchestrator.physics.laws import LAWS, Bridged, Exposure
 from orchestrator.physics.threshold import (
@@ -18,6 +17,7 @@ from orchestrator.physics.threshold import (
     shields_at,
     threshold,
 )
+from orchestrator.surface.across import threshold_across
 from orchestrator.types import FloatArray
 
 few = settings(max_examples=30, deadline=None)

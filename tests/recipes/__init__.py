@@ -17,9 +17,7 @@ import pandas as pd
 from orchestrator.bed.poured import BED, PouredBed
 from orchestrator.flow import theory
 from orchestrator.flow.case import WALL_STRESS, FlowCase
-from orchestrator.flow.mesh3 import Level
 from orchestrator.flow.stress import WallStress
-from orchestrator.flow.surface_case import SurfaceFlowCase
 from orchestrator.grains import pile
 from orchestrator.grains.cells import batches
 from orchestrator.grains.loads import Geometry
@@ -27,9 +25,12 @@ from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile, PileCase, Worn, WornFlow
 from orchestrator.runs.case import Case, template_files
 from orchestrator.runs.files import canonical_json, digest_files, digest_text
-from orchestrator.study import study, surface
+from orchestrator.study import study
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
+from orchestrator.surface import heights as surface
+from orchestrator.surface.case import SurfaceFlowCase
+from orchestrator.surface.mesh import Level
 from orchestrator.types import FloatArray
 
 FOLDER = Path(__file__).parent
@@ -108,7 +109,7 @@ def advice(names: list[str]) -> str:
         "did not mean to change them, undo it. Else raise `recipe` by one in the class "
         "of each kind that is named: flow FlowCase (orchestrator/flow/case.py), which "
         "raises that of worn too; surface SurfaceFlowCase "
-        "(orchestrator/flow/surface_case.py); poured PouredBed (orchestrator/bed/poured.py); pile "
+        "(orchestrator/surface/case.py); poured PouredBed (orchestrator/bed/poured.py); pile "
         "PileCase (orchestrator/grains/pile.py); cells SingleGrainCase "
         f"(orchestrator/grains/cells.py). Then run `{COMMAND}` and commit "
         "tests/recipes/pinned.json with it."

@@ -10,14 +10,7 @@ from orchestrator.physics import saltation
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.threshold import SingleGrain, thresholds_of
 from orchestrator.physics.velocity import measurable_speeds
-from orchestrator.report import (
-    answers,
-    drawing,
-    head,
-    head_grain,
-    shields,
-    single,
-)
+from orchestrator.report import answers, drawing, head, head_grain, shields, single
 from orchestrator.report.card import Card, Number, Worth, lines
 from orchestrator.report.results import Results
 from tests.report.conftest import changed, copies, legend_of, only

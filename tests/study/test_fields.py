@@ -9,7 +9,7 @@ from pydantic.fields import FieldInfo
 
 from orchestrator import plan
 from orchestrator.errors import InputError
-from orchestrator.experiments.ladder import RUNGS
+from orchestrator.lab.ladder import RUNGS
 from orchestrator.study import fields, study
 from orchestrator.study.fields import Quantity
 from orchestrator.study.parts import Gusts, LogNormal

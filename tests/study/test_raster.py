@@ -15,9 +15,9 @@ from PIL import Image
 from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
 from orchestrator.errors import InputError
-from orchestrator.study import raster
-from orchestrator.study.raster import geotiff, read_surface
-from orchestrator.study.surface import Surface
+from orchestrator.surface import raster
+from orchestrator.surface.heights import Surface
+from orchestrator.surface.raster import geotiff, read_surface
 from orchestrator.types import FloatArray
 
 EAST, NORTH = 512_300.0, 5_640_800.0

@@ -325,8 +325,8 @@ def test_a_level_bed_has_no_height(bed: str) -> None:
 
 SOLVERS = """
 import sys
-from orchestrator.study import surface_study
-from orchestrator.study import study
+from orchestrator.surface import study as surface_study
+from orchestrator.study import study as surface_study
 for name in study.presets():
     assert (surface_study.load(name) or study.load(name)).scenes
 print(*set(sys.modules) & {"orchestrator.flow", "orchestrator.solvers", "gmsh", "pyvista"})

@@ -10,9 +10,10 @@ from orchestrator.calculator import PARAMETERS
 from orchestrator.calculator.asked import thresholds_and_questions
 from orchestrator.calculator.cli import OPTIONS
 from orchestrator.errors import InputError
-from orchestrator.study import study, surface_study, units
+from orchestrator.study import study, units
 from orchestrator.study.parts import PileBed
 from orchestrator.study.source import presets
+from orchestrator.surface import study as surface_study
 
 WATER = "fluid.kind = 'water'\n"
 QUARTZ = f"{WATER}grain.density = 2650.0\n"

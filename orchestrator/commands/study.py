@@ -1,0 +1,90 @@
+"""The command `study`."""
+
+import sys
+from argparse import Namespace
+from pathlib import Path
+
+from orchestrator import guests
+from orchestrator.command import Command, Parser, add_run_options
+from orchestrator.runs.cluster import SYSTEMS, Queue
+from orchestrator.study.units import number
+
+
+def _options(command: Parser) -> None:
+    """Add the options of the command."""
+    add_run_options(command, "first-look", of="file")
+    text = "accepted relative error of a threshold, such as 0.05; the fastest models "
+    text += "known to be within it are taken"
+    command.add_argument("--tolerance", type=number, metavar="X", help=text)
+    text = "run the cases in jobs of a queue: %(choices)s; its settings stand in the "
+    text += "table [cluster] of the file"
+    queues = sorted(SYSTEMS)
+    command.add_argument("--cluster", choices=queues, metavar="QUEUE", help=text)
+
+
+def _run(options: Namespace) -> int:
+    """Run a study; of one that was finished before its answer is printed."""
+    if not options.plan:
+        answered = finished(options)
+        if answered:
+            print("it was answered already; no solver was started", file=sys.stderr)
+            print(*answered, sep="\n")
+            return 0
+    code = guests.taken_over(options)
+    if code is not None:
+        return code
+    from orchestrator import pipeline, plan
+    from orchestrator.study.study import load
+
+    study = load(options.source, options.tolerance)
+    out = options.out or Path("results") / study.name
+    if options.plan:
+        cases = out.absolute() / "cases"
+        print(*plan.forecast(study, cases, options.workers), sep="\n")
+        return 0
+    queue = Queue(options.cluster, study.cluster) if options.cluster else None
+    ended = pipeline.run(study, out, workers=options.workers, queue=queue)
+    return ended.tell()
+
+
+def finished(options: Namespace) -> tuple[str, Path] | None:
+    """Look up a study that was finished before.
+
+    No study is read: the bytes of its files are compared with those that it was made
+    from.
+
+    Parameters
+    ----------
+    options
+        The options of the command ``study``.
+
+    Returns
+    -------
+    answer, page : tuple, or None
+        The answer and the file of the page; None if it was not finished.
+    """
+    from orchestrator.runs import workspace
+    from orchestrator.study.source import Source, digests_now, find
+
+    file = find(options.source).absolute()
+    root = (options.out or Path("results") / file.stem).absolute()
+    try:
+        digests = digests_now(file.parent, workspace.files_of(root))
+    except OSError:
+        return None
+    now = Source(str(file), digests, options.tolerance)
+    return workspace.finished(root, file.stem, now.described(root))
+
+
+COMMAND = Command(
+    name="study",
+    order=0,
+    help="run the missing cases of a study, and write its page",
+    page="docs/first-study.md",
+    examples={
+        "study first-look": "run a preset; its page is results/first-look",
+        "study sand.toml --plan": "list what your own file would run, and end",
+    },
+    options=_options,
+    run=_run,
+)

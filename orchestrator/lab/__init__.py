@@ -1,0 +1,115 @@
+"""Measures the package: ladder, budget, maps of failure, validation."""
+
+from argparse import Namespace
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from orchestrator.command import Command, Parser, add_run_options
+from orchestrator.guests import Offer
+from orchestrator.surface import TRUTH
+
+if TYPE_CHECKING:
+    from orchestrator.experiment import Experiment
+
+
+def _on_preset(command: Parser) -> None:
+    """Add the options of a command on the preset of its own name."""
+    _, _, name = command.prog.partition(" ")
+    add_run_options(command, name)
+
+
+def _on_own_scenes(command: Parser) -> None:
+    """Add the options of a command on scenes of its own."""
+    add_run_options(command, "")
+
+
+def _of_validate(command: Parser) -> None:
+    """Add the options of `validate`."""
+    _on_preset(command)
+    text = "flows over beds in three dimensions alone: all, or one comparison"
+    command.add_argument("--surfaces", choices=("all", *TRUTH), help=text)
+
+
+def _run(options: Namespace) -> int:
+    """Run an experiment on a study."""
+    from orchestrator.study.study import load
+
+    study = load(options.source, options.tolerance)
+    out = options.out or Path("results") / options.command
+    module = import_module(f"orchestrator.lab.{options.command}")
+    experiment: Experiment = module.experiment(study, out)
+    return experiment.command(options, out)
+
+
+def _run_stability(options: Namespace) -> int:
+    """Run the maps of failure."""
+    from orchestrator.lab import stability
+
+    out = options.out or Path("results") / options.command
+    return stability.experiment(out).command(options, out)
+
+
+def _run_validate(options: Namespace) -> int:
+    """Run the validation, or its flows over beds in three dimensions alone."""
+    if not options.surfaces:
+        return _run(options)
+    from orchestrator.surface import truth
+
+    names = TRUTH if options.surfaces == "all" else (options.surfaces,)
+    out = options.out or Path("results") / "surfaces"
+    return truth.experiment(names).command(options, out)
+
+
+OFFER = Offer(
+    commands=(
+        Command(
+            name="ladder",
+            order=6,
+            help="measure the cost and the error of each fidelity",
+            page="docs/ladder.md",
+            examples={
+                "ladder --plan": "list what the preset would run; it takes hours",
+                "ladder dune.toml --out results/mine": "measure on your own scenes",
+            },
+            options=_on_preset,
+            run=_run,
+        ),
+        Command(
+            name="budget",
+            order=7,
+            help="measure how much each assumption changes a threshold",
+            page="docs/budget.md",
+            examples={
+                "budget --plan": "list what the preset would run",
+                "budget sand.toml": "the effect of each assumption on your own study",
+            },
+            options=_on_preset,
+            run=_run,
+        ),
+        Command(
+            name="stability",
+            order=8,
+            help="draw maps of where each method fails; for developers",
+            page="docs/stability.md",
+            examples={
+                "stability --plan": "list what would run",
+                "stability --workers 1": "run one case at a time",
+            },
+            options=_on_own_scenes,
+            run=_run_stability,
+        ),
+        Command(
+            name="validate",
+            order=9,
+            help="compare the models with measured thresholds",
+            page="docs/validation.md",
+            examples={
+                "validate --plan": "list what would run",
+                "validate": "compare every model with every measurement",
+            },
+            options=_of_validate,
+            run=_run_validate,
+        ),
+    )
+)

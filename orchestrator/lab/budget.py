@@ -1,0 +1,710 @@
+"""The budget: how far the choices that all fidelities share move a threshold.
+
+A choice is changed alone, by the cheapest fidelity that feels it.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure as Canvas
+
+from orchestrator import plan
+from orchestrator.digits import percent
+from orchestrator.errors import InputError
+from orchestrator.experiment import Experiment, Results, Runs, label, piles
+from orchestrator.fidelity import limits, spread
+from orchestrator.fidelity.decision import Decision, on_fidelity
+from orchestrator.fidelity.fidelities import OWN, Fidelity, named
+from orchestrator.fidelity.spread import FROZEN
+from orchestrator.grains.pile import Pile
+from orchestrator.physics.laws import LAWS
+from orchestrator.report import style
+from orchestrator.report.card import Card, Number, Worth
+from orchestrator.report.page import Section
+from orchestrator.report.results import FRACTION
+from orchestrator.report.style import Figure
+from orchestrator.study.closed_form import law_holds
+from orchestrator.study.fidelities import Fields
+from orchestrator.study.scene import Scene
+from orchestrator.study.study import Study, changed, value_of
+from orchestrator.tables.rows import shields
+
+QUASI_STATIC = named("static")
+"""Fidelity of the choices but for those that dynamics alone feel."""
+DYNAMIC = named("paper")
+"""Fidelity whose grains move where a choice is felt by dynamics alone."""
+SEEDS = (1, 2, 3)
+"""Other draws of a random packing that are as good."""
+QUANTITIES = {
+    "shields": "Shields number $θ$",
+    "ustar0": "undisturbed friction velocity $u^*_0$",
+}
+"""What a choice moves, with its label in figures."""
+COLOURS = {
+    "shields": "#0072b2",
+    "ustar0": "#d55e00",
+}
+BAR = 0.38
+"""Height of a bar, rows of a figure."""
+OFFSETS = {
+    "shields": BAR / 2,
+    "ustar0": -BAR / 2,
+}
+"""Middles of the bars over that of their row, rows."""
+ENDS = ["shields_low", "shields_high", "ustar0_low", "ustar0_high"]
+"""Columns: how far each quantity moves down and up, relative."""
+BASE = "as asked"
+"""End of the name, in the plan, of a pile without a change."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One choice that all fidelities share, and what else it could be.
+
+    Attributes
+    ----------
+    name
+        Its name.
+    why
+        Why it could be something else, within what measurements and good practice
+        leave open.
+    field
+        The field of a scene that it is.
+    values
+        Alternatives: values of the field.
+    times
+        Alternatives: factors on the scene's value.
+    beside
+        Alternatives: sums added to the scene's value, degrees.
+    packings
+        Whether "all" piles have it, "lattices" or "poured" beds alone.
+    of_solved_flow
+        Whether it moves nothing under another flow than a solved one.
+    dynamic
+        Whether DEM alone feels it.
+    """
+
+    name: str
+    why: str
+    field: str
+    values: Sequence[Any] = ()
+    times: Sequence[float] = ()
+    beside: Sequence[float] = ()
+    packings: str = "all"
+    of_solved_flow: bool = False
+    dynamic: bool = False
+
+    def fidelity(self, scene: Scene) -> Fidelity:
+        """Choose the fidelity by which it is changed in a scene.
+
+        Parameters
+        ----------
+        scene
+            The scene.
+
+        Returns
+        -------
+        Fidelity
+            The flow is that of `QUASI_STATIC`; a flow model that is not solved is kept.
+        """
+        flow = QUASI_STATIC.flow if scene.method.flow.model == "solve" else OWN
+        grains = DYNAMIC.grains if self.dynamic else QUASI_STATIC.grains
+        return Fidelity(f"{flow.name} | {grains.name}", "", flow, grains)
+
+    def scenes(self, scene: Scene) -> Iterator[tuple[str, Scene]]:
+        """List the alternatives that a scene can have.
+
+        Parameters
+        ----------
+        scene
+            The scene.
+
+        Yields
+        ------
+        name, other
+            The alternative's name, and the scene with it.
+        """
+        if not self._concerns(scene):
+            return
+        for name, fields in self._alternatives(scene).items():
+            try:
+                other = changed(scene, fields)
+            except InputError:
+                # the scene cannot have it
+                continue
+            if other != scene and self._holds(other):
+                yield name, other
+
+    def _concerns(self, scene: Scene) -> bool:
+        """Whether a scene has this choice."""
+        others = "lattices" if scene.is_poured else "poured"
+        if self.packings == others:
+            return False
+        return scene.method.flow.model == "solve" or not self.of_solved_flow
+
+    def _holds(self, other: Scene) -> bool:
+        """Whether a scene with an alternative is one to compare with."""
+        return True
+
+    def _value(self, scene: Scene) -> Any:
+        """What a scene has."""
+        return value_of(scene, self.field)
+
+    def _alternatives(self, scene: Scene) -> dict[str, Fields]:
+        """The fields that each alternative sets, by its name."""
+        others = {str(other): other for other in self.values}
+        for factor in self.times:
+            others[f"{factor:g} times"] = factor * self._value(scene)
+        for added in self.beside:
+            others[f"{added:+g}°"] = self._value(scene) + added
+        return {name: {self.field: other} for name, other in others.items()}
+
+
+class _FirstCell(Choice):
+    """The height of the first cell, which a scene may leave open."""
+
+    def _value(self, scene: Scene) -> float:
+        return scene.first_cell_height
+
+
+class _ForceLaw(Choice):
+    """The force law: every law that holds, but for those whose torque peeling lacks."""
+
+    def _holds(self, other: Scene) -> bool:
+        return law_holds(other)
+
+    def _alternatives(self, scene: Scene) -> dict[str, Fields]:
+        plain = {name: law for name, law in LAWS.items() if not law.turns}
+        return {law.label: {self.field: name} for name, law in plain.items()}
+
+
+class _Packing(Choice):
+    """The packing: on lattices other rows and gaps, on poured beds other seeds."""
+
+    def _alternatives(self, scene: Scene) -> dict[str, Fields]:
+        if scene.is_poured:
+            return {f"poured, seed {seed}": {"bed.seed": seed} for seed in SEEDS}
+        alternatives: dict[str, Fields] = {
+            "rows along the slope": {"bed.packing": "aligned"},
+            "horizontal rows": {"bed.packing": "horizontal"},
+        }
+        for seed in SEEDS:
+            alternatives[f"random gaps, seed {seed}"] = {
+                "bed.packing": "disordered",
+                "bed.disorder": 0.05,
+                "bed.seed": seed,
+            }
+        return alternatives
+
+
+CHOICES: tuple[Choice, ...] = (
+    _FirstCell(
+        name="first cell",
+        why="A wall function asks for no one height of the cells on the bed.",
+        field="method.flow.first_cell_height",
+        times=[0.5, 2.0],
+        of_solved_flow=True,
+    ),
+    Choice(
+        name="turbulence model",
+        why="No model is right for all flows that separate.",
+        field="method.flow.turbulence_model",
+        values=["kEpsilon", "RNGkEpsilon", "realizableKE", "kOmegaSST"],
+        of_solved_flow=True,
+    ),
+    Choice(
+        name="reading of the stress",
+        why="The paper reads it off the first cells by Eq. 10.",
+        field="forces.stress",
+        values=["wall", "eq10"],
+        of_solved_flow=True,
+    ),
+    Choice(
+        name="averaging length",
+        why="The stress at a sharp crest has no limit; it is averaged on a length.",
+        field="forces.averaging_length",
+        times=[0.5, 2.0],
+        of_solved_flow=True,
+    ),
+    _ForceLaw(
+        name="force law",
+        why="All laws that hold at the Re* of the scene.",
+        field="forces.law",
+    ),
+    Choice(
+        name="roughness length",
+        why="Measured ones of beds of equal grains are between d/30 and d/10.",
+        field="bed.roughness",
+        values=["d/10", "d/30"],
+    ),
+    Choice(
+        name="entrainment angle",
+        why="The pockets of one bed differ by more than that.",
+        field="bed.entrainment_angle_deg",
+        beside=[-5.0, 5.0],
+        packings="lattices",
+    ),
+    Choice(
+        name="lift coefficient",
+        why="Saffman's is that of an unbounded shear; measured ones scatter by more.",
+        field="forces.lift_coefficient",
+        times=[0.5, 1.5],
+    ),
+    _Packing(
+        name="packing",
+        why="Of a bed that was not seen neither rows nor gaps are known.",
+        field="bed.packing",
+    ),
+    Choice(
+        name="exposure",
+        why="The flow meets all poured grains at one height, or each at its own.",
+        field="forces.exposure",
+        values=["alike", "protrusion"],
+        packings="poured",
+    ),
+    Choice(
+        name="criterion of motion",
+        why="What counts as moved is a convention: a sixth to a half of a diameter.",
+        field="threshold.displacement",
+        values=[0.15, 0.5],
+    ),
+    Choice(
+        name="friction angle",
+        why="A sand's is known to a few degrees. A poured bed is poured anew by it.",
+        field="grain.friction_angle_deg",
+        beside=[-5.0, 5.0],
+        dynamic=True,
+    ),
+    Choice(
+        name=FROZEN,
+        why="The paper, and every fidelity, keeps the flow of the whole pile until the "
+        "last grain has gone. Else the bed line is drawn anew after each tenth.",
+        field="threshold.update",
+        values=[0.1],
+        of_solved_flow=True,
+    ),
+)
+"""The choices that all fidelities share."""
+
+
+class Change(NamedTuple):
+    """An alternative of a choice at a scene.
+
+    Attributes
+    ----------
+    scene
+        The scene.
+    choice
+        The choice.
+    alternative
+        Name of the alternative.
+    base, other
+        Names in the plan of the pile without it and with it.
+    """
+
+    scene: Scene
+    choice: Choice
+    alternative: str
+    base: str
+    other: str
+
+
+def changes(study: Study) -> tuple[list[Change], dict[str, Decision]]:
+    """List the alternatives of each pile of a study.
+
+    Parameters
+    ----------
+    study
+        The study.
+
+    Returns
+    -------
+    listed, asked
+        The alternatives, and the piles to be answered by their names in the plan.
+    """
+    listed: list[Change] = []
+    asked: dict[str, Decision] = {}
+    why = "the budget changes one choice"
+    for scene in piles(study):
+        for choice in CHOICES:
+            fidelity = choice.fidelity(scene)
+            start = f"{scene.id} | {fidelity.name} | "
+            base = f"{start}{BASE}"
+            asked[base] = on_fidelity(scene, fidelity, why)
+            for name, changed_scene in choice.scenes(scene):
+                other = f"{start}{choice.name}: {name}"
+                asked[other] = on_fidelity(changed_scene, fidelity, why)
+                listed.append(Change(scene, choice, name, base, other))
+    return listed, asked
+
+
+def experiment(study: Study, out: Path) -> Experiment:
+    """Find what each shared choice is worth, changed alone on the piles of a study.
+
+    Parameters
+    ----------
+    study
+        The study.
+    out
+        Directory of its runs.
+
+    Returns
+    -------
+    Experiment
+        The experiment.
+
+    Raises
+    ------
+    InputError
+        If the study has no pile, or a scene is beyond the limits of the methods.
+    """
+    limits.check_study(study)
+    listed, asked = changes(study)
+    planned = plan.of(asked, cases=out.absolute() / "cases")
+
+    def results(runs: Runs) -> Results:
+        moved = measure(listed, runs)
+        if moved.empty:
+            return {}, ()
+        shared = shares(moved)
+        tables = {"changes": moved, "shares": shared, "budget": known(shared)}
+        return tables, _sections(listed, moved, shared, runs)
+
+    # a flow model may refuse a bed: only runs of the scenes as they are asked count
+    # as failed
+    failing = set()
+    for change in listed:
+        failing |= {run.name for run in planned.piles[change.base].runs}
+    return Experiment(
+        "budget",
+        "What a threshold is worth",
+        planned,
+        results,
+        limit_s=study.time_limit_s,
+        failing=failing,
+        source=study.source,
+    )
+
+
+def measure(listed: Sequence[Change], runs: Runs) -> pd.DataFrame:
+    """Measure how far each alternative moves the threshold.
+
+    Parameters
+    ----------
+    listed
+        The alternatives.
+    runs
+        The runs.
+
+    Returns
+    -------
+    DataFrame
+        A row for each scene, alternative and fraction: the relative change of the
+        Shields number and of the undisturbed friction velocity. Alternatives whose runs
+        are not done are left out.
+    """
+    done = [change for change in listed if runs.are_done(change.base, change.other)]
+    thresholds = {}
+    for key, pile in runs.planned.piles.items():
+        if runs.are_done(key):
+            fractions = pile.scene.threshold.fractions
+            thresholds[key] = pile.thresholds(runs.cases, fractions)
+    rows = []
+    for change in done:
+        of_scene = {
+            "scene_id": change.scene.id,
+            "scene": label(change.scene),
+            "model_class": spread.model_class(change.scene),
+            "choice": change.choice.name,
+            "alternative": change.alternative,
+        }
+        both = thresholds[change.base], thresholds[change.other]
+        for before, after in zip(*both, strict=True):
+            row = {
+                **of_scene,
+                "fraction": before.fraction,
+                "shields": after.tau / before.tau - 1,
+                "ustar0": after.ustar0 / before.ustar0 - 1,
+            }
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def shares(moved: pd.DataFrame) -> pd.DataFrame:
+    """Find how far down and up the alternatives of a choice move each scene.
+
+    Parameters
+    ----------
+    moved
+        The rows of `measure`.
+
+    Returns
+    -------
+    DataFrame
+        A row for each scene, choice and fraction, with the columns `ENDS`, all at least
+        0.
+    """
+    keys = ["scene_id", "scene", "model_class", "choice", "fraction"]
+    grouped = moved.dropna(subset=list(QUANTITIES)).groupby(keys, sort=False)
+    ends = {}
+    for name in QUANTITIES:
+        ends[f"{name}_low"] = 0.0 - grouped[name].min().clip(upper=0.0)
+        ends[f"{name}_high"] = grouped[name].max().clip(lower=0.0)
+    return pd.DataFrame(ends).reset_index()
+
+
+def known(shared: pd.DataFrame) -> pd.DataFrame:
+    """Find the largest share of each choice in a class: what the package keeps.
+
+    Parameters
+    ----------
+    shared
+        The rows of `shares`.
+
+    Returns
+    -------
+    DataFrame
+        A row for each class of scenes, choice and fraction, with the columns `ENDS` and
+        the number of scenes.
+    """
+    keys = ["model_class", "choice", "fraction"]
+    grouped = shared.groupby(keys, sort=False)
+    largest = grouped[ENDS].max()
+    return largest.assign(scenes=grouped["scene_id"].nunique()).reset_index()
+
+
+TOGETHER_TEXT = """\
+The fidelities are measured against the best one. What all of them share does \
+not show there: it is changed here, one choice at a time. Each bar spans the largest \
+change over the fractions, downwards and upwards; the top bar is the root of the sum \
+of squares, as if the choices had nothing to do with one another."""
+SCENE_TEXT = """\
+The fidelity `static` (peeling) except for the friction angle, which DEM \
+alone feels. The Shields number is that of the mean stress on the grains that moved; \
+u*₀ is that of the flow far from the bed. tables/shares.csv has the share of each \
+choice at each fraction."""
+CHANGING_TEXT = """\
+All fidelities keep the flow over the whole pile to the end, as the paper does. Here \
+the bed line is drawn anew after each tenth of the counted grains, the flow is solved \
+again, and the grains go on by peeling. The table has the threshold on the bed that \
+changes over that on the frozen one, less 1."""
+LIMIT_TEXT = """\
+The ranges of the choices are judgements, with the reason beside each; no statistics. \
+Alternatives that are refused at a scene, or do not hold at its Re*, are left out."""
+ALONE = "What each choice moves, changed alone"
+"""Heading of the figure of a scene."""
+
+
+class _Interval(NamedTuple):
+    """A value with its interval of all choices together.
+
+    `low` and `high` are relative, and `most` is the choice that moves it most.
+    """
+
+    value: float
+    low: float
+    high: float
+    most: str
+
+    @property
+    def number(self) -> str:
+        """The value as text."""
+        return f"{self.value:#.3g}"
+
+    @property
+    def ends(self) -> str:
+        """The ends of the interval as text."""
+        low = self.value * (1 - self.low)
+        high = self.value * (1 + self.high)
+        return f"{low:#.3g} … {high:#.3g}"
+
+
+def _sections(
+    listed: Sequence[Change],
+    moved: pd.DataFrame,
+    shared: pd.DataFrame,
+    runs: Runs,
+) -> list[Section]:
+    """The page: all choices, the bed that changes, the scenes, the alternatives."""
+    bases: dict[str, str] = {}
+    for change in listed:
+        bases.setdefault(change.scene.id, change.base)
+    rows = []
+    tornados: list[Section] = []
+    for scene_id, of_scene in shared.groupby("scene_id", sort=False):
+        base = runs.planned.piles[bases[str(scene_id)]]
+        figure = f"tornado-{len(tornados) + 1}"
+        row, section = _of_scene(of_scene, base, runs.cases, figure)
+        rows.append(row)
+        tornados.append(section)
+    together = Section(
+        "All choices together",
+        TOGETHER_TEXT,
+        tables=[pd.DataFrame(rows)],
+        limits=[LIMIT_TEXT],
+    )
+    first, *others = tornados
+    of_bed = _changing_bed(moved)
+    return [first, together, *of_bed, *others, _alternatives(moved)]
+
+
+def _of_scene(
+    shared: pd.DataFrame,
+    base: Pile,
+    cases: Path,
+    figure: str,
+) -> tuple[dict[str, str], Section]:
+    """A row of the table and a section of the page, by the shares at one scene."""
+    largest = shared.groupby("choice", sort=False)[ENDS].max()
+    fraction = min(shared["fraction"], key=_from_usual)
+    (at,) = base.thresholds(cases, [fraction])
+    theta = _interval(largest, "shields", shields(base.scene, at.tau))
+    ustar0 = _interval(largest, "ustar0", at.ustar0)
+    name = str(shared["scene"].iloc[0])
+    chart = Figure(figure, ALONE, SCENE_TEXT, (), tornado(largest))
+    told = _in_words(name, fraction, theta, ustar0)
+    said = f"{name}; criterion: a grain {'goes on' if base.goes_on else 'leaves'}"
+    section = Section("", told, [chart], card=_card(said, fraction, theta, ustar0))
+    return _row(name, theta, ustar0), section
+
+
+def _from_usual(fraction: float) -> float:
+    """Distance of a fraction from the one that stands for a pile."""
+    return abs(float(fraction) - FRACTION)
+
+
+def _interval(largest: pd.DataFrame, quantity: str, value: float) -> _Interval:
+    """A value with the interval of all choices together."""
+    low, high = spread.together(largest, quantity)
+    widths = largest[f"{quantity}_low"] + largest[f"{quantity}_high"]
+    return _Interval(value, low, high, most=str(widths.idxmax()))
+
+
+def _row(name: str, theta: _Interval, ustar0: _Interval) -> dict[str, str]:
+    """A row of the table of all choices together."""
+    return {
+        "scene": name,
+        "θ": theta.number,
+        "θ: interval": theta.ends,
+        "θ: most by": theta.most,
+        "u*₀, m/s": ustar0.number,
+        "u*₀, m/s: interval": ustar0.ends,
+        "u*₀, m/s: most by": ustar0.most,
+    }
+
+
+def _card(name: str, fraction: float, theta: _Interval, ustar0: _Interval) -> Card:
+    """The answer card: the numbers of a bed with all choices together."""
+    part = percent(fraction)
+    of_what = "all choices that the models share, together"
+    numbers = []
+    for of, unit, meaning in (
+        (ustar0, "m/s", "friction velocity: the pull of the flow, written as a speed"),
+        (
+            theta,
+            "",
+            "Shields number: the stress over the weight of one layer of grains",
+        ),
+    ):
+        numbers.append(
+            Number(
+                of.value,
+                unit,
+                meaning,
+                f"most by {of.most}",
+                low=of.value * (1 - of.low),
+                high=of.value * (1 + of.high),
+                interval_of=of_what,
+                decimals=3,
+            )
+        )
+    return Card(
+        f"How far off may the flow be that moves {part} of the grains, by the model?",
+        f"{name}.",
+        tuple(numbers),
+        "Nothing is measured here: each choice of the model is changed alone, such as "
+        "how grains are packed, and the changes are added up.",
+        Worth("good", "usable", "Quote the interval beside a threshold of such a bed."),
+    )
+
+
+def _in_words(
+    name: str,
+    fraction: float,
+    theta: _Interval,
+    ustar0: _Interval,
+) -> str:
+    """The same in a sentence."""
+    go = f"{name}: {fraction:.0%} of the exposed grains go at θ = {theta.number}"
+    together = f"{theta.ends} with all choices together, most by {theta.most}"
+    return f"{go} ({together}), u*₀ = {ustar0.number} m/s ({ustar0.ends})."
+
+
+def _changing_bed(moved: pd.DataFrame) -> list[Section]:
+    """What the bed that changes is worth; nothing if no flow was solved anew."""
+    frozen = moved[moved["choice"] == FROZEN]
+    if frozen.empty:
+        return []
+    table = pd.DataFrame(
+        {
+            "scene": frozen["scene"],
+            "n/N": frozen["fraction"],
+            "θ, %": 100 * frozen["shields"],
+            "u*₀, %": 100 * frozen["ustar0"],
+        }
+    )
+    return [Section("The bed that changes", CHANGING_TEXT, tables=[table])]
+
+
+def _alternatives(moved: pd.DataFrame) -> Section:
+    """The choices with the alternatives that were tried."""
+    rows = []
+    for choice in CHOICES:
+        tried = moved.loc[moved["choice"] == choice.name, "alternative"]
+        if not tried.empty:
+            names = ", ".join(dict.fromkeys(tried))
+            rows.append((choice.name, names, choice.why))
+    table = pd.DataFrame(rows, columns=["choice", "alternatives", "why"])
+    return Section("The choices and their alternatives", tables=[table])
+
+
+def tornado(largest: pd.DataFrame) -> Canvas:
+    """Draw what each choice moves at one scene.
+
+    Parameters
+    ----------
+    largest
+        The largest share of each choice over the fractions; rows are the choices.
+
+    Returns
+    -------
+    Canvas
+        A bar for each choice and quantity, the widest on top, and all together.
+    """
+    rising = largest.max(axis=1).sort_values()
+    largest = largest.loc[rising.index]
+    total: list[float] = []
+    for name in QUANTITIES:
+        total += spread.together(largest, name)
+    together = pd.DataFrame([total], columns=ENDS, index=["all together"])
+    rows = pd.concat([largest, together])
+    canvas = style.canvas(0.28 * len(rows) + 1.0)
+    ax = canvas.subplots()
+    for name, offset in OFFSETS.items():
+        low = 100 * rows[f"{name}_low"]
+        width = low + 100 * rows[f"{name}_high"]
+        y = np.arange(len(rows)) + offset
+        ax.barh(y, width, BAR, left=-low, color=COLOURS[name], lw=0)
+    ax.use_sticky_edges = False  # no bar ends on the frame
+    ax.axvline(0.0, color="0.2", lw=0.8)
+    ax.axhline(len(largest) - 0.5, color="0.7", lw=0.6)
+    ax.set_yticks(range(len(rows)), list(rows.index))
+    ax.set_xlabel("change of the threshold, %")
+    ax.grid(axis="x", lw=0.4, color="0.85")
+    entries = [style.entry(text, COLOURS[name]) for name, text in QUANTITIES.items()]
+    style.legends(canvas, entries, [])
+    return canvas

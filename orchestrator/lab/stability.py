@@ -1,0 +1,495 @@
+"""Maps of failure: where in a plane of two parameters a run is good, and where not.
+
+A map's file has the tables of a study file. An axis changes fields of them: a list of
+values, each times a factor where it is a number; entries with a label and the fields
+they set; or the fractions of a pile at which the threshold of one run is read. A run
+that fails gives its own verdict. Another answer is wrong where it differs by more than
+`WRONG` from the reference of its place.
+"""
+
+import math
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure as Canvas
+from matplotlib.patches import Patch, Rectangle
+
+from orchestrator import plan
+from orchestrator.experiment import Experiment, Results, Runs
+from orchestrator.fidelity.decision import as_written, written
+from orchestrator.grains import threshold
+from orchestrator.grains.motion import Motion
+from orchestrator.report import style
+from orchestrator.report.card import Card, Number, Worth
+from orchestrator.report.page import Section
+from orchestrator.report.style import Figure
+from orchestrator.runs import case
+from orchestrator.study.closed_form import resolved
+from orchestrator.study.keys import by_name
+from orchestrator.study.scene import Scene
+from orchestrator.study.study import make_scene
+from orchestrator.types import Row
+
+FOLDER = Path(__file__).parent / "maps"
+"""The maps of the package."""
+TITLE = "Where each method fails"
+MAPS_TEXT = """\
+Each cell is a real run. It is good where tau_c is within 5 % of its reference at \
+every fraction; wrong where it is not and nothing said so; noisy, exploded or stalled \
+where the run itself said so."""
+DEFAULT = "default"
+"""In a file, the value that is a field's default; TOML has none."""
+WRONG = 0.05
+"""Relative error of tau_c from which an answer counts as wrong."""
+NOTICED = ("exploded", "noisy", "stalled")
+"""How a run says that it failed."""
+
+
+class Look(NamedTuple):
+    """How a verdict is drawn.
+
+    Attributes
+    ----------
+    colour
+        Colour of the cell.
+    ink
+        Colour of its text.
+    letter
+        Letter that stands in the cell for the verdict.
+    """
+
+    colour: str
+    ink: str
+    letter: str
+
+
+VERDICTS = {
+    "good": Look("#8cc5e8", "black", "G"),
+    "noisy": Look("#f4ea7a", "black", "N"),
+    "wrong": Look("#e0803a", "black", "W"),
+    "stalled": Look("#c8c8c8", "black", "S"),
+    "exploded": Look("#5b2a52", "white", "X"),
+}
+"""The verdicts, from the best to the worst."""
+
+
+class Place(NamedTuple):
+    """A place of a map.
+
+    Attributes
+    ----------
+    x, y
+        Its values on the axes; x is None where the run is read at several fractions.
+    scenes
+        Its scenes.
+    references
+        The scenes that they are compared with, in the same order.
+    """
+
+    x: float | str | None
+    y: float | str
+    scenes: tuple[Scene, ...]
+    references: tuple[Scene, ...]
+
+
+class Map(NamedTuple):
+    """A map.
+
+    Attributes
+    ----------
+    name
+        Its name.
+    data
+        What its file says.
+    places
+        Its places.
+    """
+
+    name: str
+    data: Mapping[str, Any]
+    places: tuple[Place, ...]
+
+    @property
+    def fractions(self) -> Sequence[float | None]:
+        """Fractions at which each run is read; None stands for those of its scene."""
+        values = self.data["x"].get("fractions")
+        if values is None:
+            return (None,)
+        return [float(value) for value in values]
+
+
+def load(path: Path) -> Map:
+    """Read a map's file.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    Map
+        The map.
+    """
+    data = tomllib.loads(path.read_text(encoding="utf-8"))
+    of_reference = data.get("reference", {})
+    places = []
+    for y, below in _axis(data["y"]):
+        for x, beside in _axis(data["x"]):
+            changes = {**below, **beside}
+            scenes = _scenes(data, changes, path.name)
+            references = _scenes(data, {**changes, **of_reference}, path.name)
+            places.append(Place(x, y, scenes, references))
+    return Map(path.stem, data, tuple(places))
+
+
+def _axis(axis: Mapping[str, Any]) -> Iterator[tuple[Any, Mapping[str, Any]]]:
+    """The places of an axis: the label, and the fields that it sets."""
+    if "fractions" in axis:
+        fractions = [float(value) for value in axis["fractions"]]
+        yield None, {"threshold.fractions": fractions}
+    for entry in axis.get("entries", ()):
+        yield entry["label"], entry["set"]
+    for value in axis.get("values", ()):
+        yield value, _scaled(axis["fields"], value)
+
+
+def _scaled(factors: Mapping[str, float], value: float | str) -> dict[str, Any]:
+    """Fields with a value times their factors if it is a number, else as it is."""
+    if not isinstance(value, int | float):
+        return dict.fromkeys(factors, value)
+    return {name: value * factor for name, factor in factors.items()}
+
+
+def _scenes(
+    data: Mapping[str, Any],
+    changes: Mapping[str, Any],
+    where: str,
+) -> tuple[Scene, ...]:
+    """The scene with some changes, with its method.
+
+    In the transition it is one for each force law.
+    """
+    tables = by_name(data)
+    for name, value in changes.items():
+        table, _, field = name.rpartition(".")
+        tables[table].pop(field, None)
+        if value != DEFAULT:
+            tables[table][field] = value
+    scenes = next(resolved([make_scene(tables, where)]))
+    return tuple(written(scene) for scene in scenes)
+
+
+def experiment(out: Path, folder: Path = FOLDER) -> Experiment:
+    """Find where each method fails.
+
+    Parameters
+    ----------
+    out
+        Directory of the runs.
+    folder
+        Directory of the maps, by default those of the package.
+
+    Returns
+    -------
+    Experiment
+        The experiment.
+    """
+    maps = [load(path) for path in sorted(folder.glob("*.toml"))]
+    asked = {}
+    for each in maps:
+        for place in each.places:
+            for scene in (*place.scenes, *place.references):
+                asked[scene.id] = as_written(scene)
+
+    def results(runs: Runs) -> Results:
+        judged = [judge(each, runs) for each in maps]
+        table = pd.concat(judged, ignore_index=True)
+        return {"maps": table}, _sections(maps, table)
+
+    return Experiment(
+        "stability",
+        TITLE,
+        plan.of(asked),
+        results,
+        verdicts=NOTICED,
+        failing=(),
+    )
+
+
+def _sections(maps: Sequence[Map], table: pd.DataFrame) -> list[Section]:
+    """The page: all maps in one figure, and each with its question."""
+    whole = Figure("maps", TITLE, "", (), draw(maps, table))
+    sections = [
+        Section("", card=_card(table)),
+        Section("All maps", MAPS_TEXT, [whole]),
+    ]
+    for each in maps:
+        title = each.data["title"]
+        figure = Figure(f"map-{each.name}", title, "", (), draw([each], table))
+        limits = each.data.get("limits", ())
+        sections.append(Section(title, each.data["question"], [figure], (), limits))
+    return sections
+
+
+def _card(table: pd.DataFrame) -> Card:
+    """The answer card: how many runs are good, failed aloud, and failed silently."""
+    of = len(table)
+    counts = table["verdict"].value_counts()
+    good = int(counts.get("good", 0))
+    noticed = int(table["caught"].sum())
+    silent = of - good - noticed
+    within = f"within {WRONG:.0%} of their references"
+    kinds = "noisy, exploded or stalled"
+    numbers = (
+        Number.counted(good, of, "runs are good", within, "good"),
+        Number.counted(noticed, of, "runs say that they failed", kinds, "care"),
+        Number.counted(
+            silent, of, "runs are wrong and say nothing", "further off", "bad"
+        ),
+    )
+    return Card(
+        "Where do the methods fail, and do they say so?",
+        f"{table['map'].nunique()} maps of two numbers each, taken far beyond what is "
+        "used.",
+        numbers,
+        "Nothing is measured here: each run is compared with a finer one.",
+        Worth("good", "usable", "Stay where the maps are good."),
+    )
+
+
+def judge(one: Map, runs: Runs) -> pd.DataFrame:
+    """Judge every run of a map.
+
+    Parameters
+    ----------
+    one
+        The map.
+    runs
+        The runs.
+
+    Returns
+    -------
+    DataFrame
+        A row for each place, and for each fraction where its run is read at several: x
+        and y, numbers or texts; verdict, "good", "wrong" or one of `NOTICED`; caught,
+        whether the run itself noticed; error, relative and signed, or NaN; note, the
+        cause.
+    """
+    rows = []
+    for place in one.places:
+        failed = _first_failure(place, runs)
+        for fraction in one.fractions:
+            judged = failed or _judged(one, place, runs, fraction)
+            row: Row = {
+                "map": one.name,
+                "x": place.x if fraction is None else fraction,
+                "y": place.y,
+                "verdict": judged.verdict,
+                "caught": failed is not None,
+                "error": judged.error,
+                "note": judged.note,
+            }
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+class _Judged(NamedTuple):
+    """What became of a run: a verdict, the error of tau_c or NaN, and the cause."""
+
+    verdict: str
+    error: float
+    note: str
+
+
+def _first_failure(place: Place, runs: Runs) -> _Judged | None:
+    """How the first run that failed at a place failed; None where none did."""
+    failures = (_failure(scene, runs) for scene in place.scenes)
+    return next((failure for failure in failures if failure), None)
+
+
+def _judged(one: Map, place: Place, runs: Runs, fraction: float | None) -> _Judged:
+    """Judge a run that did not fail by its error against its reference."""
+    error = max(_errors(one, place, runs, fraction), key=abs, default=math.nan)
+    if math.isnan(error):
+        return _Judged("wrong", error, "its reference failed")
+    if abs(error) <= WRONG:
+        return _Judged("good", error, "")
+    return _Judged("wrong", error, "")
+
+
+def _failure(scene: Scene, runs: Runs) -> _Judged | None:
+    """How a run that the scene needs failed, and why; None where all are done."""
+    pile = runs.planned.piles.get(scene.id)
+    if pile is not None:
+        needed: Sequence[case.Case] = pile.runs
+    else:
+        needed = [cells for cells in runs.planned.cells if scene in cells.scenes]
+    lost = [run.name for run in needed if run.name not in runs.done]
+    if not lost:
+        return None
+    ended, cause = case.failure(runs.cases / lost[0])
+    if ended not in NOTICED:
+        ended = "stalled"
+    note = cause.replace(f"{runs.cases}/", "") or "it did not run"
+    return _Judged(ended, math.nan, note)
+
+
+def _errors(
+    one: Map,
+    place: Place,
+    runs: Runs,
+    fraction: float | None,
+) -> Iterator[float]:
+    """The signed relative errors of tau_c; infinite where one of two was reached."""
+    for scene, reference in zip(place.scenes, place.references, strict=True):
+        if one.data["judge"] == "grain":
+            yield _error_of_grain(scene, runs)
+        elif _failure(reference, runs):
+            yield math.nan
+        else:
+            yield from _errors_of_pile(scene, reference, runs, fraction)
+
+
+def _error_of_grain(scene: Scene, runs: Runs) -> float:
+    """Error of a single grain against the closed form."""
+    cells = next(cells for cells in runs.planned.cells if scene in cells.scenes)
+    over = threshold.of_grains(Motion.from_csv(runs.cases / cells.name))
+    return float(over.value[cells.scenes.index(scene)]) ** 2 - 1
+
+
+def _errors_of_pile(
+    scene: Scene,
+    reference: Scene,
+    runs: Runs,
+    fraction: float | None,
+) -> Iterator[float]:
+    """Errors of a pile against its reference, at a fraction or at those of the scene.
+
+    A fraction that neither reached has none.
+    """
+    fractions = scene.threshold.fractions
+    if fraction is not None:
+        fractions = (fraction,)
+    pile = runs.planned.piles[scene.id]
+    other = runs.planned.piles[reference.id]
+    found = pile.thresholds(runs.cases, fractions)
+    expected = other.thresholds(runs.cases, fractions)
+    for answer, exact in zip(found, expected, strict=True):
+        error = answer.tau / exact.tau - 1
+        if not math.isnan(error):
+            yield error
+        elif not (math.isnan(answer.tau) and math.isnan(exact.tau)):
+            yield math.inf
+
+
+COLUMNS = 2
+"""Maps beside each other in a figure of several."""
+
+
+def draw(maps: Sequence[Map], table: pd.DataFrame) -> Canvas:
+    """Draw maps as grids of cells.
+
+    Parameters
+    ----------
+    maps
+        The maps.
+    table
+        The rows of `judge`.
+
+    Returns
+    -------
+    Canvas
+        The worst verdict at each place, and its error.
+    """
+    tables = [table[table["map"] == each.name] for each in maps]
+    counts = [rows["y"].nunique() for rows in tables]
+    columns = min(len(maps), COLUMNS)
+    starts = range(0, len(maps), columns)
+    ratios = [max(counts[start : start + columns]) for start in starts]
+    # height of a cell, inches, and size of its text, points
+    cell = 0.42
+    font = 9.0
+    if columns > 1:
+        cell = 0.31
+        font = 5.4
+    canvas = style.canvas(cell * sum(ratios) + 0.85 * len(ratios) + 0.55)
+    grid = canvas.subplots(len(ratios), columns, squeeze=False, height_ratios=ratios)
+    axes = grid.ravel()
+    for ax, each, rows in zip(axes, maps, tables, strict=False):
+        _panel(ax, each, rows, font)
+    for ax in axes[len(maps) :]:
+        ax.set_axis_off()
+    style.legends(canvas, _samples(set(table["verdict"])), [])
+    return canvas
+
+
+def _samples(verdicts: set[str]) -> list[Patch]:
+    """Samples of the verdicts that are drawn, for a legend."""
+    samples = []
+    for verdict, look in VERDICTS.items():
+        if verdict in verdicts:
+            label = f"{look.letter}: {verdict}"
+            samples.append(Patch(fc=look.colour, ec="white", label=label))
+    return samples
+
+
+def _panel(ax: Axes, one: Map, table: pd.DataFrame, font: float) -> None:
+    """Draw one map, with texts of some size (points)."""
+    columns = _ticked(ax.xaxis, table["x"], one.data["x"]["label"])
+    lines = _ticked(ax.yaxis, table["y"], one.data["y"]["label"])
+    cells: Any = _worst(table).itertuples(index=False)
+    for cell in cells:
+        x = columns[cell.x]
+        y = lines[cell.y]
+        look = VERDICTS[cell.verdict]
+        shape = {"fc": look.colour, "ec": "white", "lw": 1, "gid": cell.verdict}
+        ax.add_patch(Rectangle((x, y), 1, 1, **shape))
+        ax.text(
+            x + 0.5,
+            y + 0.5,
+            _cell_text(look.letter, cell.error),
+            ha="center",
+            va="center",
+            fontsize=font,
+            color=look.ink,
+        )
+    ax.set(xlim=(0, len(columns)), ylim=(0, len(lines)))
+    ax.set_title(one.data["title"], loc="left")
+    ax.tick_params(length=0)
+
+
+def _ticked(axis: Axis, column: "pd.Series[Any]", label: str) -> dict[Any, int]:
+    """Mark the cells of an axis; the place of each value on it.
+
+    Texts stand as they come, numbers rise.
+    """
+    values = column.drop_duplicates()
+    is_number = pd.to_numeric(values, errors="coerce").notna()
+    if is_number.all():
+        values = values.astype(float).sort_values()
+    marks = [value if isinstance(value, str) else f"{value:g}" for value in values]
+    axis.set_ticks(np.arange(len(marks)) + 0.5, marks)
+    axis.set_label_text(label)
+    return {value: place for place, value in enumerate(values)}
+
+
+def _worst(table: pd.DataFrame) -> pd.DataFrame:
+    """The row with the worst verdict of each place."""
+    rank = {verdict: place for place, verdict in enumerate(VERDICTS)}
+    rising = table.sort_values("verdict", key=lambda verdicts: verdicts.map(rank))
+    return rising.drop_duplicates(["x", "y"], keep="last")
+
+
+def _cell_text(letter: str, error: float) -> str:
+    """The letter of a verdict, and below it the error if there is one."""
+    if math.isnan(error):
+        return letter
+    percent = f"{100 * error:+.2g} %".replace("-", "−")
+    return f"{letter}\n{percent}"

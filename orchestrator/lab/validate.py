@@ -1,0 +1,690 @@
+"""Validation: what the model says beside what was measured, with nothing fitted.
+
+Each set of measurements is a table beside this file, in the folder ``measured``. Level
+beds are answered on strips poured from a mixture of sand. Each set has the ratio of the
+model's value to the measured one.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure as Canvas
+
+from orchestrator import plan
+from orchestrator.errors import InputError
+from orchestrator.experiment import Experiment, Results, Runs
+from orchestrator.fidelity.decision import as_written
+from orchestrator.flow.stress import WallStress, bubble
+from orchestrator.lab.sphere import speed_of, sphere
+from orchestrator.lab.strips import PERCENTILES, ROUGH, Strips
+from orchestrator.physics import saltation
+from orchestrator.physics.constants import GAS_BELOW, GRAVITY
+from orchestrator.physics.gusts import peak_over_mean
+from orchestrator.physics.laws import CLIFT_GAUVIN, LAWS, Exposure
+from orchestrator.physics.measured import kirchner_pivot
+from orchestrator.physics.threshold import LAWS_OF, PAPER, Threshold, weight
+from orchestrator.physics.threshold import threshold as threshold_of
+from orchestrator.report import style
+from orchestrator.report.card import Card, Number, Worth
+from orchestrator.report.page import Section
+from orchestrator.report.style import Figure
+from orchestrator.study.fidelities import Fields
+from orchestrator.study.scene import Scene
+from orchestrator.study.study import Study
+from orchestrator.surface import truth
+from orchestrator.types import FloatArray
+
+FOLDER = Path(__file__).with_name("measured")
+"""The sets of measurements."""
+TITLE = "The model against measurements"
+INTENSITY = 0.4
+"""Intensity of the wall stress under gusts: standard deviation over mean."""
+EVENTS = 100
+"""Of so many events the largest moves a grain."""
+FREE = 5000.0
+"""Particle Reynolds number of the spheres whose drag was measured, about."""
+ENOUGH = 1.5
+"""Factor over all sets within which a model would be made the default."""
+LEVEL = 0.01
+"""Slope below which a bed is drawn as a level one."""
+BAND = 0.8
+"""Part of the height of a set in a figure over which its models stand."""
+WINDWARD = (0.095, 0.605)
+"""Part of the hump's chord on which its stress is compared.
+
+It goes from the hump's steep front to its brink.
+"""
+READ = "read"
+"""Mark of a row whose numbers were read in their source; others are from memory."""
+
+
+class Model(NamedTuple):
+    """A model that is compared with measurements.
+
+    Attributes
+    ----------
+    name
+        Its name.
+    fields
+        The fields of a scene that it sets.
+    gust
+        Largest over mean stress of its gusts.
+    goes_on
+        Whether grains must go on hopping after the gust. Such a model has no strips,
+        but one grain in closed form.
+    leaves
+        Whether grains must leave their pockets in the gust.
+    """
+
+    name: str
+    fields: Fields
+    gust: float = 1.0
+    goes_on: bool = False
+    leaves: bool = True
+
+
+LONE = {"forces.exposure": "protrusion"}
+"""Each grain feels the flow at its own height, as if it stood alone."""
+BALANCED = {"forces.exposure": "protrusion", "forces.sheltering": "balanced"}
+"""And the drags add up to the stress of the flow."""
+GUST = peak_over_mean(INTENSITY, EVENTS)
+"""Largest over mean stress of the gusts of the models that have gusts."""
+MODELS = (
+    Model("paper", {"forces.law": PAPER}),
+    Model("goes on", {}, GUST, goes_on=True, leaves=False),
+    Model("leaves and goes on", {}, GUST, goes_on=True),
+    Model("bridged", {}),
+    Model("bridged, protrusion", LONE),
+    Model("balanced", BALANCED),
+    Model("balanced, gusts", BALANCED, GUST),
+)
+COLOURS = (
+    "#009e73",
+    "#cc79a7",
+    "#0072b2",
+    "#999999",
+    "#56b4e9",
+    "#e69f00",
+    "#d55e00",
+)
+"""Colours of the models in figures."""
+MARKERS = "os^DvPX"
+"""Markers of the models."""
+
+
+def by_paper(beds: pd.DataFrame) -> FloatArray:
+    """Find the threshold of single grains by Eq. 2 or Eq. 4, where one holds.
+
+    Parameters
+    ----------
+    beds
+        The grains and fluids, as `single` takes them.
+
+    Returns
+    -------
+    FloatArray
+        Shields numbers, of shape (rows,); NaN in the transition.
+    """
+    answers = []
+    for name in LAWS_OF["transition"]:
+        at = single(beds, name)
+        low, high = LAWS[name].reynolds
+        holds = (at.reynolds >= low) & (at.reynolds < high)
+        answers.append(np.where(holds, at.shields, np.nan))
+    return np.asarray(np.fmax(*answers))
+
+
+def single(
+    beds: pd.DataFrame,
+    law: str,
+    beta_deg: float = 60,
+    ratio: float = 30,
+) -> Threshold:
+    """Find the thresholds of single grains on some measured beds.
+
+    Parameters
+    ----------
+    beds
+        A row for each bed: diameter, densities, viscosity, slope and cohesion.
+    law
+        Name of the force law.
+    beta_deg
+        Entrainment angle, degrees.
+    ratio
+        Diameter over roughness length, d/z0.
+
+    Returns
+    -------
+    Threshold
+        Thresholds, of shape (rows,).
+    """
+    d = beds["d_m"].to_numpy(float)
+    exposure = Exposure(
+        diameter=d,
+        roughness=d / ratio,
+        fluid_density=beds["rho_f_kg_m3"].to_numpy(float),
+        viscosity=beds["nu_m2_s"].to_numpy(float),
+    )
+    slope = beds["slope"].to_numpy(float)
+    return threshold_of(
+        LAWS[law],
+        exposure,
+        density=beds["rho_sol_kg_m3"].to_numpy(float),
+        # a bed that falls with the flow has a positive slope in the table
+        slope_deg=-np.degrees(np.arctan(slope)),
+        entrainment_angle_deg=beta_deg,
+        cohesion=beds["cohesion_n_m"].to_numpy(float),
+    )
+
+
+def over_hump(stress: WallStress) -> pd.DataFrame:
+    """Compare the stress on the windward side of the hump with the measured one.
+
+    Parameters
+    ----------
+    stress
+        The computed stress along the bed.
+
+    Returns
+    -------
+    DataFrame
+        A row for each measured place: both stresses, each over its own mean.
+    """
+    hump = pd.read_csv(FOLDER / "hump_stress.csv")
+    hump = hump[hump["x_over_chord"].between(*WINDWARD)]
+    chord = pd.read_csv(FOLDER / "hump.csv")["x_m"].max()
+    tau = np.interp(hump["x_over_chord"] * chord, stress.x_m, stress.tau_wall)
+    return pd.DataFrame(
+        {
+            "measured": hump["cf"] / hump["cf"].mean(),
+            "value": tau / tau.mean(),
+            "set": "stress over a hump",
+            "source": "Naughton, Viken and Greenblatt 2006",
+            "sure": READ,
+        }
+    )
+
+
+def going_on(
+    beds: pd.DataFrame,
+    gust: float,
+    *,
+    leaves: bool,
+    ratio: float = 30,
+) -> FloatArray:
+    """Find the mean stress from which grains go on after a gust, on measured beds.
+
+    In a liquid the bed's slope is that of the surface of an open uniform flow. Grains
+    that cannot hop go on where the mean stress turns them over.
+
+    Parameters
+    ----------
+    beds
+        The grains and fluids, as `single` takes them.
+    gust
+        Largest over mean stress.
+    leaves
+        Whether a grain must also leave its pocket in the gust: that of `single` by the
+        law for gravel, between neighbours at 60 degrees.
+    ratio
+        Diameter over roughness length, d/z0.
+
+    Returns
+    -------
+    FloatArray
+        Shields numbers of the mean flow, of shape (rows,).
+    """
+    grains = hoppers(beds, ratio)
+    goes_on = saltation.tabulated(grains).initiation(gust)
+    if not leaves:
+        return goes_on
+    steady = single(beds, "bridged-gravel", 60, ratio).shields
+    return saltation.motion(steady, goes_on, saltation.hops(grains), gust).shields
+
+
+def hoppers(beds: pd.DataFrame, ratio: float = 30) -> saltation.Grains:
+    """Make the grains of measured beds as they hop.
+
+    Parameters
+    ----------
+    beds
+        The grains and fluids, as `single` takes them.
+    ratio
+        Diameter over roughness length, d/z0.
+
+    Returns
+    -------
+    Grains
+        The grains; in a liquid the surface of the flow falls with the bed.
+    """
+    slope = np.arctan(beds["slope"])
+    is_liquid = beds["rho_f_kg_m3"] >= GAS_BELOW
+    return saltation.Grains.of(
+        beds["d_m"],
+        density=beds["rho_sol_kg_m3"],
+        fluid_density=beds["rho_f_kg_m3"],
+        viscosity=beds["nu_m2_s"],
+        slope_deg=-np.degrees(slope),
+        roughness=beds["d_m"] / ratio,
+        fall=np.where(is_liquid, np.sin(slope), 0.0),
+    )
+
+
+class _Answers(NamedTuple):
+    """The answers of a model, at first without gusts.
+
+    Shields numbers of a sphere that stands `clear` or is `level` with its neighbours,
+    and of the measured `beds`, shape (rows,); the exponent of `hiding`.
+    """
+
+    clear: float
+    level: float
+    beds: FloatArray
+    hiding: float
+
+    def under(self, gust: float) -> "_Answers":
+        """The answers under a gust, as mean stresses; hiding is alike."""
+        mean = _Answers(self.clear / gust, self.level / gust, self.beds / gust, 0.0)
+        return mean._replace(hiding=self.hiding)
+
+
+def _answers(model: Model, strips: Strips, beds: pd.DataFrame) -> _Answers:
+    """Answer the measured beds and spheres by a model, without its gusts."""
+    clear = sphere(model.fields, ROUGH, clear=True)
+    level = sphere(model.fields, ROUGH, clear=False)
+    if model.name == PAPER:
+        return _Answers(clear, level, by_paper(beds), hiding=np.nan)
+    galileo = beds["galileo"].to_numpy()
+    bond = beds["bond"].to_numpy()
+    shields = strips.interpolated(model.fields)(galileo, beds["slope"].to_numpy())
+    for place in np.flatnonzero(bond):
+        cohesion = {"bond": bond[place]}
+        shields[place] = strips.shields(model.fields, galileo[place], **cohesion)
+    return _Answers(clear, level, shields, strips.hiding(model.fields))
+
+
+def compared(
+    strips: Strips,
+    hump: pd.DataFrame,
+    lengths: Mapping[str, float],
+) -> pd.DataFrame:
+    """Compare all models with all measurements.
+
+    Parameters
+    ----------
+    strips
+        The strips that level beds are answered on.
+    hump
+        The stress over the hump, of `over_hump`; it is alike in all models.
+    lengths
+        Ends of reversed flows, h, by their names in the table of single values; they
+        are alike in all models.
+
+    Returns
+    -------
+    DataFrame
+        A row for each measurement and model: set, source, measured value, that of the
+        model, and their ratio.
+    """
+    beds = _measured_beds()
+    others = pd.read_csv(FOLDER / "single.csv")
+    pivots = pd.DataFrame(
+        {
+            "measured": kirchner_pivot(PERCENTILES),
+            "value": strips.pivots_deg(),
+            "set": "pivots of laid grains",
+            "source": "Kirchner et al. 1990",
+            "sure": READ,
+        }
+    )
+    ends = pd.read_csv(FOLDER / "cessation.csv").rename(columns={"shields": "measured"})
+    ceases = saltation.tabulated(hoppers(ends)).cessation
+    without_gusts: dict[str, _Answers] = {}
+    rows = []
+    for model in MODELS:
+        cessation = np.full(len(ends), np.nan)
+        if model.goes_on:
+            shields = going_on(beds, model.gust, leaves=model.leaves)
+            answers = _Answers(np.nan, np.nan, shields, np.nan)
+            cessation = ceases
+        else:
+            # a model with gusts has a part of the same model's stresses without them
+            key = str(model.fields)
+            if key not in without_gusts:
+                without_gusts[key] = _answers(model, strips, beds)
+            answers = without_gusts[key].under(model.gust)
+        values = {
+            "saddle": speed_of(2500.0, 0.354),
+            "top": speed_of(1430.0, 0.707),
+            "drag": float(24 / FREE * CLIFT_GAUVIN.factor(np.array(FREE))),
+            **lengths,
+            "clear": answers.clear,
+            "level": answers.level,
+            "hiding": answers.hiding,
+        }
+        parts = [
+            beds.drop(columns="bond").assign(value=answers.beds),
+            ends.assign(value=cessation, sure=READ),
+            others.assign(value=others["what"].map(values)),
+            pivots,
+            hump,
+        ]
+        rows += [part.assign(model=model.name) for part in parts]
+    table = pd.concat(rows, ignore_index=True)
+    return table.assign(ratio=table["value"] / table["measured"])
+
+
+def _measured_beds() -> pd.DataFrame:
+    """The measured beds, with Galileo number and pull of a contact over the weight."""
+    beds = pd.read_csv(FOLDER / "beds.csv").rename(columns={"shields": "measured"})
+    excess = beds["rho_sol_kg_m3"] / beds["rho_f_kg_m3"] - 1
+    velocity = np.sqrt(excess * GRAVITY * beds["d_m"] ** 3)
+    submerged = weight(
+        diameter=beds["d_m"],
+        density=beds["rho_sol_kg_m3"],
+        fluid_density=beds["rho_f_kg_m3"],
+    )
+    return beds.assign(
+        galileo=velocity / beds["nu_m2_s"],
+        sure=READ,
+        bond=beds["cohesion_n_m"] * beds["d_m"] / submerged,
+    )
+
+
+def scores(rows: pd.DataFrame) -> pd.DataFrame:
+    """Score each model on each set; rows from memory count in no score.
+
+    A factor is the ratio or its inverse, whichever is above 1.
+
+    Parameters
+    ----------
+    rows
+        The comparison, as of `compared`.
+
+    Returns
+    -------
+    DataFrame
+        A row for each set and model: number of rows, and of those answered; median
+        ratio and its 10 to 90 %; factor in the median, and the worst.
+    """
+    read = rows[rows["sure"] == READ]
+    # a value of the wrong sign has no factor
+    positive = read["ratio"].where(read["ratio"] > 0)
+    factor = np.exp(np.abs(np.log(positive)))
+    groups = read.assign(factor=factor).groupby(["set", "model"], sort=False)
+    ratio = groups["ratio"]
+    return pd.DataFrame(
+        {
+            "rows": ratio.size(),
+            "answered": ratio.count(),
+            "ratio": ratio.median(),
+            "ratio_10": ratio.quantile(0.1),
+            "ratio_90": ratio.quantile(0.9),
+            "factor": groups["factor"].median(),
+            "worst": groups["factor"].max(),
+        }
+    ).reset_index()
+
+
+def experiment(study: Study, out: Path) -> Experiment:
+    """Answer what was measured, on the strips, the hill and the hump of a study.
+
+    Parameters
+    ----------
+    study
+        The study, such as the preset ``validate``.
+    out
+        Directory of its runs.
+
+    Returns
+    -------
+    Experiment
+        The experiment.
+
+    Raises
+    ------
+    InputError
+        If the study lacks strips, a hill of RUSHIL or a profile.
+    """
+    strips = [scene for scene in study.scenes if scene.is_poured]
+    hills = [scene for scene in study.scenes if _is_hill(scene)]
+    humps = [scene for scene in study.scenes if getattr(scene.bed, "profile", None)]
+    if not strips or len(hills) != 1 or len(humps) != 1:
+        what = "it needs poured strips, one hill of RUSHIL and one profile, the hump"
+        raise InputError(what, study.name, "start from the preset validate")
+    asked = {scene.id: as_written(scene) for scene in study.scenes}
+    planned = plan.of(asked, cases=out.absolute() / "cases")
+
+    def results(runs: Runs) -> Results:
+        if not runs.are_done(*asked):
+            return {}, ()
+        (hill,) = hills
+        (hump,) = humps
+        lengths = {
+            **_reversed_flow("hill", hill, runs),
+            **_reversed_flow("hump", hump, runs),
+        }
+        over = over_hump(planned.piles[hump.id].stress(runs.cases))
+        rows = compared(Strips(strips, runs.cases), over, lengths)
+        scored = scores(rows)
+        return {"measured": rows, "scores": scored}, _sections(rows, scored)
+
+    return Experiment(
+        "validate",
+        TITLE,
+        planned,
+        results,
+        limit_s=study.time_limit_s,
+        source=study.source,
+    )
+
+
+def _is_hill(scene: Scene) -> bool:
+    """Whether the bed of a scene is a hill of RUSHIL."""
+    return getattr(scene.bed, "shape", "") == "rushil"
+
+
+def _reversed_flow(name: str, scene: Scene, runs: Runs) -> dict[str, float]:
+    """Ends of the reversed flow behind a form, h, by their names in the table."""
+    pile = runs.planned.piles[scene.id]
+    ends = bubble(pile.stress(runs.cases), pile.model.line.h)
+    start, end = ends or (np.nan, np.nan)
+    return {f"{name}, separation": start, f"{name}, reattachment": end}
+
+
+SETS_TEXT = """\
+Each row is a set of measurements with the number of its rows; the ratio is that of \
+the model's value to the measured one, its bar spans 10 to 90 % of the rows. Nothing \
+is fitted to these sets. The first table has the median, over the sets in which the \
+models differ, of the factor in the median; the second the factor of each set. The \
+stress over the hump is compared over its windward side, each over its own mean: the \
+boundary layer of the experiment is thinner."""
+FACTORS_TEXT = """\
+Ratio of the model's value to the measured one: median, and 10 to 90 % of the rows of \
+each set. The grey band is a factor of 1.5."""
+THRESHOLDS_TEXT = """\
+Level beds are answered on three poured strips of sand, where a tenth of the exposed \
+grains has moved, each by its own pivot. `bridged` is the drag and lift of a grain \
+that stands alone, as high as all others; `protrusion` takes its own height over the \
+bed; `balanced` lets the drags on a patch add up to the stress of the flow; gusts are \
+the largest of 100 independent, log-normal stresses of intensity 0.4. `goes on` is the \
+least mean stress at which one grain that has left its pocket keeps hopping after such \
+a gust, in closed form; `leaves and goes on` asks as well that the gust turns it over \
+its neighbour."""
+SHIELDS_TEXT = """\
+Measured thresholds and those of the models, in water (solid) and in air (dotted). The \
+Galileo number has no threshold in it: both axes are independent."""
+MEMORY_TEXT = """\
+Figures that are quoted from memory count in no score. They stand here beside the \
+last model."""
+
+
+def _sections(rows: pd.DataFrame, scored: pd.DataFrame) -> list[Section]:
+    """The page: the nearest model, the sets, the thresholds, what is from memory."""
+    nearest = _median_factors(scored)
+    title = "Model over measurement"
+    chart = Figure("factors", title, FACTORS_TEXT, (), factors(scored))
+    of_points = "Thresholds of level beds"
+    points = Figure("shields", of_points, SHIELDS_TEXT, (), diagram(rows))
+    wide = scored.pivot(index="set", columns="model", values="factor")
+    wide = wide.loc[scored["set"].unique(), [model.name for model in MODELS]]
+    wide = wide.reset_index()
+    is_from_memory = (rows["sure"] != READ) & (rows["model"] == MODELS[-1].name)
+    memory = rows.loc[is_from_memory, ["set", "source", "measured", "value", "ratio"]]
+    return [
+        Section("", _nearest_in_words(nearest), card=_card(nearest)),
+        Section(title, SETS_TEXT, (chart,), [nearest.reset_index(), wide]),
+        Section("Thresholds", THRESHOLDS_TEXT, (points,), [scored]),
+        Section("From memory", MEMORY_TEXT, (), [memory]),
+        truth.section(truth.stored()),
+    ]
+
+
+def _median_factors(scored: pd.DataFrame) -> "pd.Series[float]":
+    """Factor of each model in the median of the sets in which the models differ."""
+    # flows and drags that all models share say nothing of which is nearer
+    differ = scored.groupby("set")["factor"].transform("nunique") > 1
+    median = scored[differ].groupby("model", sort=False)["factor"].median()
+    return median.rename("median of the sets in which they differ")
+
+
+def _card(median: "pd.Series[float]") -> Card:
+    """The answer card: the nearest model, the usual one, and how many are near."""
+    least = float(median.min())
+    near = int((median <= ENOUGH).sum())
+    usual = float(median.iloc[0])
+    numbers = (
+        Number(
+            least,
+            "times",
+            "off the measurements: the nearest model",
+            f"in the median of their sets; it is “{median.idxmin()}”",
+            decimals=2,
+        ),
+        Number(
+            usual,
+            "times",
+            f"off the measurements: the model “{median.index[0]}”",
+            "the first of the list below; in the median of the sets",
+            decimals=2,
+        ),
+        Number(
+            near,
+            f"of {len(median)}",
+            f"models within a factor of {ENOUGH:g}",
+            "that is asked of a default",
+            decimals=0,
+        ),
+    )
+    worth = Worth("good", "usable", "The nearest model is within what is asked.")
+    if least > ENOUGH:
+        worth = Worth(
+            "care",
+            "usable, with a correction",
+            "No model is within what is asked; the default is kept.",
+        )
+    return Card(
+        "Which model is nearest to measured thresholds, and how far off is it?",
+        f"{len(median)} models beside flumes, wind tunnels and field sites; nothing is "
+        "fitted to them.",
+        numbers,
+        "Each set and its source stands below; a factor of 1 is the measurement.",
+        worth,
+    )
+
+
+def _nearest_in_words(median: "pd.Series[float]") -> str:
+    """Which model is nearest to the measurements."""
+    least = float(median.min())
+    said = (
+        f"Of {len(median)} models “{median.idxmin()}” is nearest to the measurements, "
+        f"off by a factor of {least:.2f} in the median of their sets; "
+        f"asked is {ENOUGH:g}. "
+    )
+    if least > ENOUGH:
+        said += "The default model is kept: none is within."
+    return said
+
+
+def factors(scored: pd.DataFrame) -> Canvas:
+    """Draw the ratio of each model to each set.
+
+    Parameters
+    ----------
+    scored
+        The scores, as of `scores`.
+
+    Returns
+    -------
+    Canvas
+        Median, and 10 to 90 % of the rows, in a row for each set.
+    """
+    sets = list(dict.fromkeys(scored["set"]))
+    canvas = style.canvas(0.6 * len(sets) + 1.0)
+    ax = canvas.subplots()
+    middle = (len(MODELS) - 1) / 2
+    for number, model in enumerate(MODELS):
+        part = scored[scored["model"] == model.name]
+        colour = COLOURS[number]
+        offset = BAND / len(MODELS) * (number - middle)
+        y = [sets.index(name) + offset for name in part["set"]]
+        ends = part["ratio_10"], part["ratio_90"]
+        ax.hlines(y, *ends, color=colour, lw=2.5, alpha=0.5)
+        marker = MARKERS[number]
+        ax.plot(part["ratio"], y, marker, ms=5, color=colour, label=model.name)
+    ax.axvline(1.0, color="0.2", lw=0.8)
+    ax.axvspan(1 / ENOUGH, ENOUGH, color="0.93", zorder=0)
+    ax.set_xscale("log")
+    style.plain_ticks(ax.xaxis)
+    counts = scored.groupby("set")["rows"].first()
+    labels = [f"{name} ({counts[name]})" for name in sets]
+    ax.set_yticks(range(len(sets)), labels)
+    ax.invert_yaxis()
+    ax.set_xlabel("model over measurement")
+    style.legends(canvas, ax.get_lines()[: len(MODELS)], [])
+    return canvas
+
+
+def diagram(rows: pd.DataFrame) -> Canvas:
+    """Draw thresholds of level beds over the Galileo number.
+
+    Parameters
+    ----------
+    rows
+        The comparison, as of `compared`.
+
+    Returns
+    -------
+    Canvas
+        The measured thresholds, and the models' curves.
+    """
+    canvas = style.canvas(3.6)
+    ax = canvas.subplots()
+    is_bed = rows["galileo"].notna() & (rows["cohesion_n_m"] == 0)
+    level = rows[is_bed & (rows["slope"] < LEVEL)]
+    measured = level[level["model"] == MODELS[0].name]
+    sets = dict.fromkeys(level["set"])
+    for name, mark in zip(sets, "osv^D", strict=False):
+        part = measured[measured["set"] == name]
+        shown = {"ms": 3, "color": "0.6", "label": name}
+        ax.plot(part["galileo"], part["measured"], mark, **shown)
+    is_gas = level["rho_f_kg_m3"] < GAS_BELOW
+    for model, colour in zip(MODELS, COLOURS, strict=True):
+        part = level[level["model"] == model.name].sort_values("galileo")
+        gas = is_gas.loc[part.index]
+        in_water = part[~gas]
+        in_air = part[gas]
+        shown = {"color": colour, "label": model.name}
+        ax.plot(in_water["galileo"], in_water["value"], **shown)
+        ax.plot(in_air["galileo"], in_air["value"], ":", color=colour)
+    ax.set(xscale="log", yscale="log")
+    ax.set(xlabel="Galileo number", ylabel="Shields number $θ$")
+    style.plain_ticks(ax.yaxis)
+    named = [
+        line for line in ax.get_lines() if not str(line.get_label()).startswith("_")
+    ]
+    style.legends(canvas, [], named)
+    return canvas

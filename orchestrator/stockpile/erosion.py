@@ -1,0 +1,697 @@
+"""What wind takes from a stockpile: the solved stress beside AP-42, section 13.2.5.
+
+Between two disturbances a surface loses its erosion potential P, which the fastest mile
+of that time decides (U.S. EPA, Industrial Wind Erosion, 2006). AP-42 has classes of
+u_s/u_r, the speed 25 cm above a pile over that at 10 m, from a wind tunnel (Billman and
+Arya, EPA/600/S3-85/059).
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import log
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Canvas
+from numpy.typing import ArrayLike
+
+from orchestrator import plan
+from orchestrator.bed.line import BedLine
+from orchestrator.errors import InputError
+from orchestrator.experiment import Experiment, Results, Runs, page_texts, piles
+from orchestrator.fidelity import limits
+from orchestrator.flow.model import FlowModel
+from orchestrator.flow.stress import WallStress
+from orchestrator.physics.constants import GAS_BELOW
+from orchestrator.physics.threshold import thresholds_of
+from orchestrator.physics.velocity import log_law_ustar
+from orchestrator.report import labels, style
+from orchestrator.report.card import Card, Number, Worth
+from orchestrator.report.flows import USTAR
+from orchestrator.report.page import Section
+from orchestrator.report.style import Figure
+from orchestrator.study import fields
+from orchestrator.study.closed_form import single_grain
+from orchestrator.study.parts import Fluid, PileBed
+from orchestrator.study.scene import Scene
+from orchestrator.study.study import Study
+from orchestrator.types import FloatArray, Row
+
+TEXTS = page_texts(__file__, "erosion")
+"""What the page says around its figure and tables."""
+MEASURED = Path(__file__).parent / "measured"
+AREAS = pd.read_csv(MEASURED / "ap42_areas.csv", keep_default_na=False)
+"""Shares of the surfaces of the four piles of AP-42, by class."""
+MATERIALS = pd.read_csv(MEASURED / "ap42_thresholds.csv", keep_default_na=False)
+"""Threshold friction velocities of AP-42."""
+USTAR_T = dict(zip(MATERIALS["material"], MATERIALS["ustar_m_s"], strict=True))
+"""The same by material, m/s."""
+MOST_USTAR_T = 10.0
+"""Largest threshold friction velocity that a wind can reach, m/s."""
+CLASSES = np.unique(AREAS["us_over_ur"])
+"""Classes of u_s/u_r."""
+WIND_HEIGHT = 10.0
+"""Height of the fastest mile and of u_r, m."""
+OVER_FLAT = log(WIND_HEIGHT / 0.005) / log(0.25 / 0.005)
+"""u*/u*_0 over u_s/u_r, by the log laws of both heights over a z0 of 5 mm."""
+PILE = 0.10
+"""AP-42: u* over u_s on a pile."""
+FLAT = 0.053
+"""AP-42: u* over the wind on flat ground."""
+FLAT_BELOW = 0.2
+"""Height over base below which AP-42 takes a pile for flat ground."""
+LEVEL_DEG = 5.0
+"""Slope up to which a surface is neither windward nor lee, degrees."""
+GROUND = 0.01
+"""Height of the bed over the pile's up to which it is the ground around."""
+BASE_PLACES = 10_001
+"""Places at which the length of a base is looked for."""
+IN_NAME = {"bed_shape", "profile", "h_m", "alpha_deg", "solve_z0_m", "obstacles"}
+"""Columns of a scene that the name of its pile, or of its surface, has in any case."""
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
+"""Colours of the surfaces of a pile in the figure."""
+LINES = ("-", "--", "-.", ":")
+"""Line styles of the four piles of AP-42."""
+GREY = "0.3"
+"""Colour of AP-42."""
+DRAWN = 4
+"""Most piles of the figure."""
+
+
+class Surface(NamedTuple):
+    """The surface of a pile.
+
+    Attributes
+    ----------
+    name
+        What it has on it: its obstacles, or that it is one of AP-42's.
+    faces
+        Its faces, with the columns `part`, `share` and `ratio`, the friction velocity
+        |u*| over that of the undisturbed flow.
+    ustar0_over_wind
+        Friction velocity of the undisturbed flow over the wind at 10 m.
+    threshold
+        u*_t, m/s.
+    line
+        Faces along the middle, which the figure has in place of all.
+    """
+
+    name: str
+    faces: pd.DataFrame
+    ustar0_over_wind: float
+    threshold: float
+    line: pd.DataFrame | None = None
+
+    @property
+    def drawn(self) -> pd.DataFrame:
+        """The faces that the figure has."""
+        return self.faces if self.line is None else self.line
+
+    def potential(self, winds: ArrayLike) -> FloatArray:
+        """Mean erosion potential of the surface.
+
+        AP-42, Eq. 3: P = 58 (u* - u*_t)^2 + 25 (u* - u*_t), 0 where u* is below u*_t.
+
+        Parameters
+        ----------
+        winds
+            Winds at 10 m, m/s.
+
+        Returns
+        -------
+        FloatArray
+            P of each wind, g/m2.
+        """
+        ratio = self.faces["ratio"].to_numpy()
+        share = self.faces["share"].to_numpy()
+        ustar = np.multiply.outer(winds, self.ustar0_over_wind * ratio)
+        excess = np.maximum(ustar - self.threshold, 0)
+        lost = 58 * excess**2 + 25 * excess
+        return np.asarray(lost @ (share / share.sum()))
+
+    @property
+    def area(self) -> float:
+        """Sum of the shares of its faces: of a surface in three dimensions m2."""
+        return float(self.faces["share"].sum())
+
+    def total(self, winds: ArrayLike) -> float:
+        """Erosion potential of several winds, one after another.
+
+        Parameters
+        ----------
+        winds
+            Winds at 10 m, m/s.
+
+        Returns
+        -------
+        float
+            The sum of P, g/m2.
+        """
+        return float(self.potential(winds).sum())
+
+
+@dataclass(frozen=True)
+class Pile:
+    """A pile with the surfaces that it has without and with obstacles, at least one.
+
+    They are alike in everything else: shape, grains, flow and how that is solved.
+
+    Attributes
+    ----------
+    name
+        What tells it from other piles.
+    surfaces
+        Its surfaces; that without an obstacle comes first, if there is one.
+    is_flat
+        Whether AP-42 takes the pile for flat ground.
+    has_bare
+        Whether there is a surface without an obstacle.
+    """
+
+    name: str
+    surfaces: Sequence[Surface]
+    is_flat: bool
+    has_bare: bool
+
+    @property
+    def by_epa(self) -> list[Surface]:
+        """The surfaces by which AP-42 answers it: flat ground, or its four piles."""
+        threshold = self.surfaces[0].threshold
+        if self.is_flat:
+            faces = AREAS[:1].assign(part="all", ratio=1.0)
+            return [Surface("AP-42, flat ground", faces, FLAT, threshold)]
+        every = AREAS.assign(part="all", ratio=OVER_FLAT * AREAS["us_over_ur"])
+        found = []
+        for name, faces in every.groupby("pile"):
+            found.append(Surface(f"AP-42, {name}", faces, PILE / OVER_FLAT, threshold))
+        return found
+
+
+def without_obstacles(scene: Scene) -> Scene:
+    """Take the obstacles from a pile: piles of one such scene may be compared.
+
+    Parameters
+    ----------
+    scene
+        The scene of the pile.
+
+    Returns
+    -------
+    Scene
+        The scene without them.
+    """
+    return scene.without_obstacles()
+
+
+def names_of(scenes: Sequence[Scene]) -> list[str]:
+    """Name some different piles, each by what tells it from the others.
+
+    Parameters
+    ----------
+    scenes
+        Their scenes.
+
+    Returns
+    -------
+    list of str
+        The names.
+    """
+    table = pd.DataFrame([fields.asked(scene) for scene in scenes])
+    differing = [name for name in table if table[name].nunique(dropna=False) > 1]
+    apart = set(differing) - {*IN_NAME, *fields.TWINS}
+    columns = [column for column in fields.COLUMNS if column in apart]
+    found: list[str] = []
+    for scene, (_, row) in zip(scenes, table.iterrows(), strict=True):
+        name = ", ".join([*_form(scene), *labels.told(row, columns)])
+        # fields that are in no table tell them apart
+        same = sum(other.partition(" (pile ")[0] == name for other in found)
+        found.append(f"{name} (pile {same + 1})" if same else name)
+    return found
+
+
+def _form(scene: Scene) -> list[str]:
+    """The form of a pile in words."""
+    bed = scene.bed
+    assert isinstance(bed, PileBed)
+    words = [str(bed.profile.name if bed.profile else bed.shape)]
+    if _rises(bed):
+        height = FlowModel(scene).line.h
+        words += [f"{height:g} m high", f"{bed.slope_deg:g}°"]
+    words.append(f"z₀ {1e3 * scene.solve_roughness:g} mm")
+    return words
+
+
+def solved(scene: Scene, threshold: float | None, cases: Path) -> Surface:
+    """Find the surface of a pile by its flow.
+
+    Parameters
+    ----------
+    scene
+        The scene of the pile.
+    threshold
+        u*_t, m/s; None for that of its grain on a level bed, by the closed form.
+    cases
+        The directory of the finished runs.
+
+    Returns
+    -------
+    Surface
+        The surface; its faces have the columns ``x_m`` and ``z_m`` as well.
+    """
+    bed = scene.bed
+    assert isinstance(bed, PileBed)
+    faces = _faces(bed, FlowModel(scene).line, FlowModel(scene).stress(cases))
+    if threshold is None:
+        level = replace(single_grain(scene), slope_deg=0.0)
+        (own,) = thresholds_of(scene.forces.law, [level])
+        threshold = float(own.friction_velocity)
+    over_wind = float(log_law_ustar(1.0, WIND_HEIGHT, scene.solve_roughness))
+    name = " and a ".join(map(str, scene.obstacles)) or "no obstacle"
+    return Surface(name, faces, over_wind, threshold)
+
+
+def _faces(bed: PileBed, line: BedLine, stress: WallStress) -> pd.DataFrame:
+    """The faces of a pile, without the ground around it and without obstacles."""
+    x = stress.x_m
+    z = stress.z_m
+    is_on = (x > line.x[1]) & (x < line.x[-2])
+    if _rises(bed):
+        is_on &= z > GROUND * line.h
+    for start, end in line.bare:
+        is_on &= (x < start) | (x > end)
+    segment = np.searchsorted(line.x, x) - 1
+    slope = line.slopes_deg[np.clip(segment, 0, len(line.x) - 2)]
+    sides = [slope > LEVEL_DEG, slope < -LEVEL_DEG]
+    part = np.select(sides, ["windward", "lee"], "top")
+    columns = {
+        "x_m": bed.place(x),
+        "z_m": z,
+        "part": part,
+        "share": stress.length_m,
+        "ratio": np.abs(stress.ustar_over_ustar0_wall),
+    }
+    return pd.DataFrame(columns)[is_on]
+
+
+def _rises(bed: PileBed) -> bool:
+    """Whether a bed has a form on it, and is not flat ground."""
+    return bool(bed.profile) or bed.form.rises
+
+
+def grouped(
+    scenes: Sequence[Scene], threshold: float | None, cases: Path
+) -> list[Pile]:
+    """Find the piles of some scenes, each without and with its obstacles.
+
+    Parameters
+    ----------
+    scenes
+        The scenes, whose flows are done.
+    threshold
+        u*_t, m/s; None for that of each grain.
+    cases
+        The directory of the finished runs.
+
+    Returns
+    -------
+    list of Pile
+        The piles.
+    """
+    alike: dict[Scene, list[Scene]] = {}
+    for scene in scenes:
+        alike.setdefault(without_obstacles(scene), []).append(scene)
+    found = []
+    for (bare, members), name in zip(alike.items(), names_of([*alike]), strict=True):
+        bed = bare.bed
+        assert isinstance(bed, PileBed)
+        # a scene without obstacles is the first one, whatever the order of the file
+        first_bare = sorted(members, key=lambda scene: scene != bare)
+        surfaces = [solved(scene, threshold, cases) for scene in first_bare]
+        line = FlowModel(bare).line
+        base = _base(line.x, line.z, line.h)
+        is_flat = not _rises(bed) or line.h < FLAT_BELOW * base
+        found.append(Pile(name, surfaces, is_flat, bare in members))
+    return found
+
+
+def _base(x: Sequence[float], z: Sequence[float], height: float) -> float:
+    """Length of a bed line from its first to its last place above the ground, m."""
+    places = np.linspace(x[1], x[-2], BASE_PLACES)
+    above = places[np.interp(places, x, z) > GROUND * height]
+    return float(np.ptp(above)) if len(above) else 0.0
+
+
+def experiment(study: Study, out: Path) -> Experiment:
+    """Make the experiment on the erosion potential of the piles of a study.
+
+    Parameters
+    ----------
+    study
+        The study.
+    out
+        The directory, which the experiment does not depend on.
+
+    Returns
+    -------
+    Experiment
+        The experiment.
+
+    Raises
+    ------
+    InputError
+        If the threshold is neither a number that a wind can reach nor a material of
+        AP-42, if the study has no pile or one in a liquid, or if the flow over one
+        cannot be solved.
+    """
+    winds = study.erosion.fastest_mile
+    where = study.file or study.name
+    least, source = given_threshold(study.erosion.threshold, where)
+    asked = piles(study)
+    check_winds((scene.fluid for scene in asked), where)
+    flows = {scene: FlowModel(scene) for scene in asked}
+    for scene in flows:
+        limits.check(scene, where, grains=False)
+
+    def results(runs: Runs) -> Results:
+        done = []
+        for scene, flow in flows.items():
+            if all(run.name in runs.done for run in flow.cases):
+                done.append(scene)
+        if not done:
+            return {}, ()
+        return _results(grouped(done, least, runs.cases), winds, source)
+
+    every = plan.listed(run for flow in flows.values() for run in flow.cases)
+    return Experiment(
+        name="erosion",
+        title=study.title,
+        planned=plan.Plan({}, {}, (), {}, every),
+        results=results,
+        limit_s=study.time_limit_s,
+        source=study.source,
+        shares_cases=True,
+    )
+
+
+def given_threshold(asked: str | float | None, where: str) -> tuple[float | None, str]:
+    """Find the threshold that a study asks for.
+
+    Parameters
+    ----------
+    asked
+        A number, m/s, a material of AP-42, or None for that of each grain.
+    where
+        The study file, for messages.
+
+    Returns
+    -------
+    least
+        u*_t, m/s; None for that of each grain.
+    source
+        Where it is from, in words.
+
+    Raises
+    ------
+    InputError
+        If it is neither a number that a wind can reach nor a material of AP-42.
+    """
+    if asked is None:
+        return None, " (closed form)"
+    source = ""
+    least = asked
+    if isinstance(asked, str):
+        source = f" (AP-42, {asked})"
+        least = USTAR_T.get(asked, -1.0)
+    assert not isinstance(least, str)
+    if not 0 < least <= MOST_USTAR_T:
+        what = f"{asked!r} is not accepted"
+        materials = ", ".join(USTAR_T)
+        remedy = f"a value in m/s up to {MOST_USTAR_T:g}, or one of: {materials}"
+        raise InputError(what, f"{where}: erosion.threshold", remedy)
+    return least, source
+
+
+def check_winds(fluids: Iterable[Fluid], where: str) -> None:
+    """Refuse liquids, whose current takes no dust.
+
+    Parameters
+    ----------
+    fluids
+        The fluids of a study.
+    where
+        The study file, for messages.
+
+    Raises
+    ------
+    InputError
+        If one of them is a liquid.
+    """
+    for fluid in fluids:
+        if fluid.density >= GAS_BELOW:
+            what = f"a fluid of {fluid.density:g} kg/m3 is no wind"
+            remedy = "the losses of AP-42 are of wind"
+            remedy += "; `orchestrator study` has the current"
+            raise InputError(what, f"{where}: fluid.density", remedy)
+
+
+def _results(found: Sequence[Pile], winds: Sequence[float], source: str) -> Results:
+    """The table and the page of some piles."""
+    table = rows(found, winds)
+    caption = TEXTS["figure"]
+    if len(found) > DRAWN:
+        caption += f" The first {DRAWN} of {len(found)} piles are drawn."
+    drawing = picture(found[:DRAWN], winds)
+    figure = Figure("erosion", "Stress and loss", caption, (), drawing)
+    told = "\n\n".join([*sentences(found, winds, source), TEXTS["sure"]])
+    sections = [
+        Section("", told, [figure], card=card(found, winds, source)),
+        Section("Parts", TEXTS["rows"], (), [table], TEXTS["limits"].split("\n\n")),
+        Section("The tables of AP-42", TEXTS["sources"], (), [AREAS, MATERIALS]),
+    ]
+    return {"erosion": table}, sections
+
+
+def rows(found: Sequence[Pile], winds: ArrayLike) -> pd.DataFrame:
+    """List the parts of the surfaces of some piles.
+
+    Parameters
+    ----------
+    found
+        The piles.
+    winds
+        Winds at 10 m, m/s.
+
+    Returns
+    -------
+    DataFrame
+        A row for each part of each surface of each pile, those of AP-42 after the
+        solved ones: the share of the surface that it has, P, u*/u*_0, its largest
+        value, and the share of the whole surface that is nearest to each class of
+        AP-42.
+    """
+    listed = []
+    for pile in found:
+        for surface in (*pile.surfaces, *pile.by_epa):
+            whole = surface.faces["share"].sum()
+            # the surfaces of AP-42 are whole
+            by_part = {"all": surface.faces}
+            for name, part_of in surface.faces.groupby("part", sort=False):
+                by_part[str(name)] = part_of
+            for part, faces in by_part.items():
+                row: Row = {"pile": pile.name, "surface": surface.name, "part": part}
+                row |= _row(surface._replace(faces=faces), whole, winds)
+                listed.append(row)
+    return pd.DataFrame(listed)
+
+
+def _row(part: Surface, whole: float, winds: ArrayLike) -> Row:
+    """The numbers of a part of a surface; `whole` is the sum of all its shares."""
+    ratio = part.faces["ratio"].to_numpy()
+    share = 100 * part.faces["share"].to_numpy() / whole
+    row: Row = {
+        "u*ₜ, m/s": part.threshold,
+        "share, %": share.sum(),
+        "P, g/m²": part.total(winds),
+        "u*/u*₀": np.average(ratio, weights=share),
+        "largest": ratio[share > 0].max(),
+    }
+    apart = np.abs(ratio[:, None] - OVER_FLAT * CLASSES)
+    shares = np.bincount(apart.argmin(axis=1), share, len(CLASSES))
+    for us, near in zip(CLASSES, shares, strict=True):
+        row[f"{us:g} ({OVER_FLAT * us:.2f}), %"] = near
+    return row
+
+
+def sentences(
+    found: Sequence[Pile], winds: Sequence[float], source: str
+) -> Iterator[str]:
+    """Say what wind takes from each pile, by both, and what its obstacles take away.
+
+    Parameters
+    ----------
+    found
+        The piles.
+    winds
+        Winds at 10 m, m/s.
+    source
+        The source of the threshold, in words.
+
+    Yields
+    ------
+    str
+        A paragraph for each pile.
+    """
+    speeds = ", ".join(map("{:g}".format, winds))
+    for pile in found:
+        first, *others = pile.surfaces
+        lost = first.total(winds)
+        epa = [surface.total(winds) for surface in pile.by_epa]
+        ends = [f"{min(epa):.3g}"]
+        if f"{max(epa):.3g}" not in ends:
+            ends.append(f"{max(epa):.3g}")
+        with_what = first.name if pile.has_bare else f"with {_named(first)}"
+        by_epa = "by AP-42, to which it is flat ground," if pile.is_flat else "by AP-42"
+        told = (
+            f"Wind of {speeds} m/s at 10 m can take {lost:.3g} g/m² from the surface of"
+            f" a pile ({pile.name}; {with_what}), {by_epa} {' to '.join(ends)} g/m²."
+            f" Its threshold u*ₜ is {first.threshold:.3g} m/s{source}."
+        )
+        for other in others:
+            left = other.total(winds)
+            # obstacles are compared with none, not with one another
+            change = ""
+            if lost and pile.has_bare:
+                change = f" ({left / lost - 1:+.0%})"
+            told += f" With {_named(other)}: {left:.3g} g/m²{change}."
+        yield told
+
+
+def card(found: Sequence[Pile], winds: Sequence[float], source: str) -> Card:
+    """Make the answer card: what a wind takes from the first pile.
+
+    Parameters
+    ----------
+    found
+        The piles.
+    winds
+        Winds at 10 m, m/s.
+    source
+        Where the threshold is from, in words.
+
+    Returns
+    -------
+    Card
+        The loss by the solved flow and by AP-42, and the least of all with a fence or
+        from another direction.
+    """
+    pile = found[0]
+    first, *others = pile.surfaces
+    epa = [surface.total(winds) for surface in pile.by_epa]
+    with_what = "" if pile.has_bare else f", with {_named(first)}"
+    numbers = [
+        Number(
+            first.total(winds),
+            "g/m²",
+            f"of dust by the solved flow{with_what}",
+            f"mean over the surface; the threshold friction velocity is "
+            f"{first.threshold:.3g} m/s{source}",
+        ),
+        Number(
+            min(epa),
+            "g/m²",
+            "of dust by AP-42",
+            "the range of its patterns of the wind over piles",
+            last=max(epa),
+        ),
+    ]
+    if others:
+        least = min(others, key=lambda surface: surface.total(winds))
+        numbers.append(
+            Number(
+                least.total(winds), "g/m²", f"with {_named(least)}, the least of all"
+            )
+        )
+    speeds = ", ".join(map("{:g}".format, winds))
+    subject = pile.name
+    if len(found) > 1:
+        subject += f"; {len(found)} piles are compared below"
+    return Card(
+        f"How much dust does a wind of {speeds} m/s take from this pile?",
+        f"{subject}.",
+        tuple(numbers),
+        TEXTS["measured"],
+        Worth(
+            "care",
+            "usable, to compare",
+            "Compare piles and fences; the loss itself is that of an emission factor.",
+        ),
+    )
+
+
+def _named(surface: Surface) -> str:
+    """The obstacles of a surface with an article, such as "a fence of 2 m at -3 m"."""
+    return f"a {surface.name}"
+
+
+def picture(found: Sequence[Pile], winds: Sequence[float]) -> Canvas:
+    """Draw a row for each pile: u*/u*_0 over it, its share of the surface, P.
+
+    Parameters
+    ----------
+    found
+        The piles.
+    winds
+        Winds at 10 m, m/s.
+
+    Returns
+    -------
+    Figure
+        The figure.
+    """
+    canvas = style.canvas(2.3 * len(found) + 1.0)
+    grid = canvas.subplots(len(found), 3, squeeze=False, width_ratios=[1.3, 1, 1])
+    for axes, pile in zip(grid, found, strict=True):
+        _draw(axes, pile, winds)
+    style.legends(canvas, [], style.samples(grid[:, 1].tolist()))
+    return canvas
+
+
+def _draw(axes: Sequence[Axes], pile: Pile, winds: Sequence[float]) -> None:
+    """Draw the row of one pile: three panels."""
+    left, middle, right = axes
+    axis = np.linspace(0, 1.4 * max(winds), 141)
+    for number, surface in enumerate(pile.surfaces):
+        colour = COLOURS[number % len(COLOURS)]
+        _draw_shares(middle, surface, colour, "-")
+        right.plot(axis, surface.potential(axis), color=colour)
+        line = surface.drawn
+        left.plot(line["x_m"], line["ratio"], ".", ms=2.5, color=colour)
+    for surface, line_style in zip(pile.by_epa, LINES, strict=False):
+        _draw_shares(middle, surface, GREY, line_style)
+        right.plot(axis, surface.potential(axis), color=GREY, ls=line_style)
+    bed = left.twinx()
+    first = pile.surfaces[0]
+    line = first.drawn
+    x, z = line[["x_m", "z_m"]].to_numpy().T
+    bed.fill_between(x, z, color=style.BED, lw=0)
+    bed.set(ylim=(0, 4 * (z.max() or 1)), yticks=[])
+    middle.set(xlim=(0, 100), ylim=(0, None), xlabel="share of the surface above, %")
+    left.set(zorder=1, frame_on=False, ylim=middle.get_ylim())
+    left.set(xlabel="x, m", ylabel=USTAR)
+    left.set_title(pile.name, loc="left")
+    right.set(xlim=(0, axis[-1]), ylim=(0, None), xlabel="wind at 10 m, m/s")
+    right.set_title("P, g/m² of surface", loc="left")
+    right.vlines(winds, 0, right.get_ylim()[1], color="0.7", lw=0.8, zorder=0)
+
+
+def _draw_shares(ax: Axes, surface: Surface, colour: str, line_style: str) -> None:
+    """Draw u*/u*_0 over the share of the surface where it is larger."""
+    faces = surface.faces.sort_values("ratio", ascending=False)
+    above = 100 * faces["share"].cumsum() / faces["share"].sum()
+    first = faces["ratio"].max()
+    x = [0, *above]
+    y = [first, *faces["ratio"]]
+    ax.step(x, y, color=colour, ls=line_style, label=surface.name)

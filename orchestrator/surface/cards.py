@@ -1,0 +1,288 @@
+"""The answer on a surface in words: the card, and the sentences below it."""
+
+from collections.abc import Iterator, Sequence
+from functools import cache
+from math import ceil, isfinite, log10
+from pathlib import Path
+
+import pandas as pd
+
+from orchestrator.digits import number
+from orchestrator.report.card import Card, Number, Worth
+from orchestrator.report.subjects import length
+from orchestrator.surface import onset
+from orchestrator.surface.answer import Answer, Direction
+
+SURFACES = Path(__file__).with_name("measured") / "surfaces.csv"
+"""Flows over surfaces beside others: `orchestrator validate --surfaces all`."""
+MOST_TIED = 3
+"""Most directions that a tie names."""
+HALF, TENTH = 0.5, 0.1
+"""Shares of the surface whose hours or winds the answer has."""
+EXCEEDED = {
+    onset.STARTS: "u*/u*_0 that 1 % of the area exceeds",
+    HALF: "u*/u*_0 that half of the area exceeds",
+}
+"""Stresses of that table, by the share of the surface whose wind they decide."""
+LITTLE = 0.005
+"""Share of the surface that is not worth a word."""
+NOT_MEASURED = (
+    "Wall stress over a bed in three dimensions has not been measured; the wind at the "
+    "masts of Askervein hill is met within {:.2f} to {:.2f} of the reference speed, in "
+    "root mean square."
+)
+RMS = "rms of the differences"
+"""Its quantity in the table, of each line of masts."""
+INTERVAL_OF = "other first cells, meshes and models, on a cone"
+WORTH = Worth(
+    "care",
+    "usable, to compare directions and parts",
+    "Quote the interval. It is that of the flow alone; the threshold of the grain has "
+    "an interval of its own.",
+)
+
+
+def card(found: Sequence[Answer], source: str) -> Card:
+    """Make the answer card of surfaces: that of the one which moves first.
+
+    Parameters
+    ----------
+    found
+        The answers.
+    source
+        Where a given threshold is from, in words.
+
+    Returns
+    -------
+    Card
+        The wind in which motion starts, that in which half of the surface moves, and
+        the hours a year by the wind rose or the share that moves before flat ground.
+    """
+    first = min(found, key=lambda answer: answer.easiest.starts)
+    others = f"; {len(found)} surfaces are compared below" if len(found) > 1 else ""
+    directions = [f"{each.from_deg:g}°" for each in first.directions]
+    stream = first.ground.stream
+    winds = f"{stream.word} from {', '.join(directions)}"
+    if len(directions) > 4:
+        winds = f"{stream.word} from {len(directions)} directions"
+    return Card(
+        f"In which {stream.word} does this surface start to move, and how much of it "
+        "moves?",
+        f"{first.name}; {heaps(first)}; {_grain(first, source)}; {winds}{others}.",
+        tuple(_numbers(first)),
+        NOT_MEASURED.format(*_ends_at_masts()),
+        WORTH,
+    )
+
+
+def heaps(answer: Answer) -> str:
+    """Say how many heaps a surface has, and their area, in words.
+
+    Parameters
+    ----------
+    answer
+        The answer on it.
+
+    Returns
+    -------
+    str
+        The words.
+    """
+    counted = number(len(answer.surface.heaps), "heap")
+    return f"{counted} of {answer.easiest.area:.3g} m²"
+
+
+def _grain(answer: Answer, source: str) -> str:
+    """What lies on the surface, in words."""
+    ground = answer.ground
+    if ground.threshold is not None:
+        return f"threshold friction velocity {ground.threshold:.3g} m/s{source}"
+    return f"grains of {length(ground.grain.diameter)}"
+
+
+def _numbers(answer: Answer) -> Iterator[Number]:
+    """The figures of the card."""
+    first = answer.easiest
+    flat = answer.ground.flat
+    stream = answer.ground.stream
+    notes = [f"first at {_place(answer)}", f"on flat ground in {flat:.3g} m/s"]
+    high = factors_of_wind(onset.STARTS)[1] * first.starts
+    alike = [each for each in answer.directions if each.starts <= high]
+    tied = tie(
+        [each.from_deg for each in alike], first.from_deg, len(answer.directions)
+    )
+    yield _wind(
+        first,
+        onset.STARTS,
+        f"{stream.at} from {first.from_deg:g}° in which motion starts",
+        "; ".join(filter(None, [*notes, tied])),
+    )
+    if isfinite(first.shares().wind_for(HALF)):
+        what = f"{stream.at} from {first.from_deg:g}° in which half of it moves"
+        yield _wind(first, HALF, what)
+    if answer.rose is not None:
+        yield Number(
+            answer.hours_of(TENTH),
+            "hours a year",
+            "in which a tenth of it moves or more, by the wind rose",
+            f"some of it {answer.hours_of(onset.STARTS):.0f}, "
+            f"half of it {answer.hours_of(HALF):.0f} hours",
+            decimals=0,
+        )
+        return
+    low, high = factors_of_wind(HALF)
+    least, share, most = first.shares().at([flat / high, flat, flat / low])
+    yield Number(
+        100 * float(share),
+        "%",
+        f"of it moves in {flat:.3g} m/s, the {stream.word} that moves flat ground",
+        low=100 * float(least),
+        high=100 * float(most),
+        interval_of=INTERVAL_OF,
+        decimals=0,
+    )
+
+
+def _wind(direction: Direction, share: float, meaning: str, note: str = "") -> Number:
+    """The wind in which a share of a surface moves, with its interval."""
+    wind = direction.shares().wind_for(share)
+    low, high = factors_of_wind(share)
+    return Number(
+        wind,
+        "m/s",
+        meaning,
+        note,
+        low=low * wind,
+        high=high * wind,
+        interval_of=INTERVAL_OF,
+    )
+
+
+def tie(alike: Sequence[float], first: float, count: int) -> str:
+    """Say which directions are no better known apart from the first than its interval.
+
+    Parameters
+    ----------
+    alike
+        Directions within the interval of the first, degrees.
+    first
+        The first of all, degrees.
+    count
+        Number of all directions.
+
+    Returns
+    -------
+    str
+        The words; empty where there is none but the first.
+    """
+    others = [f"{each:g}°" for each in alike if each != first]
+    if not others:
+        return ""
+    if len(others) == count - 1 and count > 2:
+        return "no direction is told from another within the interval"
+    if len(others) > MOST_TIED:
+        return f"{len(others)} others are not told from it within the interval"
+    verb = "is" if len(others) == 1 else "are"
+    return f"{' and '.join(others)} {verb} not told from it within the interval"
+
+
+@cache
+def factors_of_wind(share: float) -> tuple[float, float]:
+    """Find how far other flows move the wind in which a share of a surface moves.
+
+    The wind is inverse to the stress.
+
+    Parameters
+    ----------
+    share
+        The share, of `EXCEEDED`.
+
+    Returns
+    -------
+    low, high : float
+        The least and the largest factor, which 1 lies between.
+    """
+    table = pd.read_csv(SURFACES)
+    is_meant = (table["part"] == "interval") & (table["quantity"] == EXCEEDED[share])
+    factors = table["compared_with"][is_meant] / table["value"][is_meant]
+    return min(1.0, float(factors.min())), max(1.0, float(factors.max()))
+
+
+def _ends_at_masts() -> tuple[float, float]:
+    """The least and the largest difference of all lines of masts."""
+    table = pd.read_csv(SURFACES)
+    rms = table["value"][table["quantity"] == RMS]
+    return float(rms.min()), float(rms.max())
+
+
+def _place(answer: Answer) -> str:
+    """Where motion starts, in the axes of the file."""
+    row = answer.easiest.first
+    x, y = (in_axes(float(row[name]), answer.cell_m) for name in ("x_m", "y_m"))
+    return f"x = {x} m, y = {y} m, {row['z_m']:.3g} m high"
+
+
+def in_axes(place: float, cell_m: float) -> str:
+    """Write a place on an axis of a file, whose zero may be far away.
+
+    Parameters
+    ----------
+    place
+        The place, m.
+    cell_m
+        Length of the flow's cells, m: a place is known to a tenth of it.
+
+    Returns
+    -------
+    str
+        The place, m.
+    """
+    return f"{place:.{max(0, ceil(1 - log10(cell_m)))}f}"
+
+
+def sentences(answer: Answer, source: str) -> Iterator[str]:
+    """Say what qualifies an answer.
+
+    Parameters
+    ----------
+    answer
+        The answer.
+    source
+        Where a given threshold is from, in words.
+
+    Yields
+    ------
+    str
+        A sentence.
+    """
+    first = answer.easiest
+    shares = first.shares()
+    stream = answer.ground.stream
+    yield (
+        f"On {answer.name} ({_grain(answer, source)}) motion starts in a {stream.word} "
+        f"of {first.starts:.3g} m/s at {stream.height:g} m from {first.from_deg:g}°. "
+        f"A tenth of the surface moves in {shares.wind_for(TENTH):.3g} m/s."
+    )
+    if len(answer.directions) > 1:
+        last = max(answer.directions, key=lambda each: each.starts)
+        high = factors_of_wind(onset.STARTS)[1] * first.starts
+        tied = ", which is within the interval" if last.starts <= high else ""
+        yield (
+            f"From {last.from_deg:g}° motion starts at {last.starts:.3g} m/s, "
+            f"of the {len(answer.directions)} directions the highest{tied}."
+        )
+    leaves = first.leaves
+    if leaves is not None:
+        yield (
+            "Motion is that of grains that leave in a gust and go on after it; "
+            f"without gusts grains leave their pockets at {leaves:.3g} m/s."
+        )
+    said = "; ".join(answer.smooth.said)
+    yield f"The surface is {said}: {answer.smooth.relief:.4g} m high in the flow."
+    loose = max(each.loose for each in answer.directions)
+    if loose > LITTLE:
+        angle = 90 - answer.ground.grain.entrainment_angle_deg
+        yield (
+            f"{loose:.0%} of it is steeper than {angle:g}° of the pockets of its "
+            "grains, which lie loose there: it is left out."
+        )

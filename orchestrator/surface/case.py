@@ -1,0 +1,368 @@
+"""The flow over a surface from one direction as an OpenFOAM case."""
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from importlib.metadata import version as installed
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from orchestrator.bed.deck import read_texts
+from orchestrator.digits import rounded
+from orchestrator.errors import Exploded, SolverError, Stalled
+from orchestrator.flow.case import DIAGNOSTICS, FIELDS, SPEED_HEIGHT, set_values
+from orchestrator.flow.foam import BED_FLOW, SolvedFlow, start_from
+from orchestrator.physics.constants import KARMAN
+from orchestrator.physics.velocity import log_law_speed, log_law_ustar
+from orchestrator.runs.case import Case
+from orchestrator.solvers import openfoam
+from orchestrator.surface import mesh
+from orchestrator.surface.heights import Surface
+from orchestrator.surface.mesh import COARSE, Columns, Level, Sizes
+from orchestrator.surface.stress import SurfaceStress, diagnostics
+from orchestrator.types import FloatArray
+
+SURFACE_STRESS = "surface_stress.csv"
+RESIDUAL = 1e-4
+"""Residual of p at which the mean stress on a hill is within 0.1 % of where it ends."""
+ITERATIONS = 120
+"""Iterations that a flow takes."""
+SPEED = 3.5e5
+"""Cells times iterations that a core does in a second."""
+DIRECTIONS_DEG = np.arange(0.0, 180.0, 15.0)
+"""Directions of which the one with the largest mesh decides how long the cells are."""
+
+
+def form_places(surface: Surface) -> FloatArray:
+    """Find the nodes of a surface that are a part of the form.
+
+    Parameters
+    ----------
+    surface
+        The surface.
+
+    Returns
+    -------
+    FloatArray
+        Their places from its centre, m, shape (n, 2).
+    """
+    rows, columns = np.nonzero(surface.is_form)
+    places = np.column_stack([surface.x[columns], surface.y[rows]])
+    return np.asarray(places - np.array(surface.centre))
+
+
+def sizes(places: FloatArray, from_deg: float) -> Sizes:
+    """Find the ends of a form along and across a wind.
+
+    Parameters
+    ----------
+    places
+        Places of the form, m, shape (n, 2).
+    from_deg
+        Where the wind comes from, degrees.
+
+    Returns
+    -------
+    Sizes
+        The ends, m.
+    """
+    along, across = mesh.wind_axes(from_deg) @ places.T
+    ends = (along.min(), along.max(), across.min(), across.max())
+    return Sizes(*(rounded(float(end)) for end in ends))
+
+
+def cell_length(surface: Surface, level: Level) -> float:
+    """Find how long the cells over a form are, whatever the direction of the wind.
+
+    Parameters
+    ----------
+    surface
+        The surface as it was read.
+    level
+        How fine the mesh is.
+
+    Returns
+    -------
+    float
+        The length, m: as the level has it, or longer where the mesh would have more
+        cells than the level allows.
+    """
+    places = form_places(surface)
+    step_x, step_y = surface.steps
+    radius = np.sqrt(len(places) * step_x * step_y / np.pi)
+    height = surface.relief
+    length = min(float(radius) / level.per_radius, height / level.per_height)
+    forms = [sizes(places, float(angle)) for angle in DIRECTIONS_DEG]
+    up = mesh.rows(height, mesh.FIRST_CELL * height, level)
+    while max(_cells(form, height, length, level) for form in forms) * up > (
+        level.most_cells
+    ):
+        length *= 1.02
+    return rounded(length)
+
+
+def _cells(form: Sizes, height: float, cell: float, level: Level) -> int:
+    """Columns of cells of the mesh over a form."""
+    x, y = mesh.grid_lines(form, height, cell, level)
+    return len(x) * (len(y) - 1)
+
+
+@dataclass(frozen=True)
+class SurfaceFlowCase(Case):
+    """Steady turbulent flow of a boundary layer over a surface from one direction.
+
+    The flow's u*/u*_0 depends on the shape, on the direction, on z0/h and on the mesh,
+    and hardly on the speed and the viscosity.
+
+    Attributes
+    ----------
+    surface
+        The surface as it was read.
+    from_deg
+        Where the wind comes from, degrees from north (+y) towards east (+x).
+    speed_m_s
+        Speed at ten heights of the form above the flat ground, U_e, m/s.
+    roughness_m
+        Roughness length z0 of the bed, m.
+    viscosity_m2_s
+        Kinematic viscosity, m2/s.
+    level
+        How fine the mesh is.
+    turbulence_model
+        OpenFOAM's turbulence model.
+    convection_scheme
+        OpenFOAM's scheme for the convection of U.
+    first_cell_m
+        Height of the cells on the bed, normal to it, m; by default h/40.
+    """
+
+    surface: Surface
+    from_deg: float
+    speed_m_s: float
+    roughness_m: float
+    viscosity_m2_s: float
+    level: Level = COARSE
+    turbulence_model: str = "kEpsilon"
+    convection_scheme: str = "linearUpwind"
+    first_cell_m: float | None = None
+
+    kind: ClassVar[str] = "surface"
+    template: ClassVar[str] = "openfoam/surface"
+    recipe: ClassVar[int] = 1
+    results: ClassVar[tuple[str, ...]] = (BED_FLOW,)
+    derived: ClassVar[tuple[str, ...]] = (SURFACE_STRESS, DIAGNOSTICS)
+    bulky: ClassVar[tuple[str, ...]] = (
+        *(f"[1-9]*/{name}" for name in FIELDS),
+        *(f"[1-9]*/uniform/{name}" for name in ("time", "cumulativeContErr")),
+        "[1-9]*/uniform/functionObjects/functionObjectProperties",
+    )
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """All that the flow depends on."""
+        return {
+            "surface": self.surface.digest,
+            "height": rounded(self.height_m),
+            "from_deg": float(self.from_deg),
+            "speed": float(self.speed_m_s),
+            "roughness": float(self.roughness_m),
+            "viscosity": float(self.viscosity_m2_s),
+            "level": vars(self.level),
+            "turbulence_model": self.turbulence_model,
+            "convection_scheme": self.convection_scheme,
+            "first_cell": self.first_cell,
+        }
+
+    @property
+    def height_m(self) -> float:
+        """Height h of the form above the flat ground, m."""
+        return self.surface.relief
+
+    @property
+    def first_cell(self) -> float:
+        """Height of the cells on the bed, normal to it, m; z_e is half of it."""
+        return rounded(self.first_cell_m or mesh.FIRST_CELL * self.height_m)
+
+    @property
+    def ustar0_m_s(self) -> float:
+        """Friction velocity u*_0 of the approaching flow by the log law, m/s."""
+        height = SPEED_HEIGHT * self.height_m
+        return float(log_law_ustar(self.speed_m_s, height, self.roughness_m))
+
+    @property
+    def axes(self) -> FloatArray:
+        """Unit vectors along and across the wind in the axes of the file, (2, 2)."""
+        return mesh.wind_axes(self.from_deg)
+
+    @cached_property
+    def cell_m(self) -> float:
+        """Length of the cells over the form, m."""
+        return cell_length(self.surface, self.level)
+
+    @property
+    def mesh(self) -> Columns:
+        """The mesh over the smoothed surface, in the axes of the wind."""
+        return _mesh_of(self)
+
+    def heights(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Find heights of the smoothed surface.
+
+        Parameters
+        ----------
+        x, y
+            Places in the axes of the wind, m, of one shape.
+
+        Returns
+        -------
+        FloatArray
+            Heights above the flat ground, m.
+        """
+        turned = np.stack([x, y], axis=-1) @ self.axes
+        east, north = np.moveaxis(turned + np.array(self.surface.centre), -1, 0)
+        return self.surface.smoothed(self.cell_m).at(east, north)
+
+    @property
+    def ranks(self) -> int:
+        """Processes that share the mesh."""
+        return self.level.ranks
+
+    @property
+    def cost_s(self) -> float:
+        """Time of one core, s; cells by what a mesh of the level has at most."""
+        return self.level.most_cells * ITERATIONS / SPEED
+
+    def share(self, directory: Path) -> float:
+        """Iterations over those that are expected, at most nearly all."""
+        path = directory / "log.simpleFoam"
+        if not path.is_file():
+            return 0.0
+        text = path.read_text(encoding="utf-8", errors="replace")
+        return min(text.count("\nTime = ") / ITERATIONS, 0.95)
+
+    def versions(self) -> dict[str, str]:
+        """The programs that mesh and solve."""
+        return {"numpy": installed("numpy"), "openfoam": openfoam.version()}
+
+    def write(self, directory: Path, cases: Path) -> None:
+        """Write parameters, the mesh and a flow to start from."""
+        height = self.height_m
+        values = {
+            "freeStream": float(self.speed_m_s),
+            "speedHeight": SPEED_HEIGHT * height,
+            "lidHeight": self.mesh.lid,
+            "slabOffset": -self.mesh.slab,
+            "firstCentre": self.first_cell / 2,
+            "roughnessLength": float(self.roughness_m),
+            "viscosity": float(self.viscosity_m2_s),
+            "turbulence": self.turbulence_model,
+            "convection": self.convection_scheme,
+            "residual": f"{RESIDUAL:.3g}",
+            "ranks": self.ranks,
+        }
+        set_values(directory / "parameters", values)
+        (directory / "surface.msh").unlink()  # the mesh of the template
+        self.mesh.write(directory)
+        over = self.mesh.over_bed.ravel()
+        ustar = self.ustar0_m_s
+        speed = log_law_speed(ustar, over, self.roughness_m)
+        start_from(directory / "0/U", np.column_stack([speed, 0 * speed, 0 * speed]))
+        frequency = ustar / (KARMAN * (over + self.roughness_m))
+        start_from(directory / "0/epsilon", ustar**2 * frequency)
+        start_from(directory / "0/omega", frequency / np.sqrt(0.09))
+
+    def collect(self, directory: Path) -> None:
+        """Check the run and write its tables, or say why it failed."""
+        try:
+            iterations = openfoam.check_log(directory)
+        except Stalled as error:
+            remedy = "raise bed.smoothing_cells, which smooths the surface"
+            what = f"{error.what}: the flow cycles"
+            raise Stalled(what, error.where, remedy) from None
+        stress, ustar0 = self.stress(directory)
+        approach = ustar0 / self.ustar0_m_s
+        reynolds = self.ustar0_m_s / self.viscosity_m2_s
+        stress.to_csv(directory / SURFACE_STRESS)
+        table = diagnostics(
+            stress, self.mesh, approach, reynolds, self.roughness_m, iterations
+        )
+        table.to_csv(directory / DIAGNOSTICS, float_format="%.6g", lineterminator="\n")
+        if table.loc["approach_ustar_over_log_law", "sound"] != "yes":
+            what = f"on flat ground u* is {approach:.3f} of the log law's"
+            what = f"{what}: the wall function fails"
+            remedy = (
+                f"{DIAGNOSTICS} says more; raise the first cell's height or the speed"
+            )
+            raise SolverError(what, where=str(directory), remedy=remedy)
+
+    def velocity(self, directory: Path) -> FloatArray:
+        """Read the velocity in the cells, in the axes of the wind.
+
+        Parameters
+        ----------
+        directory
+            Directory of the case, with its bulky files.
+
+        Returns
+        -------
+        FloatArray
+            The velocity, m/s, of the shape of the mesh's `middles`.
+
+        Raises
+        ------
+        SolverError
+            If it is missing or not whole.
+        """
+        values = SolvedFlow(directory).field("U")
+        return values.reshape(*self.mesh.shape, 3)
+
+    def stress(self, directory: Path) -> tuple[SurfaceStress, float]:
+        """Read the stress on the bed.
+
+        Parameters
+        ----------
+        directory
+            Directory of the case.
+
+        Returns
+        -------
+        stress
+            The stress over that of the approaching flow.
+        ustar0
+            Friction velocity of the approaching flow, m/s.
+
+        Raises
+        ------
+        SolverError
+            If it is missing, or not of this mesh.
+        Exploded
+            If it is not a number.
+        """
+        columns = read_texts(directory / BED_FLOW)
+        ustar0 = float(columns["ustar0_m_s"][0])
+        parts = [columns[f"tau_{axis}"].astype(float) for axis in ("x", "y", "z")]
+        tau = np.column_stack(parts)
+        along, across, _ = self.mesh.shape
+        if len(tau) != along * across:
+            what = f"{BED_FLOW} has {len(tau)} faces, not those of this mesh"
+            raise SolverError(what, str(directory), "run the case again")
+        if not np.isfinite(tau).all():
+            raise Exploded("the stress on the bed is not a number", str(directory))
+        centre = np.array(self.surface.centre)
+        return SurfaceStress.of_faces(self.mesh, tau, self.axes, centre), ustar0
+
+
+# the meshes of many directions would take 50 MB each
+@lru_cache(maxsize=2)
+def _mesh_of(one: SurfaceFlowCase) -> Columns:
+    """The mesh of a case."""
+    form = sizes(form_places(one.surface), one.from_deg)
+    x, y = mesh.grid_lines(form, one.height_m, one.cell_m, one.level)
+    return Columns.over(
+        one.heights,
+        x,
+        y,
+        height=one.height_m,
+        first_cell=one.first_cell,
+        count=mesh.rows(one.height_m, one.first_cell, one.level),
+    )

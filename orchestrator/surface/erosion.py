@@ -1,0 +1,502 @@
+"""What wind takes from heaps in three dimensions, beside AP-42, section 13.2.5."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from orchestrator import plan
+from orchestrator.digits import number
+from orchestrator.experiment import Experiment, Results, Runs, page_texts
+from orchestrator.physics.velocity import log_law_ustar
+from orchestrator.report.card import Card, Number, Worth
+from orchestrator.report.page import Section
+from orchestrator.report.style import Figure
+from orchestrator.stockpile import erosion
+from orchestrator.surface import answer, cards, onset, pipeline
+from orchestrator.surface.case import SURFACE_STRESS, SurfaceFlowCase
+from orchestrator.surface.heights import Heap
+from orchestrator.surface.mesh import wind_axes
+from orchestrator.surface.parts import SurfaceScene
+from orchestrator.surface.stress import SurfaceStress
+from orchestrator.surface.study import SurfaceStudy
+
+ROW = 1.5
+"""Distance from the middle up to which faces are of its row, over the least."""
+GRAMS = 1000.0
+"""Grams of a kilogram."""
+
+
+@dataclass(frozen=True)
+class Wind:
+    """The heaps of a surface under the wind of one direction.
+
+    Attributes
+    ----------
+    from_deg
+        Where the wind comes from, degrees.
+    whole
+        The faces of all heaps.
+    heaps
+        The faces of each.
+    """
+
+    from_deg: float
+    whole: erosion.Surface
+    heaps: Sequence[erosion.Surface]
+
+    @classmethod
+    def of(cls, scene: SurfaceScene, form: pd.DataFrame, threshold: float) -> "Wind":
+        """Divide the faces of the heaps of a scene.
+
+        Parameters
+        ----------
+        scene
+            The surface under the wind of one direction.
+        form
+            The faces of all heaps, as `answer.Direction.form` lists them.
+        threshold
+            u*_t, m/s.
+
+        Returns
+        -------
+        Wind
+            The heaps; shares are areas, m2.
+        """
+        surface_ = scene.heights
+        heaps = []
+        for one, heap in enumerate(surface_.heaps, 1):
+            faces = form[form[answer.HEAP] == one]
+            heaps.append(surface_of(scene, faces, threshold, heap))
+        highest = surface_.heaps[0]
+        whole = surface_of(scene, form, threshold, highest)
+        return cls(scene.flow.from_deg, whole, heaps)
+
+    def loss_kg(self, winds: Sequence[float]) -> float:
+        """Mass that winds, one after another, can take from all heaps, kg."""
+        return self.whole.total(winds) * self.whole.area / GRAMS
+
+
+@dataclass(frozen=True)
+class Heaps:
+    """The heaps of a surface under the winds of all directions.
+
+    Attributes
+    ----------
+    name
+        The surface in words.
+    heaps
+        The heaps.
+    winds
+        The directions, the one that takes the most first.
+    speeds
+        Winds at 10 m, one after another, m/s.
+    rose
+        The table of the wind rose of the study; None without one.
+    """
+
+    name: str
+    heaps: Sequence[Heap]
+    winds: Sequence[Wind]
+    speeds: Sequence[float]
+    rose: pd.DataFrame | None = None
+
+    @property
+    def worst(self) -> Wind:
+        """The direction that takes the most."""
+        return self.winds[0]
+
+    @cached_property
+    def piles(self) -> list[erosion.Pile]:
+        """Each heap as a pile of its own, with its surface by every direction."""
+        found = []
+        for place, heap in enumerate(self.heaps):
+            surfaces = [wind.heaps[place] for wind in self.winds]
+            is_flat = heap.height < erosion.FLAT_BELOW * 2 * heap.radius
+            name = self._name_of(place, heap)
+            found.append(erosion.Pile(name, surfaces, is_flat, has_bare=False))
+        return found
+
+    def _name_of(self, place: int, heap: Heap) -> str:
+        """The name of a heap: where there are several, with its number and place."""
+        if len(self.heaps) == 1:
+            return self.name
+        where = f"x = {heap.x:.0f} m, y = {heap.y:.0f} m"
+        return f"{self.name}, heap {place + 1} at {where}, {heap.height:.3g} m high"
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Ends of the loss by the worst direction, g/m2, by other flows over a cone.
+
+        Stress is inverse to the wind in which motion starts.
+        """
+        low, high = cards.factors_of_wind(onset.STARTS)
+        whole = self.worst.whole
+        ends = []
+        for factor in (1 / high, 1 / low):
+            other = whole._replace(ustar0_over_wind=factor * whole.ustar0_over_wind)
+            ends.append(other.total(self.speeds))
+        return ends[0], ends[1]
+
+    @property
+    def by_epa(self) -> tuple[float, float]:
+        """The least and the largest loss of all heaps together by AP-42, kg."""
+        low = high = 0.0
+        for pile in self.piles:
+            lost = [surface_.total(self.speeds) for surface_ in pile.by_epa]
+            area = pile.surfaces[0].area
+            low += min(lost) * area / GRAMS
+            high += max(lost) * area / GRAMS
+        return low, high
+
+    def by_rose(self) -> "pd.Series[float]":
+        """Mean loss of a disturbance whose strongest wind is one of the rose, kg.
+
+        Returns
+        -------
+        Series
+            The part of each direction of the flow, by degrees.
+        """
+        assert self.rose is not None
+        found = {}
+        for wind in self.winds:
+            rows = self.rose[self.rose["solved_deg"] == wind.from_deg]
+            lost = wind.whole.potential(rows["speed_m_s"].to_numpy(float))
+            mean = float(lost @ rows["share"].to_numpy(float))
+            found[wind.from_deg] = mean * wind.whole.area / GRAMS
+        return pd.Series(found)
+
+
+def surface_of(
+    scene: SurfaceScene, faces: pd.DataFrame, threshold: float, heap: Heap
+) -> erosion.Surface:
+    """Make the surface of a pile of its faces.
+
+    Parameters
+    ----------
+    scene
+        The pile under the wind of one direction.
+    faces
+        Its faces, as `answer.Ground.faces` lists them, with the slope along the
+        wind in ``uphill``.
+    threshold
+        u*_t, m/s.
+    heap
+        The heap whose middle the figure is drawn over.
+
+    Returns
+    -------
+    erosion.Surface
+        The surface; shares are by area.
+    """
+    faces = faces.sort_values("along_m")
+    is_level = faces["slope_deg"] < erosion.LEVEL_DEG
+    side = np.where(faces["uphill"] > 0, "windward", "lee")
+    along, across = _from_middle(scene, heap)
+    columns = {
+        "x_m": faces["along_m"] - along,
+        "z_m": faces["z_m"],
+        "part": np.where(is_level, "top", side),
+        "share": faces["area_m2"],
+        "ratio": faces[answer.RATIO],
+    }
+    name = f"wind from {scene.flow.from_deg:g}°"
+    over_wind = float(log_law_ustar(1.0, onset.WIND_HEIGHT, scene.solve_roughness))
+    listed = pd.DataFrame(columns)
+    off_middle = (faces["across_m"] - across).abs()
+    # the middles of a row of faces lie within a part of a cell
+    is_middle = off_middle <= ROW * off_middle.min()
+    return erosion.Surface(name, listed, over_wind, threshold, listed[is_middle])
+
+
+def _from_middle(scene: SurfaceScene, heap: Heap) -> tuple[float, float]:
+    """The middle of a heap along and across the wind, from that of the form, m."""
+    off = np.array([heap.x, heap.y]) - np.array(scene.heights.centre)
+    along, across = wind_axes(scene.flow.from_deg) @ off
+    return float(along), float(across)
+
+
+def experiment(study: SurfaceStudy, out: Path) -> Experiment:
+    """Make the experiment on the erosion potential of heaps in three dimensions.
+
+    Parameters
+    ----------
+    study
+        The study.
+    out
+        The directory of the results.
+
+    Returns
+    -------
+    Experiment
+        Its runs, and what is made of them.
+
+    Raises
+    ------
+    InputError
+        If the threshold is no number that a wind can reach, nor a material of AP-42, if
+        the rose blows from where no flow is, or if the fluid is a liquid.
+    """
+    del out
+    erosion.check_winds((scene.fluid for scene in study.scenes), study.file)
+    least, source = erosion.given_threshold(study.erosion.threshold, study.file)
+    flows = {scene: pipeline.flow_of(scene) for scene in study.scenes}
+    members = pipeline.alike(study.scenes)
+    roses = surface.roses_of(study, members)
+
+    def results(runs: Runs) -> Results:
+        found = []
+        for bare, scenes in members.items():
+            done = [scene for scene in scenes if flows[scene].name in runs.done]
+            if done:
+                rose = roses.get(bare) if len(done) == len(scenes) else None
+                winds = _winds(done, flows, least, runs.cases, study)
+                speeds = study.erosion.fastest_mile
+                heaps = bare.heights.heaps
+                found.append(Heaps(bare.name, heaps, winds, speeds, rose))
+        if not found:
+            return {}, ()
+        return {"erosion": rows(found)}, sections(found, source)
+
+    planned = plan.Plan({}, {}, (), {}, plan.listed(flows.values()))
+    return Experiment(
+        "erosion",
+        study.title,
+        planned,
+        results,
+        study.time_limit_s,
+        source=study.source,
+        shares_cases=True,
+    )
+
+
+def _winds(
+    scenes: Sequence[SurfaceScene],
+    flows: Mapping[SurfaceScene, SurfaceFlowCase],
+    least: float | None,
+    cases: Path,
+    study: SurfaceStudy,
+) -> list[Wind]:
+    """The heaps of scenes that differ in the direction of the wind, the worst first."""
+    found = []
+    for scene in scenes:
+        ground = pipeline.ground_of(scene, least)
+        stress = SurfaceStress.from_csv(cases / flows[scene].name / SURFACE_STRESS)
+        direction = answer.Direction.of(
+            ground, stress, scene.flow.from_deg, scene.heights
+        )
+        found.append(Wind.of(scene, direction.form, ground.level_ustar))
+    speeds = study.erosion.fastest_mile
+    return sorted(found, key=lambda wind: -wind.loss_kg(speeds))
+
+
+def rows(found: Sequence[Heaps]) -> pd.DataFrame:
+    """List the parts of each heap, as `erosion.rows` does, with areas and masses.
+
+    Parameters
+    ----------
+    found
+        The heaps of each surface.
+
+    Returns
+    -------
+    DataFrame
+        The rows; AP-42 is applied to the area of the heap by the worst direction.
+    """
+    tables = []
+    for heaps in found:
+        for pile in heaps.piles:
+            table = erosion.rows([pile], heaps.speeds)
+            areas = {one.name: one.area for one in pile.surfaces}
+            whole = table["surface"].map(areas).fillna(pile.surfaces[0].area)
+            area = whole * table["share, %"] / 100
+            at = table.columns.get_loc("P, g/m²")
+            assert isinstance(at, int)
+            table.insert(at, "area, m²", area)
+            table.insert(at + 2, "loss, kg", area * table["P, g/m²"] / GRAMS)
+            tables.append(table)
+    return pd.concat(tables, ignore_index=True)
+
+
+def sections(found: Sequence[Heaps], source: str) -> list[Section]:
+    """The page: the answer with its figure, the parts, and the tables of AP-42.
+
+    Parameters
+    ----------
+    found
+        The heaps of each surface.
+    source
+        Where the threshold is from, in words.
+
+    Returns
+    -------
+    list of Section
+        The sections, in their order.
+    """
+    texts = erosion.TEXTS
+    own = page_texts(__file__, "surface")
+    piles = [pile for heaps in found for pile in heaps.piles]
+    drawing = erosion.picture(piles[: erosion.DRAWN], found[0].speeds)
+    figure = Figure("erosion", "Stress and loss", own["erosion"], (), drawing)
+    said = [line for heaps in found for line in sentences(heaps, source)]
+    told = "\n\n".join([*said, own["erosion_sure"]])
+    limits = own["erosion_limits"].split("\n\n")
+    tables = [erosion.AREAS, erosion.MATERIALS]
+    return [
+        Section("", told, [figure], card=card(found, source)),
+        Section("Parts", texts["rows"], (), [rows(found)], limits),
+        Section("The tables of AP-42", texts["sources"], (), tables),
+    ]
+
+
+def sentences(heaps: Heaps, source: str) -> Iterator[str]:
+    """Say what wind takes from each heap, by both, and from which directions less.
+
+    Parameters
+    ----------
+    heaps
+        The heaps of a surface.
+    source
+        Where the threshold is from, in words.
+
+    Yields
+    ------
+    str
+        A paragraph for each heap, and one for the wind rose.
+    """
+    speeds = ", ".join(map("{:g}".format, heaps.speeds))
+    for pile in heaps.piles:
+        first, *others = pile.surfaces
+        lost = first.total(heaps.speeds)
+        epa = [one.total(heaps.speeds) for one in pile.by_epa]
+        ends = dict.fromkeys(f"{end:.3g}" for end in (min(epa), max(epa)))
+        by_epa = "by AP-42, to which it is flat ground," if pile.is_flat else "by AP-42"
+        told = (
+            f"Wind of {speeds} m/s at 10 m can take {lost:.3g} g/m² from the surface of"
+            f" a pile ({pile.name}; {first.name}), {lost * first.area / GRAMS:.3g} kg"
+            f" from its {first.area:.3g} m², {by_epa} {' to '.join(ends)} g/m²."
+            f" Its threshold u*ₜ is {first.threshold:.3g} m/s{source}."
+        )
+        for other in others:
+            left = other.total(heaps.speeds)
+            change = f" ({left / lost - 1:+.0%})" if lost else ""
+            told += f" With {other.name}: {left:.3g} g/m²{change}."
+        yield told
+    if heaps.rose is not None:
+        yield _of_rose(heaps)
+
+
+def _of_rose(heaps: Heaps) -> str:
+    """What the winds of the rose take, in words."""
+    parts = heaps.by_rose()
+    if not parts.sum():
+        return "No wind of the rose reaches the threshold anywhere on the heaps."
+    shares = parts / parts.sum()
+    named = [
+        f"{share:.0%} in wind from {at:g}°" for at, share in shares.items() if share
+    ]
+    return (
+        f"A disturbance after which the strongest wind is one of the rose costs "
+        f"{parts.sum():.3g} kg in the mean: {', '.join(named)}. A year has that times "
+        "the number of its disturbances. The fastest mile of AP-42 is a gust of a "
+        "minute or less, stronger than the mean wind of an hour."
+    )
+
+
+def card(found: Sequence[Heaps], source: str) -> Card:
+    """Make the answer card: what the wind from the worst direction takes.
+
+    Parameters
+    ----------
+    found
+        The heaps of each surface; the card is on the first.
+    source
+        Where the threshold is from, in words.
+
+    Returns
+    -------
+    Card
+        The loss by the solved flow and by AP-42, and that by the wind rose or from the
+        direction that takes the least.
+    """
+    heaps = found[0]
+    speeds = ", ".join(map("{:g}".format, heaps.speeds))
+    counted = number(len(heaps.heaps), "heap")
+    subject = f"{heaps.name}; {counted} of {heaps.worst.whole.area:.3g} m²"
+    if len(found) > 1:
+        subject += f"; {len(found)} surfaces are compared below"
+    return Card(
+        f"How much dust does a wind of {speeds} m/s take from this pile?",
+        f"{subject}.",
+        tuple(_numbers(heaps, source)),
+        erosion.TEXTS["measured"],
+        Worth(
+            "care",
+            "usable, to compare",
+            "Compare heaps and directions; the loss itself is that of an emission "
+            "factor.",
+        ),
+    )
+
+
+def _numbers(heaps: Heaps, source: str) -> Iterator[Number]:
+    """The figures of the card."""
+    worst = heaps.worst
+    whole = worst.whole
+    low, high = heaps.interval
+    of_all = f", the worst of {len(heaps.winds)}" if len(heaps.winds) > 1 else ""
+    notes = [
+        f"{worst.loss_kg(heaps.speeds):.3g} kg in all",
+        f"the threshold friction velocity is {whole.threshold:.3g} m/s{source}",
+        _tie(heaps),
+    ]
+    yield Number(
+        whole.total(heaps.speeds),
+        "g/m²",
+        f"of dust by the solved flow, with a {whole.name}{of_all}",
+        "; ".join(filter(None, notes)),
+        low=low,
+        high=high,
+        interval_of=cards.INTERVAL_OF,
+    )
+    least, most = heaps.by_epa
+    yield Number(
+        GRAMS * least / whole.area,
+        "g/m²",
+        "of dust by AP-42",
+        f"{' to '.join(dict.fromkeys(f'{end:.3g}' for end in (least, most)))} kg; the "
+        "range of its patterns of the wind over piles",
+        last=GRAMS * most / whole.area,
+    )
+    if heaps.rose is not None:
+        yield _by_rose(heaps)
+    elif len(heaps.winds) > 1:
+        last = heaps.winds[-1]
+        meaning = f"with a {last.whole.name}, the least of all"
+        note = f"{last.loss_kg(heaps.speeds):.3g} kg"
+        yield Number(last.whole.total(heaps.speeds), "g/m²", meaning, note)
+
+
+def _by_rose(heaps: Heaps) -> Number:
+    """The mean loss by the wind rose."""
+    parts = heaps.by_rose()
+    meaning = "in the mean over the winds of the rose, for each disturbance"
+    if not parts.sum():
+        return Number(0.0, "kg", meaning, "none of them reaches the threshold")
+    most = parts.index[int(parts.argmax())]
+    share = parts.max() / parts.sum()
+    note = f"{share:.0%} of it in wind from {most:g}°"
+    return Number(float(parts.sum()), "kg", meaning, note)
+
+
+def _tie(heaps: Heaps) -> str:
+    """Say which directions are not told from the worst."""
+    low, _ = heaps.interval
+    alike = []
+    for wind in heaps.winds:
+        if wind.whole.total(heaps.speeds) >= low:
+            alike.append(wind.from_deg)
+    return cards.tie(alike, heaps.worst.from_deg, len(heaps.winds))

@@ -1,0 +1,444 @@
+"""From a raster to the wind at which each part of it moves.
+
+OpenFOAM gives the stress on a bed in three dimensions for each direction of the wind,
+the closed form the threshold of a grain on each of its faces.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure as Canvas
+
+from orchestrator import plan
+from orchestrator.experiment import Experiment, Results, Runs, page_texts
+from orchestrator.flow.case import SPEED_HEIGHT
+from orchestrator.physics.constants import KARMAN
+from orchestrator.physics.velocity import log_law_ustar
+from orchestrator.report.page import Section
+from orchestrator.report.style import Figure
+from orchestrator.stockpile.erosion import given_threshold
+from orchestrator.study.scene import (
+    SOLVE_VISCOSITY,
+    VISCOUS_CELLS,
+    default_first_cell_height,
+)
+from orchestrator.surface import cards, maps
+from orchestrator.surface.answer import (
+    HOURS,
+    LEAST,
+    LEAVES,
+    MOVES,
+    RATIO,
+    Answer,
+    Direction,
+    Ground,
+    Stream,
+)
+from orchestrator.surface.case import SURFACE_STRESS, SurfaceFlowCase
+from orchestrator.surface.mesh import LEVELS
+from orchestrator.surface.parts import SurfaceScene
+from orchestrator.surface.raster import geotiff
+from orchestrator.surface.stress import SurfaceStress
+from orchestrator.surface.study import SurfaceStudy
+from orchestrator.types import FloatArray
+
+HEADINGS = {
+    "x_m": "first at x, m",
+    "y_m": "y, m",
+    "z_m": "z, m",
+}
+"""Columns of directions as the page calls them."""
+MOST_SHARE = 0.95
+"""Share of the surface up to which it is drawn against the wind."""
+
+
+def experiment(study: SurfaceStudy, out: Path) -> Experiment:
+    """Make the experiment of a study on surfaces.
+
+    Parameters
+    ----------
+    study
+        The study.
+    out
+        The directory of the results.
+
+    Returns
+    -------
+    Experiment
+        Its runs, and what is made of them.
+
+    Raises
+    ------
+    InputError
+        If the threshold is no number or material, or the rose blows from where no flow
+        is.
+    """
+    threshold, source = given_threshold(study.erosion.threshold, study.file)
+    flows = {scene: flow_of(scene) for scene in study.scenes}
+    members = alike(study.scenes)
+    roses = roses_of(study, members)
+
+    def answers(runs: Runs) -> list[Answer]:
+        found = []
+        for bare, scenes in members.items():
+            done = [scene for scene in scenes if flows[scene].name in runs.done]
+            if not done:
+                continue
+            rose = roses.get(bare) if len(done) == len(scenes) else None
+            found.append(_answer(done, flows, threshold, runs.cases, rose))
+        return found
+
+    def results(runs: Runs) -> Results:
+        found = answers(runs)
+        if not found:
+            return {}, ()
+        return tables(found), sections(found, source)
+
+    planned = plan.Plan({}, {}, (), {}, plan.listed(flows.values()))
+    return Experiment(
+        "surface",
+        study.title,
+        planned,
+        results,
+        study.time_limit_s,
+        source=study.source,
+        files=lambda runs: files(answers(runs)),
+        shares_cases=True,
+    )
+
+
+def flow_of(scene: SurfaceScene) -> SurfaceFlowCase:
+    """The run of a scene.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+
+    Returns
+    -------
+    SurfaceFlowCase
+        The run of its flow.
+    """
+    roughness = scene.solve_roughness
+    relief = scene.heights.relief
+    asked = scene.method.flow
+    eddy = KARMAN * float(log_law_ustar(asked.speed, SPEED_HEIGHT * relief, roughness))
+    viscous = (asked.viscosity or 0.0) / eddy
+    cell = asked.first_cell_height
+    cell = cell or default_first_cell_height(relief, roughness, viscous)
+    most = eddy * cell / VISCOUS_CELLS
+    viscosity = asked.viscosity or min(SOLVE_VISCOSITY, float(f"{most:.3g}"))
+    return SurfaceFlowCase(
+        scene.heights,
+        scene.flow.from_deg,
+        asked.speed,
+        roughness,
+        viscosity,
+        LEVELS[asked.level],
+        turbulence_model=asked.turbulence_model,
+        first_cell_m=cell,
+    )
+
+
+def alike(
+    scenes: Sequence[SurfaceScene],
+) -> dict[SurfaceScene, list[SurfaceScene]]:
+    """Scenes by the one that they are but for the direction of the wind.
+
+    Parameters
+    ----------
+    scenes
+        Scenes of a study.
+
+    Returns
+    -------
+    dict
+        By a scene whose wind comes from 0 degrees: those that differ from it in the
+        direction alone.
+    """
+    found: dict[SurfaceScene, list[SurfaceScene]] = {}
+    for scene in scenes:
+        flow = scene.flow.model_copy(update={"from_deg": 0.0})
+        bare = scene.model_copy(update={"flow": flow})
+        found.setdefault(bare, []).append(scene)
+    return found
+
+
+def roses_of(
+    study: SurfaceStudy, members: Mapping[SurfaceScene, Sequence[SurfaceScene]]
+) -> dict[SurfaceScene, pd.DataFrame]:
+    """List the wind rose of a study with the flows that answer it.
+
+    Parameters
+    ----------
+    study
+        The study.
+    members
+        Its scenes by `alike`.
+
+    Returns
+    -------
+    dict
+        The table of the rose for the scenes of each key; empty without a rose.
+
+    Raises
+    ------
+    InputError
+        If the rose blows from where no flow is.
+    """
+    if not study.rose:
+        return {}
+    where = f"{study.file}: erosion.wind"
+    found = {}
+    for bare, scenes in members.items():
+        directions = [scene.flow.from_deg for scene in scenes]
+        found[bare] = study.rose.table(directions, where)
+    return found
+
+
+def ground_of(scene: SurfaceScene, threshold: float | None) -> Ground:
+    """What lies on the surface of a scene; a threshold replaces the closed form.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    threshold
+        Friction velocity of every face, m/s; None: the closed form.
+
+    Returns
+    -------
+    Ground
+        The grains of its faces.
+    """
+    return Ground(
+        grain=scene.grain_in_pocket,
+        law=scene.law,
+        roughness=scene.solve_roughness,
+        is_natural=scene.is_natural,
+        threshold=threshold,
+    )
+
+
+def _answer(
+    scenes: Sequence[SurfaceScene],
+    flows: Mapping[SurfaceScene, SurfaceFlowCase],
+    threshold: float | None,
+    cases: Path,
+    rose: pd.DataFrame | None,
+) -> Answer:
+    """The answer of scenes that are alike but for the direction of the wind."""
+    first = scenes[0]
+    ground = ground_of(first, threshold)
+    directions = []
+    for scene in scenes:
+        stress = SurfaceStress.from_csv(cases / flows[scene].name / SURFACE_STRESS)
+        directions.append(
+            Direction.of(ground, stress, scene.flow.from_deg, first.heights)
+        )
+    cell = flows[first].cell_m
+    return Answer(first.name, first.heights, ground, directions, cell, rose)
+
+
+def tables(found: Sequence[Answer]) -> dict[str, pd.DataFrame]:
+    """The tables: directions, shares against the wind, and all faces.
+
+    Parameters
+    ----------
+    found
+        Answers of a study.
+
+    Returns
+    -------
+    dict of str to DataFrame
+        The tables by their names.
+    """
+    rows = []
+    curves = []
+    made = {}
+    for number, answer in enumerate(found, 1):
+        winds = _winds(answer)
+        for each in answer.directions:
+            rows.append({"surface": answer.name, **each.row()})
+            curve = {"surface": answer.name, "from_deg": each.from_deg}
+            shares = each.shares().at(winds)
+            names = answer.ground.stream.columns
+            drawn = pd.DataFrame({**curve, MOVES: winds, "share": shares})
+            curves.append(drawn.rename(columns=names))
+            made[f"faces-{number}-{each.word}"] = each.every.rename(columns=names)
+    return {
+        "directions": pd.DataFrame(rows),
+        "shares": pd.concat(curves, ignore_index=True),
+        **made,
+    }
+
+
+def _winds(answer: Answer) -> FloatArray:
+    """Winds over which shares are drawn and listed, m/s."""
+    most = max(each.shares().wind_for(MOST_SHARE) for each in answer.directions)
+    last = most if np.isfinite(most) else 3 * answer.ground.flat
+    return np.linspace(0.0, 1.1 * last, 111)
+
+
+def files(found: Sequence[Answer]) -> dict[str, bytes]:
+    """GeoTIFFs of the maps for a GIS, and files of VTK for ParaView, by their paths.
+
+    Parameters
+    ----------
+    found
+        Answers of a study.
+
+    Returns
+    -------
+    dict of str to bytes
+        Contents by path in the directory of the study.
+    """
+    made = {}
+    for number, answer in enumerate(found, 1):
+        grid = answer.grid
+        for name, values in answer.maps.items():
+            path = f"maps/{number}-{_in_files(name, answer)}.tif"
+            made[path] = geotiff(grid.x, grid.y, values, answer.surface.tags)
+        made[f"maps/{number}.vtk"] = _vtk(answer)
+    return made
+
+
+def _in_files(name: str, answer: Answer) -> str:
+    """What files call a map, which has the name of a column and maybe a direction."""
+    column, dash, direction = name.partition("-")
+    return answer.ground.stream.columns.get(column, column) + dash + direction
+
+
+def _vtk(answer: Answer) -> bytes:
+    """The maps on the surface as a file of VTK; coordinates are those of the file."""
+    import pyvista
+
+    grid = answer.grid
+    x, y = np.meshgrid(grid.x, grid.y)
+    height = grid.height + answer.surface.ground.at(x, y)
+    body: Any = pyvista.StructuredGrid(x, y, height)
+    for name, values in answer.maps.items():
+        body[_in_files(name, answer)] = values.ravel(order="F")
+    body["height_m"] = grid.height.ravel(order="F")
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "surface.vtk"
+        body.save(path)
+        return path.read_bytes()
+
+
+def sections(found: Sequence[Answer], source: str) -> list[Section]:
+    """The page: the answer with the map of the least wind, then all else.
+
+    Parameters
+    ----------
+    found
+        Answers of a study.
+    source
+        What the study was read from, in words.
+
+    Returns
+    -------
+    list of Section
+        The sections, in their order.
+    """
+    words = _texts(found[0].ground.stream)
+    listed: list[Section] = []
+    for number, answer in enumerate(found, 1):
+        listed += _sections(answer, f"-{number}" if len(found) > 1 else "", source)
+    table = pd.concat(map(_directions, found))
+    if len(found) == 1:
+        table = table.drop(columns="surface")  # the card names it
+    card = cards.card(found, source)
+    listed[0] = replace(listed[0], tables=[table], card=card)
+    return [*listed, Section("How sure it is", words["sure"])]
+
+
+def _texts(stream: Stream) -> dict[str, str]:
+    """The texts of the page, by their names, with the word for what flows."""
+    texts = page_texts(__file__, "surface")
+    return {
+        name: texts[name].format(flow=stream.word, at=stream.at)
+        for name in ("least", "stress", "winds", "shares", "hours", "sure")
+    }
+
+
+def _directions(answer: Answer) -> pd.DataFrame:
+    """The table of directions for people: a place has the digits that its axes need."""
+    rows = []
+    for each in answer.directions:
+        row = each.row()
+        for name in ("x_m", "y_m"):
+            row[name] = cards.in_axes(row[name], answer.cell_m)
+        rows.append({"surface": answer.name, **row})
+    from_deg = f"{answer.ground.stream.word} from, °"
+    return pd.DataFrame(rows).rename(columns={"from_deg": from_deg, **HEADINGS})
+
+
+def _sections(answer: Answer, end: str, source: str) -> Iterator[Section]:
+    """The sections of one surface; the names of its figures have the ending."""
+    stream = answer.ground.stream
+    words = _texts(stream)
+    told = "\n\n".join(cards.sentences(answer, source))
+    first = answer.easiest.first
+    mark = (float(first["x_m"]), float(first["y_m"]))
+    several = len(answer.directions) > 1
+    title = answer.easiest.title
+    if several:
+        title = f"least {stream.word} of all directions"
+    from_deg = None if several else answer.easiest.from_deg
+    least = [maps.Map(title, answer.maps[LEAST], from_deg, mark)]
+    drawing = maps.figure(answer.grid, least, f"{stream.at}, m/s, at which it moves")
+    text = words["least"]
+    yield Section(
+        "", told, [Figure(f"least{end}", "Where motion starts", text, (), drawing)]
+    )
+    figures = [_figure(answer, RATIO, f"stress{end}", "Stress", words["stress"])]
+    if several:
+        title = f"{stream.word.capitalize()} from each direction"
+        figures.append(_figure(answer, MOVES, f"winds{end}", title, words["winds"]))
+    curves = _curves(answer)
+    figures.append(Figure(f"shares{end}", "Share", words["shares"], (), curves))
+    if answer.rose is not None:
+        hours = [maps.Map("hours a year", answer.maps[HOURS])]
+        drawing = maps.figure(answer.grid, hours, "hours a year", colours="magma")
+        text = words["hours"]
+        figures.append(Figure(f"hours{end}", "Hours of motion", text, (), drawing))
+    yield Section(answer.name, "", figures)
+
+
+def _figure(answer: Answer, column: str, name: str, title: str, text: str) -> Figure:
+    """A figure with the map of a column for each direction."""
+    drawn = []
+    for each in answer.directions:
+        values = answer.maps[f"{column}-{each.word}"]
+        drawn.append(maps.Map(each.title, values, each.from_deg))
+    if column == RATIO:
+        drawing = maps.figure(
+            answer.grid, drawn, "u*/u*₀", colours="RdBu_r", middle=1.0
+        )
+    else:
+        axis = f"{answer.ground.stream.at}, m/s, at which it moves"
+        drawing = maps.figure(answer.grid, drawn, axis)
+    return Figure(name, title, text, (), drawing)
+
+
+def _curves(answer: Answer) -> Canvas:
+    """The shares that move against the wind, a colour for each direction."""
+    winds = _winds(answer)
+    drawn = []
+    count = max(len(answer.directions), 2)
+    for number, each in enumerate(answer.directions):
+        colour = to_hex(colormaps["turbo"](0.08 + 0.84 * number / (count - 1)))
+        leaving = np.array([])
+        if LEAVES in each.faces and answer.ground.is_natural:
+            leaving = each.shares(LEAVES).at(winds)
+        drawn.append((each.title, each.shares().at(winds), leaving, colour))
+    return maps.shares(drawn, winds, answer.ground.stream.at)

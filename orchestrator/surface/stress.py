@@ -1,0 +1,248 @@
+"""The stress that the flow puts on a surface, and whether it can be right."""
+
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from orchestrator.bed.deck import read_texts
+from orchestrator.digits import FORMAT
+from orchestrator.flow.stress import APPROACH_ERROR
+from orchestrator.physics.constants import KARMAN
+from orchestrator.surface.mesh import Columns
+from orchestrator.types import FloatArray
+
+AXES = ("x", "y", "z")
+SCALARS = ("x_m", "y_m", "z_m", "along_m", "across_m", "area_m2", "z_e_m")
+VECTORS = ("normal", "tau")
+ALONG_WIND = ("tau_along", "tau_across")
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceStress:
+    """Stress on each face of a bed, ordered along the wind, then across it.
+
+    Stresses are kinematic and in units of u*_0^2, the stress of the undisturbed flow.
+
+    Attributes
+    ----------
+    x_m, y_m
+        Middle of each face in the axes of the file, m, shape (F,).
+    z_m
+        Its height above the flat ground, m, shape (F,).
+    along_m, across_m
+        The same place in the axes of the wind, from the middle of the form downstream
+        and to the left, m, shape (F,).
+    area_m2
+        Area of the face, m2, shape (F,).
+    z_e_m
+        Distance of the first cell's centre from the face along its normal, m,
+        shape (F,).
+    normal
+        Unit vector upwards, normal to the face, in the axes of the file, shape (F, 3).
+    tau
+        Stress of the flow on the face, along the face, in the axes of the file,
+        shape (F, 3).
+    tau_along, tau_across
+        Its components along and across the wind, shape (F,).
+    """
+
+    x_m: FloatArray
+    y_m: FloatArray
+    z_m: FloatArray
+    along_m: FloatArray
+    across_m: FloatArray
+    area_m2: FloatArray
+    z_e_m: FloatArray
+    normal: FloatArray
+    tau: FloatArray
+    tau_along: FloatArray
+    tau_across: FloatArray
+
+    @classmethod
+    def of_faces(
+        cls, mesh: Columns, tau: FloatArray, axes: FloatArray, centre: FloatArray
+    ) -> "SurfaceStress":
+        """Put the stresses of a mesh's faces in their places.
+
+        Parameters
+        ----------
+        mesh
+            The mesh.
+        tau
+            Stress on each face of its bed in the axes of the wind, over that of the
+            approaching flow: first those on the slab, shape (n, 3).
+        axes
+            Unit vectors along and across the wind in the axes of the file, (2, 2).
+        centre
+            Place of the mesh's origin in the axes of the file, m, shape (2,).
+
+        Returns
+        -------
+        SurfaceStress
+            Those behind the inlet.
+        """
+        middles, normals, areas = faces_of(mesh)
+        tau = tau[mesh.shape[1] :]
+        first = mesh.middles[1:, :, 0].reshape(-1, 3)
+        z_e = ((first - middles) * normals).sum(axis=1)
+        x, y = (centre + middles[:, :2] @ axes).T
+        along, across, above = middles.T
+        return cls(
+            x_m=x,
+            y_m=y,
+            z_m=above,
+            along_m=along,
+            across_m=across,
+            area_m2=areas,
+            z_e_m=z_e,
+            normal=_turned(normals, axes),
+            tau=_turned(tau, axes),
+            tau_along=tau[:, 0],
+            tau_across=tau[:, 1],
+        )
+
+    @property
+    def ustar_over_ustar0(self) -> FloatArray:
+        """Friction velocity of the stress over that of the approaching flow, (F,)."""
+        return np.asarray(np.sqrt(np.linalg.norm(self.tau, axis=1)))
+
+    def to_csv(self, path: Path) -> None:
+        """Write a table that `from_csv` reads.
+
+        Parameters
+        ----------
+        path
+            The file.
+        """
+        columns = {name: getattr(self, name) for name in SCALARS}
+        for name in VECTORS:
+            for number, axis in enumerate(AXES):
+                columns[f"{name}_{axis}"] = getattr(self, name)[:, number]
+        columns |= {name: getattr(self, name) for name in ALONG_WIND}
+        columns["ustar_over_ustar0"] = self.ustar_over_ustar0
+        table = pd.DataFrame(columns)
+        table.to_csv(path, index=False, lineterminator="\n", float_format=FORMAT)
+
+    @classmethod
+    def from_csv(cls, path: Path) -> "SurfaceStress":
+        """Read a table of `to_csv`.
+
+        Parameters
+        ----------
+        path
+            The file.
+
+        Returns
+        -------
+        SurfaceStress
+            The stresses.
+
+        Raises
+        ------
+        SolverError
+            If the file is not whole.
+        """
+        columns = read_texts(path)
+        given = {name: columns[name].astype(float) for name in (*SCALARS, *ALONG_WIND)}
+        for name in VECTORS:
+            parts = [columns[f"{name}_{axis}"].astype(float) for axis in AXES]
+            given[name] = np.column_stack(parts)
+        return cls(**given)
+
+
+def _turned(vectors: FloatArray, axes: FloatArray) -> FloatArray:
+    """Vectors in the axes of the wind as the axes of the file have them, (n, 3)."""
+    return np.column_stack([vectors[:, :2] @ axes, vectors[:, 2]])
+
+
+def faces_of(mesh: Columns) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Measure the faces of a bed behind the inlet.
+
+    A face is divided into four triangles about the mean of its corners.
+
+    Parameters
+    ----------
+    mesh
+        The mesh.
+
+    Returns
+    -------
+    middles
+        Centres of the faces in the axes of the mesh, m, shape (F, 3).
+    normals
+        Unit vectors upwards, shape (F, 3).
+    areas
+        Sums of the areas of the four triangles, m2, shape (F,).
+    """
+    bed = mesh.corners[2:, :, 0]
+    corners = np.stack([bed[:-1, :-1], bed[1:, :-1], bed[1:, 1:], bed[:-1, 1:]])
+    corners = corners.reshape(4, -1, 3)
+    mean = corners.mean(axis=0)
+    following = np.roll(corners, -1, axis=0)
+    triangles = np.cross(following - corners, mean - corners) / 2
+    sizes = np.linalg.norm(triangles, axis=2)
+    areas = sizes.sum(axis=0)
+    thirds = (corners + following + mean) / 3
+    middles = (thirds * sizes[..., None]).sum(axis=0) / areas[:, None]
+    vectors = triangles.sum(axis=0)
+    normals = vectors / np.linalg.norm(vectors, axis=1)[:, None]
+    return middles, normals, areas
+
+
+def diagnostics(
+    stress: SurfaceStress,
+    mesh: Columns,
+    approach: float,
+    reynolds: float,
+    roughness: float,
+    iterations: int,
+) -> pd.DataFrame:
+    """Collect a few numbers of a solved flow and the ranges in which they are sound.
+
+    Parameters
+    ----------
+    stress
+        The stress on the bed.
+    mesh
+        The mesh.
+    approach
+        Friction velocity in the slab before the inlet over that of the log law.
+    reynolds
+        Friction velocity of the approaching flow over the viscosity, 1/m.
+    roughness
+        Roughness length of the bed, m.
+    iterations
+        Iterations until the flow had converged.
+
+    Returns
+    -------
+    DataFrame
+        By quantity its value, the ends of its range and whether it is within.
+    """
+    centre = mesh.first_cell / 2
+    over = stress.z_e_m / centre
+    weights = stress.area_m2
+    is_reversed = stress.tau_along < 0
+    rows = {
+        # y+: the eddy viscosity is kappa y+ times the molecular one
+        "y_plus": (reynolds * centre, 1 / KARMAN, inf),
+        "z_e_over_z0": (centre / roughness, 0.5, inf),
+        "least_z_e_over_nominal": (float(over.min()), 0.7, inf),
+        "most_z_e_over_nominal": (float(over.max()), 0.0, 1.5),
+        "approach_ustar_over_log_law": (
+            approach,
+            1 - APPROACH_ERROR,
+            1 + APPROACH_ERROR,
+        ),
+        "reversed_area_m2": (float(weights[is_reversed].sum()), 0.0, inf),
+        "cells": (mesh.cells, 0.0, inf),
+        "shortest_cell_m": (float(np.diff(mesh.x).min()), 0.0, inf),
+        "iterations": (iterations, 0.0, inf),
+    }
+    columns = ["value", "sound_from", "sound_to"]
+    table = pd.DataFrame.from_dict(rows, orient="index", columns=columns)
+    sound = table["value"].between(table["sound_from"], table["sound_to"])
+    return table.assign(sound=np.where(sound, "yes", "no")).rename_axis("quantity")

@@ -1,0 +1,243 @@
+"""Validation: exact pockets of laid grains, scores, the paper's rule, and measured rows."""
+
+import math
+import runpy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from orchestrator.bed.packing import Packing
+from orchestrator.errors import InputError
+from orchestrator.flow.stress import WallStress
+from orchestrator.lab import strips, validate
+from orchestrator.physics import beside, saltation
+from orchestrator.physics.curves import Air, iversen_white
+from orchestrator.study import fields, study
+from orchestrator.study.scene import Scene
+from orchestrator.study.study import changed
+
+TOOL = Path(__file__).parents[2] / "tools" / "tested.py"
+FLUMES = ("flumes, visual", "flumes, fixed intensity", "flumes, reference transport")
+
+
+def test_grains_laid_on_a_close_packed_layer_lie_in_its_pockets() -> None:
+    # rows lie across the flow, so that pockets point up and down it
+    rows, columns = 16, 6
+    y, x = np.meshgrid(np.arange(columns) + 0.0, np.arange(rows) * math.sqrt(3) / 2)
+    y = (y + np.where(np.arange(rows)[:, None] % 2, 0.5, 0.0)).ravel()
+    every, flat = np.ones(len(y), bool), np.column_stack([x.ravel(), np.zeros_like(y)])
+    packing = Packing(
+        flat, np.ones(len(y)), every, every, ~every, x.ravel(), y, float(columns)
+    )
+    angles = strips.laid(packing, 20)
+    exact = np.degrees(np.arctan([math.sqrt(1 / 8), math.sqrt(1 / 2)]))
+    assert np.abs(angles[:, None] - exact).min(axis=1).max() < 0.1
+    # downstream of a pocket is either the saddle between two grains or the top of one
+    assert {int(np.abs(angle - exact).argmin()) for angle in angles} == {0, 1}
+
+
+@pytest.mark.parametrize(("mobility", "exponent"), [(0.0, 1.0), (2.0, 2.0)])
+def test_hiding_is_that_of_grains_that_one_stress_moves(
+    monkeypatch: pytest.MonkeyPatch, mobility: float, exponent: float
+) -> None:
+    """Equal parts of all sizes move at one stress; then a part as D^-2 falls as that."""
+    sizes = np.repeat([0.5, math.sqrt(0.5), 1.0, math.sqrt(2.0)], 2001)
+    # as much of each class moves as the square of the stress; locked grains count in none
+    stress = np.tile(np.sqrt(np.linspace(0, 1, 2001)), 4)
+    free = strips.Counted(stress, sizes, np.ones(len(sizes), bool))
+    locked = strips.Counted(np.full(500, 1e-3), np.full(500, 1.0), np.zeros(500, bool))
+
+    def grains(*_: Any) -> list[strips.Counted]:
+        return [free, locked]
+
+    monkeypatch.setattr(strips.Strips, "grains", grains)
+    found = strips.Strips([], Path()).hiding({}, mobility)
+    # theta_i ~ D_i^-1 at one stress, and the stress as the root of the part
+    assert found == pytest.approx(exponent, abs=5e-3)
+
+
+def test_a_score_is_of_rows_that_were_read_alone() -> None:
+    rows = pd.DataFrame(
+        {"set": "a", "model": "m", "ratio": [0.5, 2.0, 4.0, 100.0, np.nan]}
+    )
+    (score,) = validate.scores(
+        rows.assign(sure=["read"] * 3 + ["memory", "read"])
+    ).to_dict("records")
+    assert (score["rows"], score["answered"]) == (4, 3)
+    assert (score["ratio"], score["factor"], score["worst"]) == (2.0, 2.0, 4.0)
+
+
+def test_an_interval_is_the_widest_without_one_of_the_sets() -> None:
+    ends = runpy.run_path(str(TOOL))["ends"]
+    ratio = pd.Series([*np.arange(1.0, 12), *np.arange(21.0, 32), 100.0])
+    sets = pd.Series(["a"] * 11 + ["b"] * 11 + ["c"])
+    # the percentiles of 12 ratios without b, of all and without a: that of c alone is too few
+    assert ends(ratio, sets) == (2.0, 31.0)
+    assert ends(ratio[:11], sets[:11]) == (2.0, 10.0)
+
+
+def test_the_interval_of_a_kind_holds_its_rows_in_flumes() -> None:
+    beds = pd.read_csv(validate.FOLDER / "beds.csv").query("set in @FLUMES")
+    at = validate.single(beds, "bridged")
+    here = (at.reynolds >= 1) & (at.reynolds < 10)
+    grain = {
+        "force_law": "bridged",
+        "beta_deg": 60.0,
+        "d_m": 3e-4,
+        "z0_m": 1e-5,
+        "alpha_deg": 0.0,
+    }
+    grain |= {"alpha_s": 1.615, "cohesion_n_m": 0.0, "rho_f_kg_m3": 1000.0}
+    low, high, rows, held = beside.interval(beside.kind_of(grain), 5.0)
+    ratio = (beds["shields"] / at.shields)[here]
+    assert len(ratio) == rows
+    assert ratio.between(low, high).mean() == pytest.approx(held)
+    # nothing was measured on slopes, of another angle or with cohesion
+    for other in ({"alpha_deg": 5.0}, {"beta_deg": 52.0}, {"cohesion_n_m": 1e-4}):
+        assert not beside.interval(beside.kind_of({**grain, **other}), 5.0)[2]
+
+
+SPANNED = {
+    **{"fluid.density": 1025.0, "fluid.viscosity": 2e-6, "fluid.gravity": 3.7},
+    **{"grain.density": 2000.0, "bed.height": 0.5, "bed.length": 0.8},
+    # over a level bed u* is u*_0, whatever is above it; pivots of poured grains know no beta
+    **{
+        "flow.top": "open water",
+        "forces.stress": "eq10",
+        "forces.averaging_length": 0.1,
+    },
+    "bed.entrainment_angle_deg": 59.5,
+}
+"""Fields of a strip, and other values of them, that its tested interval spans: its threshold is a
+function of the Galileo number."""
+UNTESTED: dict[str, Any] = {
+    **{"fluid.density": 1.2, "grain.diameter": 0.022, "grain.friction_angle_deg": 10.0},
+    **{"grain.cohesion": 1e-3, "grain.sizes": {"sigma_g": 1.4}, "bed.roughness": 1e-3},
+    **{
+        "bed.poured_depth": 8.0,
+        "bed.width": 12.0,
+        "method.grains.mobile_layers": 6,
+        "bed.length": 0.2,
+    },
+    **{"bed.counted": (0.1, 0.3), "bed.packing": "aligned", "bed.shape": "step down"},
+    **{
+        "bed.slope_deg": 5.0,
+        "flow.gusts": {"intensity": 0.2, "events": 50},
+        "method.flow.model": "x",
+    },
+    **{"forces.law": "profile", "forces.lift_coefficient": 1.0},
+    **{"forces.loaded_grains": "all but crest", "forces.sheltering": "balanced"},
+    **{"method.kind": "dem", "threshold.fractions": (0.3,)},
+    **{"forces.drag": "relative", "threshold.criterion": "goes on"},
+}
+"""Other values of the fields of a strip for which none was tested."""
+
+
+def test_an_interval_is_of_strips_that_differ_in_nothing_else_than_the_tested() -> None:
+    (strip, *_) = (scene for scene in study.load("validate").scenes if scene.is_poured)
+
+    def rows(scene: Scene) -> float:
+        row = fields.used(scene)
+        row |= {"fraction": scene.threshold.fractions[0]}
+        return beside.interval(beside.kind_of(row), 30.0)[2]
+
+    assert rows(strip) == 81
+    for name, value in SPANNED.items():
+        depth = {"flow.depth": 2.0} if name == "flow.top" else {}
+        assert rows(changed(strip, {name: value, **depth})) == 81, name
+    for name, value in UNTESTED.items():
+        try:
+            other = changed(strip, {name: value})
+        except InputError:  # no strip has such a value
+            continue
+        assert rows(other) == 0, name
+    asked = {
+        field.name
+        for field in fields.FIELDS
+        if not field.is_method and fields.APPLIES[field.info.scope](strip)
+    }
+    # forms of a train, profiles and obstacles are no level beds, depth and lee side are not set
+    others = {
+        f"bed.{name}" for name in ("kind", "forms", "spacing", "profile", "obstacles")
+    }
+    others |= {"bed.lee_slope_deg", "flow.depth", "bed.disorder", fields.SEED}
+    # strips with grains that stand out were tested by themselves
+    others.add("forces.exposure")
+    assert rows(changed(strip, {"forces.exposure": "protrusion"})) == 97
+    assert asked - others <= SPANNED.keys() | UNTESTED.keys()
+
+
+def test_a_stress_that_is_the_measured_one_over_a_hump_is_met_at_every_row() -> None:
+    x, cf, ones = pd.read_csv(validate.FOLDER / "hump_stress.csv").to_numpy().T
+    # in other units, at the same places
+    stress = WallStress(x * 0.42, x * 0.42, ones, ones, ones, 300 * cf, ones)
+    measured, value, *_ = validate.over_hump(stress).to_numpy().T
+    assert value.astype(float) == pytest.approx(measured.astype(float), rel=1e-9)
+
+
+def test_the_paper_has_no_answer_in_the_transition() -> None:
+    water = {"rho_sol_kg_m3": 2650.0, "rho_f_kg_m3": 1000.0, "nu_m2_s": 1e-6}
+    beds = pd.DataFrame({"d_m": [1e-5, 1e-3, 1e-2], **water})
+    beds = beds.assign(slope=0.0, cohesion_n_m=0.0)
+    assert np.isnan(validate.by_paper(beds)).tolist() == [False, True, False]
+
+
+def test_the_measured_rows_are_whole() -> None:
+    beds = pd.read_csv(validate.FOLDER / "beds.csv")
+    counts = beds.groupby("set").size()
+    assert counts["flumes, visual"] == 245
+    assert counts["flumes, fixed intensity"] == 28
+    assert beds["shields"].between(0.0, 0.4).all()
+
+
+def test_the_rows_of_the_wind_tunnel_are_on_their_curve() -> None:
+    air = Air(density=2650.0, fluid_density=1.2, viscosity=1.5e-5)
+    beds = pd.read_csv(validate.FOLDER / "beds.csv")
+    tunnel = beds[beds["set"] == "wind tunnel, curve"]
+    d = tunnel["d_m"].to_numpy()
+    assert len(d) > 0
+    _, curve = air.shields_diagram(d, iversen_white(d, air))
+    assert tunnel["shields"].to_numpy() == pytest.approx(curve, rel=1e-3)
+
+
+@pytest.mark.long
+def test_grains_that_go_on_are_as_near_as_the_documents_say() -> None:
+    beds = pd.read_csv(validate.FOLDER / "beds.csv")
+    shields = validate.going_on(beds, validate.GUST, leaves=True)
+    rows = beds.assign(model="m", ratio=shields / beds["shields"], sure="read")
+    factors = validate.scores(rows).set_index("set")["factor"]
+    said = {
+        "flumes, fixed intensity": 1.12,
+        "flumes, reference transport": 1.27,
+        "flumes, visual": 1.48,
+        "steep flumes": 1.12,
+        "steep flumes, large elements": 1.35,
+        "wind, field": 1.19,
+        "wind tunnel, curve": 1.17,
+    }
+    assert factors.to_dict() == pytest.approx(said, rel=0.01)
+    # in water a grain that leaves stops with its gust; in air one that leaves goes on
+    alone = validate.going_on(beds, validate.GUST, leaves=False)
+    in_water = beds["rho_f_kg_m3"] > 100
+    can_hop = saltation.hops(validate.hoppers(beds))
+    assert (alone[in_water & can_hop] == shields[in_water & can_hop]).mean() > 0.95
+    assert (alone[~in_water] < shields[~in_water]).all()
+    # one that cannot hop goes on where the mean stress turns it over
+    steady = validate.single(beds, "bridged-gravel").shields
+    assert (shields[~can_hop] == steady[~can_hop]).all()
+
+
+def test_a_shallow_flow_is_why_steep_beds_hold_their_grains() -> None:
+    beds = pd.read_csv(validate.FOLDER / "beds.csv")
+    steep = beds[beds["set"] == "steep flumes"].iloc[::4]
+    shallow = validate.hoppers(steep)
+    deep = saltation.Grains(
+        shallow.galileo, shallow.density_ratio, shallow.slope_deg, shallow.roughness
+    )
+    in_deep = saltation.thresholds(deep).cessation / steep["shields"]
+    in_shallow = saltation.thresholds(shallow).cessation / steep["shields"]
+    assert in_deep.median() < 0.5
+    assert in_shallow.median() == pytest.approx(1.0, abs=0.15)

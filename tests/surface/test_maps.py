@@ -1,0 +1,95 @@
+"""Maps of a bed in three dimensions: values between faces, and what each map shows."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.text import Text
+
+from orchestrator.report import style
+from orchestrator.surface import maps
+from orchestrator.surface.maps import Grid, Map
+
+EAST, NORTH = 512_000.0, 5_640_000.0
+
+
+def grid() -> Grid:
+    """A hill of 6 m on a raster of 2 m."""
+    x = np.linspace(EAST - 20, EAST + 20, 21)
+    y = np.linspace(NORTH - 20, NORTH + 20, 21)
+    from_middle = np.hypot(x - EAST, y[:, None] - NORTH)
+    height = np.maximum(6 - 0.4 * from_middle, 0.0)
+    return Grid(x, y, height, height > 0)
+
+
+def faces() -> pd.DataFrame:
+    """Faces at random places, with values that are linear, and their inverse."""
+    random = np.random.default_rng(3)
+    x, y = random.uniform(-30, 30, (2, 4000))
+    stress = 2.0 + 0.01 * x + 0.02 * y
+    return pd.DataFrame(
+        {"x_m": EAST + x, "y_m": NORTH + y, "stress": stress, "wind_m_s": 1 / stress}
+    )
+
+
+def test_linear_values_are_exact_between_faces_and_winds_by_their_inverse() -> None:
+    of = grid()
+    found = of.of_faces(faces(), ["stress", "wind_m_s"])
+    exact = 2.0 + 0.01 * (of.x - EAST) + 0.02 * (of.y[:, None] - NORTH)
+    assert found["stress"][of.is_form] == pytest.approx(exact[of.is_form], rel=1e-9)
+    winds = found["wind_m_s"][of.is_form]
+    assert winds == pytest.approx(1 / exact[of.is_form], rel=1e-9)
+    assert np.isnan(found["stress"][~of.is_form]).all()
+
+
+def test_a_face_without_stress_makes_the_wind_around_it_higher_not_missing() -> None:
+    listed = faces()
+    listed.loc[::2, "wind_m_s"] = np.inf
+    found = grid().of_faces(listed, ["wind_m_s"])["wind_m_s"]
+    assert not np.isnan(found[grid().is_form]).any()
+
+
+def test_each_map_has_its_contours_the_wind_north_and_a_scale() -> None:
+    of = grid()
+    values = of.of_faces(faces(), ["stress"])["stress"]
+    mark = (EAST + 4.0, NORTH + 4.0)
+    drawn = [Map("from the west", values, 270.0, mark), Map("north", values, 0.0)]
+    with style.settings():
+        canvas = maps.figure(of, drawn, "stress", middle=2.0)
+    first, second, bar = canvas.axes
+    assert bar.get_ylabel() == "stress"
+    scale = [line for line in first.lines if line.get_gid() == "scale"]
+    assert np.ptp(np.asarray(scale[0].get_xdata(), float)) == pytest.approx(5.0)
+    words = [text.get_text() for text in first.findobj(Text)]
+    assert "N" in words
+    assert "5 m" in words
+    start = [line for line in first.lines if line.get_gid() == "start"]
+    assert np.asarray(start[0].get_xydata(), float)[0].tolist() == [*mark]
+    for ax in (first, second):
+        assert ax.get_aspect() == 1.0
+        contours = [one for one in ax.collections if "Contour" in type(one).__name__]
+        assert contours
+
+
+@pytest.mark.parametrize(
+    ("length", "round_one"), [(0.7, 0.5), (23.0, 20.0), (5.0, 5.0), (0.0199, 0.01)]
+)
+def test_round_numbers_are_not_above_a_length(length: float, round_one: float) -> None:
+    assert maps.nice(length) == round_one
+
+
+@pytest.mark.parametrize(("stretched", "width"), [(1.0, 1.0), (4.0, 1.0), (0.25, 0.45)])
+def test_a_figure_is_no_wider_and_no_higher_than_its_map(
+    stretched: float, width: float
+) -> None:
+    of = grid()
+    x = EAST + stretched * (of.x - EAST)
+    wide = Grid(x, of.y, of.height, of.is_form)
+    with style.settings():
+        canvas = maps.figure(wide, [Map("", of.height)], "m")
+        canvas.draw_without_rendering()
+    assert canvas.get_figwidth() <= width * style.WIDTH
+    panel, _ = canvas.axes
+    box = panel.get_window_extent()
+    # what is left is for labels, the title and the scale of colours
+    room = canvas.bbox.width - box.width, canvas.bbox.height - box.height
+    assert max(room) < 1.9 * canvas.dpi

@@ -1,0 +1,108 @@
+"""Where a bed in three dimensions moves: slopes, headings, shares and hours."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orchestrator.physics import saltation
+from orchestrator.physics.threshold import SingleGrain, thresholds_of
+from orchestrator.surface import onset
+from orchestrator.surface.onset import Shares
+
+SAND = SingleGrain(
+    diameter=5e-4,
+    roughness=5e-4 / 30,
+    fluid_density=1.2,
+    viscosity=1.5e-5,
+    lift_coefficient=1.615,
+    density=2650.0,
+    slope_deg=0.0,
+    entrainment_angle_deg=60.0,
+    gravity=9.81,
+)
+
+
+@given(
+    slope_deg=st.floats(0.1, 60.0),
+    aspect_deg=st.floats(0.0, 360.0),
+    heading_deg=st.floats(0.0, 180.0),
+)
+def test_slope_and_heading_come_back_from_vectors(
+    slope_deg: float, aspect_deg: float, heading_deg: float
+) -> None:
+    b, a, c = np.radians([slope_deg, aspect_deg, heading_deg])
+    level = np.array([np.cos(a), np.sin(a), 0.0])
+    normal = np.array([-np.sin(b) * level[0], -np.sin(b) * level[1], np.cos(b)])
+    up = np.cos(b) * level + [0.0, 0.0, np.sin(b)]
+    aside = np.cross(normal, up)
+    tau = 2.5 * (np.cos(c) * up + np.sin(c) * aside)
+    found = onset.headings_deg(normal[None], tau[None])
+    assert onset.slopes_deg(normal[None])[0] == pytest.approx(slope_deg, abs=1e-6)
+    assert found[0] == pytest.approx(heading_deg, abs=1e-4)
+
+
+def test_a_level_face_has_the_threshold_of_a_level_bed() -> None:
+    level = np.zeros(1)
+    (exact,) = thresholds_of("bridged", [SAND])
+    found = onset.leaves(SAND, "bridged", level, level + 90.0)
+    assert found[0] == pytest.approx(float(exact.friction_velocity), rel=1e-12)
+
+
+def test_grains_go_on_by_the_slope_along_the_stress() -> None:
+    slopes = np.array([20.0, 20.0, 20.0])
+    headings = np.array([0.0, 90.0, 180.0])
+    excess = (SAND.density / SAND.fluid_density - 1) * 9.81 * SAND.diameter
+    leaving = onset.leaves(SAND, "bridged", slopes, headings)
+    found = onset.goes_on(SAND, leaving, slopes, headings)
+    grains = saltation.Grains.of(
+        SAND.diameter,
+        density=SAND.density,
+        fluid_density=SAND.fluid_density,
+        viscosity=SAND.viscosity,
+        slope_deg=[20.0, 0.0, -20.0],
+    )
+    going = saltation.tabulated(grains).initiation(saltation.PEAK)
+    # the gust must turn the grain over its neighbours, and it must go on after that
+    shields = np.maximum(leaving**2 / excess / saltation.PEAK, going)
+    assert found == pytest.approx(np.sqrt(shields * excess))
+
+
+def test_a_grain_that_cannot_hop_has_no_gust() -> None:
+    silt = replace(
+        SAND, diameter=1e-4, roughness=3e-6, fluid_density=1000.0, viscosity=1e-6
+    )
+    slopes = np.array([0.0, 20.0])
+    leaving = onset.leaves(silt, "bridged", slopes, slopes)
+    assert onset.goes_on(silt, leaving, slopes, slopes) == pytest.approx(leaving)
+
+
+def test_a_face_without_stress_never_moves() -> None:
+    found = onset.undisturbed(np.array([0.3, 0.3]), np.array([0.0, 1.5]))
+    assert found.tolist() == [np.inf, pytest.approx(0.2)]
+
+
+def test_shares_are_those_of_the_areas() -> None:
+    wind = np.array([8.0, 5.0, np.inf, 6.0])
+    shares = Shares.of(wind, np.array([1.0, 2.0, 4.0, 1.0]))
+    assert shares.at([4.9, 5.0, 7.0, 100.0]).tolist() == [0.0, 0.25, 0.375, 0.5]
+    assert shares.wind_for(0.25) == 5.0
+    assert shares.wind_for(0.26) == 6.0
+    assert shares.wind_for(0.6) == np.inf
+
+
+def test_hours_of_a_rose_add_up_to_a_year() -> None:
+    rows = []
+    for direction in (0.0, 90.0):
+        for speed, share in ((2.0, 0.3), (8.0, 0.15), (14.0, 0.05)):
+            rows.append((direction, speed, share))
+    rose = pd.DataFrame(rows, columns=["solved_deg", "speed_m_s", "share"])
+    always = np.zeros(1)
+    whole = onset.hours(always, 0.0, rose) + onset.hours(always, 90.0, rose)
+    assert whole[0] == pytest.approx(8760.0)
+    winds = np.array([2.0, 2.1, 8.0, 14.0, 14.1, np.inf, np.nan])
+    parts = np.array([0.5, 0.2, 0.2, 0.05, 0.0, 0.0, np.nan])
+    assert onset.hours(winds, 0.0, rose) == pytest.approx(8760.0 * parts, nan_ok=True)
