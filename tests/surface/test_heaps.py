@@ -11,7 +11,7 @@ import pytest
 from orchestrator.errors import InputError
 from orchestrator.experiment import Experiment, Results, Runs
 from orchestrator.report.card import Card
-from orchestrator.surface import cards, pipeline
+from orchestrator.surface import cards, erosion, pipeline
 from orchestrator.surface import study as surface_study
 from orchestrator.surface.case import SURFACE_STRESS
 from orchestrator.surface.raster import geotiff
