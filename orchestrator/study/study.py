@@ -26,6 +26,7 @@ from orchestrator.study.closed_form import resolved
 from orchestrator.study.declare import List, Part, UnfitError
 from orchestrator.study.fidelities import AUTO, fields_of
 from orchestrator.study.fields import PARTS, SEED
+from orchestrator.study.hints import HINTS
 from orchestrator.study.keys import Table, Tables, by_name, check_moved, nested
 from orchestrator.study.parts import Erosion, PileBed, Sizes, percentile
 from orchestrator.study.profile import WITH_X, Files
@@ -48,7 +49,6 @@ from orchestrator.study.reading import (
 from orchestrator.study.scene import Scene, roughness_length
 from orchestrator.study.shapes import SHAPES
 from orchestrator.study.source import Source, decoded, find, presets, read_bytes
-from orchestrator.surface.study import TABLES as IN_SPACE
 
 BED = {"kind": "grain", "roughness": "d/30"}
 """Fields of a bed that a file may leave out."""
@@ -583,8 +583,5 @@ def _hint(names: Sequence[str], branch: str) -> tuple[str, str] | None:
     *table, name = names
     if branch == "grain" and name in PileBed.model_fields:
         return "a bed of one grain has none", 'a pile has it: kind = "pile"'
-    part = IN_SPACE.get(".".join(table))
-    if part is not None and name in part.model_fields:
-        remedy = 'leave it out, or bed.kind = "surface"'
-        return "beds in three dimensions alone have it", remedy
-    return None
+    told = (hint(".".join(table), name) for hint in HINTS)
+    return next(filter(None, told), None)

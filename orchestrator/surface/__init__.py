@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from orchestrator.errors import InputError
 from orchestrator.guests import Offer
+from orchestrator.study.hints import HINTS
 
 if TYPE_CHECKING:
     from orchestrator.experiment import Experiment
@@ -59,4 +60,16 @@ def take_over(options: Namespace) -> int | None:
     return experiment.command(options, out)
 
 
+def _hint(table: str, name: str) -> tuple[str, str] | None:
+    """Say that a key of a study file is one of beds in three dimensions."""
+    from orchestrator.surface.study import TABLES
+
+    part = TABLES.get(table)
+    if part is None or name not in part.model_fields:
+        return None
+    remedy = 'leave it out, or bed.kind = "surface"'
+    return "beds in three dimensions alone have it", remedy
+
+
+HINTS.append(_hint)
 OFFER = Offer(take_over=take_over)

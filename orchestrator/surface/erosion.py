@@ -245,7 +245,7 @@ def experiment(study: SurfaceStudy, out: Path) -> Experiment:
     least, source = erosion.given_threshold(study.erosion.threshold, study.file)
     flows = {scene: pipeline.flow_of(scene) for scene in study.scenes}
     members = pipeline.alike(study.scenes)
-    roses = surface.roses_of(study, members)
+    roses = pipeline.roses_of(study, members)
 
     def results(runs: Runs) -> Results:
         found = []

@@ -16,11 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orchestrator.errors import InputError
-from orchestrator.study import epsg
 from orchestrator.study.heads import METRE as METRES
-from orchestrator.study.points import read_points
 from orchestrator.study.source import decoded, read_bytes
 from orchestrator.study.units import number
+from orchestrator.surface import epsg
 from orchestrator.surface.heights import (
     FEWEST,
     MOST_NODES,
@@ -29,6 +28,7 @@ from orchestrator.surface.heights import (
     Tags,
     checked,
 )
+from orchestrator.surface.points import read_points
 from orchestrator.types import FloatArray
 
 if TYPE_CHECKING:
