@@ -102,7 +102,23 @@ def _help(name: str) -> str:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the thresholds that the options ask for, and questions on them."""
+    """Print the thresholds that the options ask for, and questions on them.
+
+    Parameters
+    ----------
+    options
+        The options of the command.
+
+    Returns
+    -------
+    int
+        The exit code.
+
+    Raises
+    ------
+    InputError
+        If an option or a range is refused.
+    """
     axes: dict[str, list[Value]] = {}
     for name in PARAMETERS:
         text = getattr(options, name)

@@ -76,7 +76,18 @@ class Wind:
         return cls(scene.flow.from_deg, whole, heaps)
 
     def loss_kg(self, winds: Sequence[float]) -> float:
-        """Mass that winds, one after another, can take from all heaps, kg."""
+        """Add up what winds, one after another, can take from all heaps.
+
+        Parameters
+        ----------
+        winds
+            The winds at 10 m, m/s.
+
+        Returns
+        -------
+        float
+            The mass, kg.
+        """
         return self.whole.total(winds) * self.whole.area / GRAMS
 
 

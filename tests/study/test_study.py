@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator import plan
+from orchestrator import guests, plan
 from orchestrator.errors import InputError
 from orchestrator.fidelity import limits
 from orchestrator.grains.loads import Geometry
@@ -18,6 +18,9 @@ from orchestrator.study import closed_form, fields, parts, study
 from orchestrator.study.keys import MOVED
 from orchestrator.study.parts import Forces, Grain, GrainBed
 from orchestrator.study.scene import Scene
+
+OFFERED = [*guests.offers()]
+"""Guests explain the keys of their own beds."""
 
 GRAIN = "[grain]\ndiameter = 1e-3\n"
 PILE = f'{GRAIN}[bed]\nkind = "pile"\nslope_deg = 15.0\n'
@@ -326,7 +329,7 @@ def test_a_level_bed_has_no_height(bed: str) -> None:
 SOLVERS = """
 import sys
 from orchestrator.surface import study as surface_study
-from orchestrator.study import study as surface_study
+from orchestrator.study import study
 for name in study.presets():
     assert (surface_study.load(name) or study.load(name)).scenes
 print(*set(sys.modules) & {"orchestrator.flow", "orchestrator.solvers", "gmsh", "pyvista"})
