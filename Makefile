@@ -32,8 +32,10 @@ calibration: setup  ## measure known errors, maps and intervals anew, for the pa
 	$(PYTHON) -m orchestrator validate
 	cp results/ladder/tables/errors.csv results/ladder/tables/domain.csv results/stability/tables/maps.csv orchestrator/fidelity/calibration/
 	cp results/budget/tables/budget.csv orchestrator/fidelity/calibration/
-	$(PYTHON) tools/tested.py results/validate/tables/measured.csv > tested.csv
+	$(PYTHON) tools/tested.py > tested.csv
 	mv tested.csv orchestrator/physics/tested.csv
+	$(PYTHON) tools/tested.py results/validate/tables/measured.csv > tested.csv
+	mv tested.csv orchestrator/physics/tested_strips.csv
 	$(PYTHON) tools/errors.py
 	$(PYTHON) tools/budget.py results/budget/tables/shares.csv
 	cp results/stability/figures/maps.png docs/stability.png

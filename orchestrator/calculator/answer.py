@@ -1,12 +1,10 @@
 """The answer card of one grain for the command `threshold`, from rows of all laws."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from orchestrator.physics.constants import GAS_BELOW
-from orchestrator.physics.threshold import SingleGrain, thresholds_of
+from orchestrator.physics.verdict import correction
 from orchestrator.report import single
 from orchestrator.report.card import Card
 
@@ -48,29 +46,9 @@ def as_row(row: "Row") -> "Row":
     Returns
     -------
     dict
-        With the computed and the measured friction velocity of the grain on a level
-        bed, m/s.
+        With the kind of its bed, and the flow over it.
     """
-    density = row["rho_f_kg_m3"]
-    weight = (row["rho_sol_kg_m3"] - density) * row["g_m_s2"] * row["d_m"]
-    level = row["ustar_m_s"]
-    if row["alpha_deg"] > 0:
-        # of either criterion: a slope changes what it takes to leave the pocket
-        here = SingleGrain.of_row(row)
-        flat = replace(here, slope_deg=0.0)
-        on_slope, on_level = thresholds_of(row["law"], [here, flat])
-        level *= float(on_level.friction_velocity / on_slope.friction_velocity)
-    theta = row["measured_curve"]
-    if density >= GAS_BELOW and row["measured_rows"] > 0:
-        theta = row["measured_median"]
-    return {
-        **row,
-        "bed": "grain",
-        "usable": row["valid"],
-        "ustar0_m_s": row["ustar_m_s"],
-        "level_ustar_m_s": level,
-        "measured_level_ustar_m_s": math.sqrt(theta * weight / density),
-    }
+    return {**row, "bed": "grain", "ustar0_m_s": row["ustar_m_s"]}
 
 
 def nearest(rows: Sequence["Row"]) -> str:
@@ -84,14 +62,9 @@ def nearest(rows: Sequence["Row"]) -> str:
     Returns
     -------
     str
-        Its name; empty if no law holds.
+        Its name; empty if no law holds, or nothing was measured near.
     """
-    holding = [as_row(row) for row in rows if row["valid"]]
+    holding = [row for row in rows if row["valid"] and correction(row) >= 1]
     if not holding:
         return ""
-
-    def off(row: "Row") -> float:
-        ratio = row["level_ustar_m_s"] / row["measured_level_ustar_m_s"]
-        return abs(math.log(ratio))
-
-    return str(min(holding, key=off)["law"])
+    return str(min(holding, key=correction)["law"])

@@ -61,9 +61,10 @@ def as_json(rows: Sequence["Row"]) -> str:
         Every number has nine digits, which are the same on all processors.
     """
     from orchestrator.physics.beside import MEASURED, TESTED
+    from orchestrator.physics.verdict import COLUMNS
 
     names = {column: name for column, (name, _) in QUANTITIES.items()}
-    for column in ("valid", "why_not", *MEASURED, *TESTED):
+    for column in ("valid", *COLUMNS, *MEASURED, *TESTED):
         names[column] = column
     for column in OF_CRITERION:
         if column in rows[0]:
@@ -241,7 +242,7 @@ def _quantities(rows: Sequence["Row"]) -> dict[str, str]:
 
 def _whether_it_holds(row: "Row") -> str:
     """Whether the law holds: where the grain leaves, which hopping on may exceed."""
-    if not row["why_not"]:
+    if row["valid"]:
         return "yes"
     is_further = row.get("decides") == "goes on"
     where = "no, when it leaves" if is_further else "no"

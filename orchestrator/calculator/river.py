@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from orchestrator.calculator.table import Table, mark, mark_laminar, why_no_depth
+from orchestrator.calculator.table import Table, judge, why_no_depth
 from orchestrator.errors import InputError
 from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.physics.velocity import measurable_speeds
@@ -75,12 +75,11 @@ def add_depth(table: Table, bed_slope: float, has_depth: bool) -> None:
     table[COLUMN] = np.full(len(ustar), slope)
     table["depth_m"] = depth
     table["mean_velocity_m_s"] = speeds["mean_velocity_m_s"]
-    _mark_depths(table)
-    mark_laminar(table)
+    judge(table, _of_depths(table))
 
 
-def _mark_depths(table: Table) -> None:
-    """Mark thresholds without a depth; refuse a table in which no answer has one."""
+def _of_depths(table: Table) -> list[str]:
+    """What is against each depth; refuse a table in which no answer has one."""
     reasons = [""] * len(table["depth_m"])
     for row, depth in enumerate(table["depth_m"].tolist()):
         # a law without a threshold has its own reason
@@ -92,6 +91,4 @@ def _mark_depths(table: Table) -> None:
         is_deep = table["depth_m"][answers[0]] > table["d_m"][answers[0]]
         remedy = f"take a {'steeper' if is_deep else 'gentler'} slope"
         raise InputError(what, "--bed-slope", remedy)
-    for row, reason in enumerate(reasons):
-        if reason:
-            mark(table, row, reason)
+    return reasons

@@ -3,7 +3,7 @@
 import itertools
 import re
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, NamedTuple
 
@@ -21,8 +21,8 @@ from orchestrator.calculator import (
     QUANTITIES,
 )
 from orchestrator.errors import InputError
-from orchestrator.physics import saltation
-from orchestrator.physics.beside import beside
+from orchestrator.physics import saltation, verdict
+from orchestrator.physics.beside import beside, measured_level_ustar
 from orchestrator.physics.constants import GAS_BELOW, GRAIN_COLUMNS
 from orchestrator.physics.laws import LAWS, Exposure, law
 from orchestrator.physics.threshold import (
@@ -33,12 +33,12 @@ from orchestrator.physics.threshold import (
     Threshold,
     default_laws,
     regime,
+    standing_out,
     threshold,
     why_not,
 )
 from orchestrator.physics.velocity import (
     LAMINAR_BELOW,
-    laminar,
     measurable_speeds,
     open_water_reynolds,
 )
@@ -48,9 +48,6 @@ Table = dict[str, NDArray[Any]]
 """Columns of equal length by their names."""
 OF_PAPER = (PAPER, *LAWS_OF["transition"])
 """Laws of the paper, which are of grains that leave their pockets."""
-NO_START = f"not reached: no flow up to a Shields number of {saltation.MOST:g} does it"
-NO_END = "not known: hops have no end"
-"""Why a grain has no threshold of going on."""
 
 
 def thresholds(
@@ -111,15 +108,15 @@ def thresholds(
     # numbers beyond all floats end as laws that do not hold
     with np.errstate(all="ignore"):
         table = _of_all_laws(grains, asked, criterion)
+        judge(table)
     if criterion == GOES_ON and not np.isfinite(table["shields"]).any():
         remedy = f"take the criterion {LEAVES}, or a larger grain"
-        raise InputError(NO_START, "threshold: criterion", remedy)
+        raise InputError(verdict.NO_START, "threshold: criterion", remedy)
     if not table["valid"].any():
         place = int(np.argmax(table["answer"]))
         reason = f"{table['law'][place]}: {table['why_not'][place]}"
         remedy = "are all numbers in SI units?"
         raise InputError(f"no force law holds; {reason}", "threshold", remedy)
-    mark_laminar(table)
     return table
 
 
@@ -133,18 +130,13 @@ def _check_criterion(criterion: str) -> None:
 
 def _of_all_laws(grains: Table, asked: str, criterion: str) -> Table:
     """The thresholds of grains under every law, a row for each grain and law."""
-    exposure = Exposure(
-        diameter=grains["diameter"],
-        roughness=grains["roughness"],
-        fluid_density=grains["fluid_density"],
-        viscosity=grains["viscosity"],
-        lift_coefficient=grains["lift_coefficient"],
-    )
+    exposure = _exposure(grains)
     inputs = {each.column: grains[name] for name, each in PARAMETERS.items()}
     by_law = {name: _threshold(name, exposure, grains) for name in LAWS}
     regimes = regime(by_law["low"], by_law["high"]).astype(object)
     picked = _picked(asked, regimes, by_law["bridged"].friction_velocity, exposure)
     hopping = _hopping(grains) if criterion == GOES_ON else None
+    level = _level_ustar(grains, criterion, by_law, hopping)
     blocks = []
     for name, at in by_law.items():
         block = _block(name, at, exposure, grains)
@@ -153,7 +145,10 @@ def _of_all_laws(grains: Table, asked: str, criterion: str) -> Table:
             block = _going_on(block, hopping, exposure, grains)
             kind["criterion"] = np.full(len(block["law"]), GOES_ON, object)
         block["regime"] = regimes
-        block |= beside({**block, **kind})
+        measured = beside({**block, **kind})
+        block |= measured
+        block["level_ustar_m_s"] = level[name]
+        block["measured_level_ustar_m_s"] = measured_level_ustar({**inputs, **measured})
         block["answer"] = np.array([name in laws for laws in picked])
         blocks.append(block)
     table = {name: np.repeat(column, len(LAWS)) for name, column in inputs.items()}
@@ -163,13 +158,52 @@ def _of_all_laws(grains: Table, asked: str, criterion: str) -> Table:
     return table
 
 
-def mark_laminar(table: Table) -> None:
-    """Mark the thresholds in open water whose flow may be laminar as not valid.
+def _level_ustar(
+    grains: Table,
+    criterion: str,
+    by_law: Mapping[str, Threshold],
+    hopping: "_Hopping | None",
+) -> dict[str, FloatArray]:
+    """Friction velocity of each grain on a level bed, m/s, by the force law."""
+    is_sloping = grains["slope_deg"] != 0
+    if is_sloping.any():
+        grains = {**grains, "slope_deg": np.zeros(len(is_sloping))}
+        exposure = _exposure(grains)
+        by_law = {name: _threshold(name, exposure, grains) for name in LAWS}
+        hopping = _hopping(grains) if criterion == GOES_ON else None
+    found = {}
+    for name, at in by_law.items():
+        ustar = at.friction_velocity
+        if hopping is not None:
+            further = hopping.thresholds.initiation(saltation.PEAK)
+            moved = saltation.motion(at.shields, further, hopping.can).shields
+            ustar = ustar * np.sqrt(moved / at.shields)
+        found[name] = ustar
+    return found
+
+
+def _exposure(grains: Table) -> Exposure:
+    """The grains in their fluids."""
+    return Exposure(
+        diameter=grains["diameter"],
+        roughness=grains["roughness"],
+        fluid_density=grains["fluid_density"],
+        viscosity=grains["viscosity"],
+        lift_coefficient=grains["lift_coefficient"],
+    )
+
+
+def judge(table: Table, of_depth: Sequence[str] = ()) -> None:
+    """Say whether the thresholds of a table are usable, and what speaks against them.
+
+    A law whose flow in open water may be laminar is not valid.
 
     Parameters
     ----------
     table
-        The table of `thresholds`, whose columns ``valid`` and ``why_not`` are changed.
+        The table of `thresholds`, with any depth; it gets the columns of the verdict.
+    of_depth
+        What is against the depth of each; empty where nothing is.
     """
     with np.errstate(all="ignore"):
         reynolds = open_water_reynolds(
@@ -178,26 +212,33 @@ def mark_laminar(table: Table) -> None:
             viscosity=table["nu_m2_s"],
             depth=table["depth_m"],
         )
-        is_laminar = reynolds < LAMINAR_BELOW
+    is_laminar = reynolds < LAMINAR_BELOW
     is_laminar &= table["rho_f_kg_m3"] >= GAS_BELOW
-    for row in np.flatnonzero(is_laminar).tolist():
-        mark(table, row, laminar(float(reynolds[row])))
-
-
-def mark(table: Table, row: int, reason: str) -> None:
-    """Mark a threshold as not valid.
-
-    Parameters
-    ----------
-    table
-        The table of `thresholds`, whose columns ``valid`` and ``why_not`` are changed.
-    row
-        Its row.
-    reason
-        Why it is not, beside other reasons.
-    """
-    table["why_not"][row] = "; ".join(filter(None, [table["why_not"][row], reason]))
-    table["valid"][row] = False
+    table["valid"] &= ~is_laminar
+    flow = np.where(table["rho_f_kg_m3"] < GAS_BELOW, np.nan, reynolds)
+    columns = {
+        **table,
+        "force_law": table["law"],
+        "law": table["law_ends"],
+        "law_remedy": table["law_remedy"],
+        "flow_reynolds": flow,
+        "standing_out": standing_out(1.0, table["beta_deg"]),
+    }
+    if "decides" in table:
+        columns["criterion"] = np.full(len(flow), GOES_ON, object)
+    cells = zip(*(column.tolist() for column in columns.values()), strict=True)
+    rows = [dict(zip(columns, row, strict=True)) for row in cells]
+    reasons = [
+        [*verdict.of_grain(row), *verdict.of_measurements(row, is_closed=True)]
+        for row in rows
+    ]
+    for place, text in enumerate(of_depth):
+        if text:
+            reasons[place].append(verdict.Reason("depth", text))
+            table["valid"][place] = False
+    for name, values in verdict.columns(rows, reasons).items():
+        is_word = name != "usable"
+        table[name] = np.array(values, object if is_word else bool)
 
 
 def why_no_depth(depth: float, diameter: float) -> str:
@@ -295,7 +336,15 @@ def _block(name: str, at: Threshold, exposure: Exposure, grains: Table) -> Table
         slope_deg=grains["slope_deg"],
         gravity=grains["gravity"],
     )
-    block["why_not"] = np.array(reasons, object)
+    # without a threshold no law is beyond its range
+    is_known = np.isfinite(ustar)
+    block["law_ends"] = np.where(is_known, np.array(reasons, object), "")
+    remedies = np.full(len(ustar), "", object)
+    further = LAWS[name].goes_on
+    if further:
+        holds = LAWS[further].valid(ustar, exposure) & (block["law_ends"] != "")
+        remedies[holds] = f'choose forces.law = "{further}"'
+    block["law_remedy"] = remedies
     return block
 
 
@@ -367,13 +416,7 @@ def _going_on(
     changed["reynolds"] = exposure.reynolds(ustar)
     changed["drag_n"] = law.drag(in_gust, exposure)
     changed["lift_n"] = law.lift(in_gust, exposure)
-    changed["why_not"] = block["why_not"].copy()
-    goes_on = stresses["shields_goes_on"]
-    is_missing = hopping.can & ~np.isfinite(goes_on)
-    for row in np.flatnonzero(is_missing).tolist():
-        reason = NO_START if np.isinf(goes_on[row]) else NO_END
-        reasons = [block["why_not"][row], reason]
-        changed["why_not"][row] = "; ".join(filter(None, reasons))
+    is_missing = hopping.can & ~np.isfinite(stresses["shields_goes_on"])
     changed["valid"] = block["valid"] & ~is_missing
     return changed
 

@@ -1,24 +1,27 @@
-"""What was measured beside a threshold on a level bed, as columns and in words.
+"""What was measured beside a threshold on a level bed, as columns.
 
 In a liquid it is rows of flumes, by eye; in a gas it is three sites in the field; in
 both it is a curve, too. An interval is that which held the thresholds of flumes, from
-the tenth to the ninetieth percentile over the model's, for one kind of bed and forces
-and a range of the model's Re*: ``tested.csv``, by `orchestrator validate` and
-``tools/tested.py``.
+the tenth to the ninetieth percentile over the model's. ``tested.csv`` has those of
+single grains, ``tested_strips.csv`` those of poured strips, each with the ranges of
+numbers that it is of: of the model's Re*, the ratio of densities, the entrainment
+angle, d/z0 and more. Outside of them there is none. ``tools/tested.py`` makes both.
 """
 
 import csv
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from orchestrator.physics.constants import GAS_BELOW, LIFT_COEFFICIENT
 from orchestrator.physics.curves import Air, shao_lu, soulsby_whitehouse
 from orchestrator.physics.measured import VISUAL
-from orchestrator.types import FloatArray
+from orchestrator.physics.threshold import weight
+from orchestrator.types import BoolArray, FloatArray
 
 FIELD = (0.0110, 0.0126, 0.0129)
 """Shields numbers of the fluid threshold at three sites, by R. L. Martin and J. F. Kok,
@@ -27,7 +30,10 @@ FIELD_REYNOLDS = (4.4, 27.0)
 """Re* near those of the sites, 8.8 to 13.5: within a factor of 2."""
 AIR_OF_QUARTZ = (1085.0, 4580.0)
 """Densities of grains over that of the gas, within 2 of those of the sites in the
-field, 2,170 to 2,290."""
+field, 2,170 to 2,290. The curve of Shao and Lu is one of such grains, too."""
+OF_FLUMES = (1.28, 4.7)
+"""Densities of grains over that of the liquid, from the least to the largest of the
+rows of flumes."""
 MOST_COHESION = 5e-5
 """Largest cohesion of the grains whose thresholds were measured in air, N/m: the curve
 of the wind tunnel is answered with that of Shao and Lu's gamma of 1.65e-4 N/m."""
@@ -41,53 +47,45 @@ MEASURED = (
 """Columns of what was measured at the Re*; `tables/columns.csv` explains them."""
 TESTED = ("tested_low", "tested_high", "tested_rows", "tested_held")
 """Columns of the interval; `tables/columns.csv` explains them."""
+LEAVES, GOES_ON = "leaves", "goes on"
+"""Criteria: a grain leaves its pocket, or also goes on after a gust."""
+LIQUID, GAS = "liquid", "gas"
+"""Media of the tested intervals."""
+GRAINS = Path(__file__).with_name("tested.csv")
+STRIPS = Path(__file__).with_name("tested_strips.csv")
+"""The tested intervals of single grains, and of poured strips."""
+OF_STRIPS = ("sizes", "exposure", "sheltering", "gusts")
+"""Words that tell tested strips apart, beside those of all tested intervals."""
+NUMBERS_OF_STRIPS = ("phi_deg", "poured_depth", "width", "mobile_layers", "fraction")
+"""The same, of numbers."""
 OF_KIND = (
-    "alpha_s",
-    "cohesion_n_m",
-    "alpha_deg",
-    "relative_size",
-    "rho_f_kg_m3",
-    "rho_sol_kg_m3",
-    "force_law",
-    "d_m",
-    "z0_m",
     "bed",
-    "beta_deg",
     "bed_shape",
     "profile",
     "obstacles",
     "width",
     "sizes",
     "method",
-    "exposure",
     "sheltering",
-    "fraction",
-    "gusts",
-    "phi_deg",
-    "poured_depth",
-    "mobile_layers",
     "counted",
     "loaded_grains",
     "length",
     "h_m",
+    "d_m",
     "criterion",
     "decides",
     "row_hold",
 )
-"""Columns that the kind of a threshold follows from."""
-LENGTHS = ("d_m", "length", "h_m")
-"""Those of them that are lengths, of which the ratios to z0 alone matter."""
-GOES_ON = "goes on"
-"""The criterion of the kinds of grains that must go on after a gust."""
+"""Columns that tell whether a bed is a strip, or one of grains that move alone."""
+LIKE = 0.01
+"""Relative difference from a number that was not varied up to which an interval is
+given: of the lift coefficient, of a grain's size over that of its neighbours, of the
+numbers of a strip. So much of its weight may cohesion hold a grain that has none."""
 LEVEL_DEG = 1.0
 """Steepest slope of a bed that is like those of the flumes, degrees."""
-TABLE = Path(__file__).with_name("tested.csv")
-"""The tested intervals."""
 ROW_HOLD = 1.05
 """u*_0 of the first grain in its row, over that of the grain alone, from which the row
 holds it."""
-NOT_MEASURED = "nothing was measured"
-"""The beginning of a reason why a threshold is not usable: no measurement is near."""
 MOST_SLOPE_DEG = 30.0
 """Slope to which an interval of grains that go on is given, degrees."""
 FRICTION_DEG = (32.0, 50.0)
@@ -114,24 +112,71 @@ def beside(table: Any) -> dict[str, FloatArray]:
         The columns `MEASURED` and `TESTED`, each of shape (n,).
     """
     reynolds = np.asarray(table["reynolds"], float)
+    density = np.asarray(table["rho_sol_kg_m3"], float)
+    fluid_density = np.asarray(table["rho_f_kg_m3"], float)
+    is_gas = fluid_density < GAS_BELOW
+    curve = _curve(table)
+    rows = np.where(is_gas, _of_field(reynolds).T, _of_flumes(reynolds).T)
+    # of other grains nothing was measured, whatever a curve says
+    is_alike = _is_alike(density / fluid_density, is_gas)
+    curve = np.where(is_alike, curve, np.nan)
+    rows = np.where(is_alike, rows, np.array(NO_ROWS)[:, None])
+    held = tested(table)
+    width = _slope_width(table)
+    held[0] *= np.asarray(table["shields"], float) / width
+    held[1] *= np.asarray(table["shields"], float) * width
+    return dict(zip((*MEASURED, *TESTED), [curve, *rows, *held], strict=True))
+
+
+def _curve(table: Any) -> FloatArray:
+    """Shields number of each grain by the published curve of its medium."""
     diameter = np.asarray(table["d_m"], float)
     density = np.asarray(table["rho_sol_kg_m3"], float)
     fluid_density = np.asarray(table["rho_f_kg_m3"], float)
     viscosity = np.asarray(table["nu_m2_s"], float)
     gravity = np.asarray(table["g_m_s2"], float)
-    ratio = density / fluid_density
-    excess = (ratio - 1) * gravity
-    is_gas = fluid_density < GAS_BELOW
+    excess = (density / fluid_density - 1) * gravity
     air = Air(density, fluid_density, viscosity, gravity)
     in_gas = shao_lu(diameter, air) ** 2 / (excess * diameter)
     in_liquid = soulsby_whitehouse(diameter * (excess / viscosity**2) ** (1 / 3))
-    rows = np.where(is_gas[..., None], _of_field(reynolds, ratio), _of_flumes(reynolds))
-    held = np.array([*map(interval, _kinds(table), reynolds.tolist())], float).T
-    held[:2] *= np.asarray(table["shields"], float)
-    held[0] /= _slope_width(table)
-    held[1] *= _slope_width(table)
-    columns = [np.where(is_gas, in_gas, in_liquid), *rows.T, *held]
-    return dict(zip((*MEASURED, *TESTED), columns, strict=True))
+    return np.where(fluid_density < GAS_BELOW, in_gas, in_liquid)
+
+
+def measured_level_ustar(table: Any) -> FloatArray:
+    """Find the measured threshold of one grain on a level bed.
+
+    Parameters
+    ----------
+    table
+        A table, or a mapping of columns, with those of `beside`.
+
+    Returns
+    -------
+    ndarray
+        Friction velocity, m/s: in a liquid that of the median of the flumes where they
+        have rows, else that of the curve. NaN where nothing was measured.
+    """
+    density = np.asarray(table["rho_f_kg_m3"], float)
+    median = np.asarray(table["measured_median"], float)
+    has_rows = (density >= GAS_BELOW) & np.isfinite(median)
+    theta = np.where(has_rows, median, np.asarray(table["measured_curve"], float))
+    excess = np.asarray(table["rho_sol_kg_m3"], float) - density
+    of_weight = excess * np.asarray(table["g_m_s2"], float)
+    of_weight = of_weight * np.asarray(table["d_m"], float)
+    return np.asarray(np.sqrt(theta * of_weight / density))
+
+
+def _is_alike(density_ratio: FloatArray, is_gas: BoolArray) -> BoolArray:
+    """Whether grain and fluid have a ratio of densities as those that were measured."""
+    in_liquid = _is_within(density_ratio, OF_FLUMES)
+    in_gas = _is_within(density_ratio, AIR_OF_QUARTZ)
+    return np.asarray(np.where(is_gas, in_gas, in_liquid))
+
+
+def _is_within(value: FloatArray, ends: tuple[float, float]) -> BoolArray:
+    """Whether numbers are between two ends, these included; NaN is not."""
+    low, high = ends
+    return np.asarray((value >= low) & (value <= high))
 
 
 def _slope_width(table: Any) -> FloatArray:
@@ -157,81 +202,214 @@ def _of_flumes(reynolds: FloatArray) -> FloatArray:
     return np.array(rows)[np.searchsorted(edges, reynolds, side="right")]
 
 
-def _of_field(reynolds: FloatArray, density_ratio: FloatArray) -> FloatArray:
+def _of_field(reynolds: FloatArray) -> FloatArray:
     """The same of the sites in the field, for what is near them; shape (n, 4)."""
     low, high = FIELD_REYNOLDS
     is_near = (reynolds > low) & (reynolds < high)
-    low, high = AIR_OF_QUARTZ
-    is_near &= (density_ratio > low) & (density_ratio < high)
     sites = (float(np.median(FIELD)), min(FIELD), max(FIELD), float(len(FIELD)))
     return np.where(is_near[..., None], sites, NO_ROWS)
 
 
-def _kinds(table: Any) -> list[str]:
-    """The kind of each row of a table; thousands of rows have few."""
-    z0 = np.asarray(table["z0_m"], float)
-    given = {}
-    for name in OF_KIND:
-        if name in table:
-            given[name] = _comparable(np.asarray(table[name]).tolist())
-    for name in LENGTHS:
-        if name in table:
-            ratio = np.asarray(table[name], float) / z0
-            given[name] = _comparable([float(f"{value:.3g}") for value in ratio])
-    given["z0_m"] = [1.0] * len(z0)
-    rows = [*zip(*given.values(), strict=True)]
-    kinds = {row: kind_of(dict(zip(given, row, strict=True))) for row in {*rows}}
-    return [kinds[row] for row in rows]
+def tested(table: Any) -> FloatArray:
+    """Find the intervals that held the measured thresholds of such beds.
 
-
-def _comparable(values: list[Any]) -> list[Any]:
-    """Values with None for NaN, which is not equal to another NaN."""
-    return [None if value != value else value for value in values]
-
-
-def kind_of(row: Mapping[str, Any]) -> str:
-    """The kind of a threshold.
-
-    There are kinds of single grains, and of strips of sand by the pivots at a fraction
-    of their grains. There are none on slopes, and in a gas three rows, too few.
+    There are intervals of single grains, and of strips of sand by the pivots at a
+    fraction of their grains.
 
     Parameters
     ----------
-    row
-        Columns of its scene, those of `OF_KIND` that it has.
+    table
+        A table, or a mapping of columns, of n thresholds: Re*, and the columns of their
+        scenes that they have.
 
     Returns
     -------
-    str
-        The kind; empty where no rows are like it.
+    ndarray
+        Ends of the interval over the Shields number, the number of measured thresholds,
+        and the share of them that it held, shape (4, n). Where there is none, there are
+        no rows (0).
     """
-    if not _is_as_tested(row):
-        return ""
-    words = [row["force_law"], f"z0 d/{row['d_m'] / row['z0_m']:.3g}"]
-    if row.get("bed", "grain") == "grain" or _is_alone(row):
-        words += ["grain", f"beta {row['beta_deg']:g}"]
-        if row.get("criterion") == GOES_ON:
-            words.append(GOES_ON)
-        if row["rho_f_kg_m3"] < GAS_BELOW:
-            words.append("air")
-    elif _is_strip(row):
-        words += [
-            "strip",
-            f"phi {row['phi_deg']:g}",
-            f"{row['poured_depth']:g} d deep",
-            f"{row['width']:g} d wide",
-            f"{row['mobile_layers']:g} layers",
-            str(row["sizes"]),
-            row["exposure"],
-            row["sheltering"],
-            f"n/N {row['fraction']:g}",
-        ]
-    else:
-        return ""
-    gusts = row.get("gusts")
-    if isinstance(gusts, str):
-        words.append(f"gusts {gusts}")
-    return ", ".join(words)
+    columns = _columns(table)
+    count = len(columns["reynolds"])
+    found = np.array([[np.nan], [np.nan], [0.0], [np.nan]]).repeat(count, axis=1)
+    is_lone, is_strip = _kinds(table, count)
+    is_usual = _is_usual(table)
+    for asked, path in ((is_lone, GRAINS), (is_strip, STRIPS)):
+        asked &= is_usual
+        if not asked.any():
+            continue
+        for interval in _intervals(path):
+            here = interval.is_of(columns, asked)
+            if here.any():
+                found[:, here] = interval.widest(found[:, here])
+    return found
+
+
+class Interval(NamedTuple):
+    """A tested interval, and what it is of.
+
+    Attributes
+    ----------
+    words
+        Words by the columns of a table.
+    ranges
+        Ends of numbers, both included, by the columns.
+    low, high
+        Ends of the interval over the Shields number.
+    rows
+        Number of measured thresholds.
+    held
+        Share of them that it held.
+    """
+
+    words: Mapping[str, str]
+    ranges: Mapping[str, tuple[float, float]]
+    low: float
+    high: float
+    rows: float
+    held: float
+
+    def is_of(self, columns: Mapping[str, NDArray[Any]], asked: BoolArray) -> BoolArray:
+        """Tell which of some thresholds it is of.
+
+        Parameters
+        ----------
+        columns
+            Their columns, each of shape (n,).
+        asked
+            Those among which it is looked for, shape (n,).
+
+        Returns
+        -------
+        ndarray
+            Truth values, shape (n,).
+        """
+        here = asked.copy()
+        for name, word in self.words.items():
+            here &= columns[name] == word
+            if not here.any():
+                return here
+        for name, ends in self.ranges.items():
+            here &= _is_within(columns[name], ends)
+        return here
+
+    def widest(self, found: FloatArray) -> FloatArray:
+        """Join it to other intervals of the same thresholds: at the end of two ranges.
+
+        Parameters
+        ----------
+        found
+            The other intervals, shape (4, n); those without rows are none.
+
+        Returns
+        -------
+        ndarray
+            The widest ends, the fewest rows, and the least part that was held.
+        """
+        own = np.array([[self.low], [self.high], [self.rows], [self.held]])
+        low, _, rows, held = np.fmin(found, own)
+        high = np.fmax(found[1], self.high)
+        return np.stack([low, high, np.where(found[2] > 0, rows, self.rows), held])
+
+
+@cache
+def _intervals(path: Path) -> tuple[Interval, ...]:
+    """The tested intervals of a file."""
+    text = path.read_text(encoding="utf-8")
+    return tuple(map(_interval, csv.DictReader(text.splitlines())))
+
+
+def _interval(row: Mapping[str, str]) -> Interval:
+    """A tested interval of a row: numbers have columns for their two ends."""
+    own = {name: float(row[name]) for name in ("low", "high", "rows", "held")}
+    words, ranges = {}, {}
+    for name, value in row.items():
+        if name in own:
+            continue
+        column, _, end = name.rpartition("_")
+        if end == "low":
+            ranges[column] = (float(value), float(row[f"{column}_high"]))
+        elif end != "high":
+            words[name] = value
+    return Interval(words, ranges, **own)
+
+
+def _columns(table: Any) -> dict[str, NDArray[Any]]:
+    """What tested intervals are told apart by, of some thresholds."""
+    diameter = np.asarray(table["d_m"], float)
+    density = np.asarray(table["rho_sol_kg_m3"], float)
+    fluid_density = np.asarray(table["rho_f_kg_m3"], float)
+    cohesion = np.asarray(table["cohesion_n_m"], float)
+    pull_over_weight = (
+        cohesion
+        * diameter
+        / weight(
+            diameter=diameter,
+            density=density,
+            fluid_density=fluid_density,
+            gravity=np.asarray(table["g_m_s2"], float),
+        )
+    )
+    columns: dict[str, NDArray[Any]] = {
+        "medium": np.where(fluid_density < GAS_BELOW, GAS, LIQUID),
+        "force_law": np.asarray(table["force_law"], object),
+        "criterion": np.full(len(diameter), LEAVES, object),
+        "reynolds": np.asarray(table["reynolds"], float),
+        "density_ratio": density / fluid_density,
+        "alpha_deg": np.asarray(table["alpha_deg"], float),
+        "beta_deg": np.asarray(table["beta_deg"], float),
+        "d_over_z0": diameter / np.asarray(table["z0_m"], float),
+        "cohesion_n_m": np.where(pull_over_weight < LIKE, 0.0, cohesion),
+    }
+    if "criterion" in table:
+        goes_on = np.asarray(table["criterion"], object) == GOES_ON
+        columns["criterion"] = np.where(goes_on, GOES_ON, LEAVES)
+    for name in OF_STRIPS:
+        if name in table:
+            words = np.asarray(table[name], object)
+            columns[name] = np.array([_word(each) for each in words], object)
+    for name in NUMBERS_OF_STRIPS:
+        if name in table:
+            columns[name] = np.asarray(table[name], float)
+    return columns
+
+
+def _word(value: Any) -> str:
+    """A word of a table; empty where it has none."""
+    return value if isinstance(value, str) else ""
+
+
+def _is_usual(table: Any) -> BoolArray:
+    """Whether grains have the lift and the neighbours of those that were tested."""
+    lift = np.asarray(table["alpha_s"], float)
+    is_usual = np.abs(lift / LIFT_COEFFICIENT - 1) <= LIKE
+    if "relative_size" not in table:
+        return np.asarray(is_usual)
+    size = np.asarray(table["relative_size"], float)
+    # a bed of many grains has none
+    return np.asarray(is_usual & ~(np.abs(size - 1) > LIKE))
+
+
+def _kinds(table: Any, count: int) -> tuple[BoolArray, BoolArray]:
+    """Whether thresholds are of single grains, or as of such, and whether of strips."""
+    if "bed" not in table:
+        return np.ones(count, bool), np.zeros(count, bool)
+    is_lone, is_strip = [], []
+    for row in _rows_of(table):
+        is_grain = row["bed"] == "grain"
+        is_lone.append(is_grain or _is_alone(row))
+        is_strip.append(not is_lone[-1] and _is_strip(row))
+    return np.array(is_lone, bool), np.array(is_strip, bool)
+
+
+def _rows_of(table: Any) -> Iterator[dict[str, Any]]:
+    """The rows of a table, with the columns of `OF_KIND` that it has."""
+    names = [name for name in OF_KIND if name in table]
+    columns = [np.asarray(table[name], object) for name in names]
+    for row in zip(*columns, strict=True):
+        # what a table lacks is NaN, which is true
+        known = (None if value != value else value for value in row)
+        yield dict(zip(names, known, strict=True))
 
 
 def _is_alone(row: Mapping[str, Any]) -> bool:
@@ -251,27 +429,6 @@ def _is_alone(row: Mapping[str, Any]) -> bool:
     return is_free or row.get("decides") == GOES_ON
 
 
-def _is_as_tested(row: Mapping[str, Any]) -> bool:
-    """Whether grains, fluid and slope are of a kind that was measured."""
-    goes_on = row.get("criterion") == GOES_ON
-    if row["alpha_s"] != LIFT_COEFFICIENT:
-        return False
-    is_gas = row["rho_f_kg_m3"] < GAS_BELOW
-    if row["cohesion_n_m"] > (MOST_COHESION if goes_on and is_gas else 0.0):
-        return False
-    if row["alpha_deg"] > (MOST_SLOPE_DEG if goes_on else LEVEL_DEG):
-        return False
-    if row.get("relative_size") not in (1.0, None):
-        return False
-    return not is_gas or (goes_on and _is_quartz_in_air(row))
-
-
-def _is_quartz_in_air(row: Mapping[str, Any]) -> bool:
-    """Whether grain and gas have a ratio of densities as those that were measured."""
-    low, high = AIR_OF_QUARTZ
-    return bool(low < row["rho_sol_kg_m3"] / row["rho_f_kg_m3"] < high)
-
-
 def _is_strip(row: Mapping[str, Any]) -> bool:
     """Whether a bed is a level strip like those tested, all of whose grains count."""
     # the strips that were tested have grains that leave
@@ -288,88 +445,3 @@ def _is_strip(row: Mapping[str, Any]) -> bool:
         return False
     length = row["length"] or 4 * row["h_m"]
     return bool(length / row["d_m"] > LEAST_LENGTH * (1 - 1e-2))
-
-
-def interval(kind: str, reynolds: float) -> list[float]:
-    """The interval that held the measured thresholds of a kind.
-
-    Parameters
-    ----------
-    kind
-        The kind, by `kind_of`.
-    reynolds
-        Re*.
-
-    Returns
-    -------
-    list of float
-        Ends of the interval over the Shields number, the number of rows, and the share
-        of them that it held. There are no rows (0) where fewer than ten are alike.
-    """
-    for low, high, *found in _table().get(kind, ()):
-        if low <= reynolds < high:
-            return found
-    return [np.nan, np.nan, 0, np.nan]
-
-
-@cache
-def _table() -> dict[str, list[list[float]]]:
-    """By kind: the ends of each range of Re*, and the interval."""
-    table: dict[str, list[list[float]]] = {}
-    text = TABLE.read_text(encoding="utf-8")
-    _, *rows = csv.reader(text.splitlines())
-    for kind, *numbers in rows:
-        table.setdefault(kind, []).append([float(number) for number in numbers])
-    return table
-
-
-def sentences(row: Mapping[Any, Any]) -> tuple[str, str]:
-    """Say what was measured beside a threshold, and which of it its interval held.
-
-    Parameters
-    ----------
-    row
-        The row of the threshold, with the columns of `beside`.
-
-    Returns
-    -------
-    measured, tested : str
-        A sentence on each.
-    """
-    is_gas = row["rho_f_kg_m3"] < GAS_BELOW
-    said = _in_gas(row) if is_gas else _in_liquid(row)
-    low, high, count, held = (row[name] for name in TESTED)
-    if not count:
-        none = "fewer than ten measured thresholds are of such beds at this Re*"
-        return said, f"no tested interval: {none}"
-    where = "rows in air" if is_gas else "flume rows"
-    rows = f"{held:.0%} of {count:g} {where} lie within {low:.3f} and {high:.3f}"
-    return said, f"θ {row['shields']:.3f}; {rows}"
-
-
-def _in_liquid(row: Mapping[Any, Any]) -> str:
-    """What was measured in flumes."""
-    curve, median, low, high, count = (row[name] for name in MEASURED)
-    by = f"the curve of Soulsby and Whitehouse {curve:.3f}"
-    if not count:
-        where = f"no flume has rows at Re* {row['reynolds']:.3g}"
-        return f"measured beside it: {by}; {where}"
-    rows = f"θ {median:.3f}, 10 to 90 % {low:.3f} to {high:.3f}, {count:g} rows"
-    return f"measured at this Re* on level beds in flumes, by eye: {rows}; {by}"
-
-
-def _in_gas(row: Mapping[Any, Any]) -> str:
-    """What was measured in the field."""
-    curve, median, low, high, count = (row[name] for name in MEASURED)
-    theta = row["shields"]
-    over = theta / curve
-    by = f"the curve of Shao and Lu has θ {curve:.4f}, this is {over:.2g} times it"
-    by = f"{by}, {over**0.5:.3g} times in u*"
-    if not count:
-        theirs = "Re* 9 to 14 and densities 2170 to 2290 times the gas's"
-        ratio = row["rho_sol_kg_m3"] / row["rho_f_kg_m3"]
-        this = f"Re* {row['reynolds']:.3g} and {ratio:.3g}"
-        return f"{by}; no field rows are near it: they have {theirs}, this has {this}"
-    rows = f"{low:.3f} to {high:.3f} at {count:g} sites (Martin and Kok 2018)"
-    said = f"measured in air on level beds: {by}; in the field {rows}"
-    return f"{said}, this is {theta / median:.2g} times"

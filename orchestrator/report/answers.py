@@ -12,8 +12,10 @@ import pandas as pd
 from orchestrator.digits import percent
 from orchestrator.grains.pile import Pile
 from orchestrator.physics.constants import GRAIN_COLUMNS
-from orchestrator.physics.laws import LAWS, Exposure
+from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import MEASURED_SOURCE, wilcock_crowe_hiding
+from orchestrator.physics.threshold import SingleGrain, thresholds_of
+from orchestrator.physics.verdict import USABLE
 from orchestrator.report import counted, labels, sheets, single, theory
 from orchestrator.report.card import Card, Mark, Number, Worth
 from orchestrator.report.results import (
@@ -584,7 +586,7 @@ def measured_of_size(row: pd.Series, size: float) -> float:
 def _of_grains(grains: pd.DataFrame) -> Card:
     """The card of one grain, or of several."""
     if is_one_grain(grains):
-        return _of_grain(grains.iloc[0])
+        return of_grain(grains.iloc[0])
     told = sheets.quantity(grains)
     usable = grains[valid(grains)]
     shown = usable if len(usable) else grains
@@ -602,8 +604,19 @@ def _of_grains(grains: pd.DataFrame) -> Card:
     )
 
 
-def _of_grain(row: pd.Series) -> Card:
-    """The card of one grain: speed, friction velocity and stress."""
+def of_grain(row: pd.Series) -> Card:
+    """Make the card of one grain: speed, friction velocity and stress.
+
+    Parameters
+    ----------
+    row
+        Its threshold with the columns of its scene.
+
+    Returns
+    -------
+    Card
+        The card.
+    """
     return single.card(row, laws_that_hold(row))
 
 
@@ -675,16 +688,15 @@ def by_this_law(rows: pd.DataFrame) -> tuple[FloatArray, BoolArray]:
 
 
 def _holds(rows: pd.DataFrame, ustar: FloatArray) -> BoolArray:
-    """Whether the one force law of rows holds at their thresholds (m/s)."""
-    exposure = Exposure(
-        diameter=rows["d_m"].to_numpy(float),
-        roughness=rows["z0_m"].to_numpy(float),
-        fluid_density=rows["rho_f_kg_m3"].to_numpy(float),
-        viscosity=rows["nu_m2_s"].to_numpy(float),
-        lift_coefficient=rows["alpha_s"].to_numpy(float),
-    )
-    law = LAWS[str(rows["force_law"].iloc[0])]
-    return np.asarray(law.valid(ustar, exposure))
+    """Whether the one force law of rows holds where the grains leave their pockets.
+
+    `ustar` is their threshold, m/s: without one there is no law that holds.
+    """
+    name = str(rows["force_law"].iloc[0])
+    columns = list(GRAIN_COLUMNS.values())
+    grains = [SingleGrain.of_row(row) for row in rows[columns].to_dict("records")]
+    holds = [bool(at.valid) for at in thresholds_of(name, grains)]
+    return np.array(holds, bool) & np.isfinite(ustar)
 
 
 # many laws, and hills
@@ -792,7 +804,7 @@ def _worth_of_many(shown: pd.DataFrame, count: int, of: int) -> Worth:
     if count < of:
         word = f"usable, with gaps: {count} of {of} thresholds"
         return Worth("care", word, "The others are marked, each with its reason.")
-    is_near = [single.is_measured(row) for _, row in shown.iterrows()]
+    is_near = (shown["verdict"] == USABLE).tolist()
     if all(is_near):
         return Worth("good", "usable", "All are within what was measured.")
     outside = len(is_near) - sum(is_near)

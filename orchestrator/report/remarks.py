@@ -11,6 +11,7 @@ from orchestrator.fidelity.decision import floor_of
 from orchestrator.fidelity.limits import FROZEN_BED
 from orchestrator.physics.beside import ROW_HOLD
 from orchestrator.physics.velocity import log_law_speed
+from orchestrator.physics.verdict import USABLE
 from orchestrator.report import counted, labels, sheets, single, theory
 from orchestrator.report.card import Remark
 from orchestrator.report.page import caption
@@ -136,7 +137,7 @@ def _correction(results: Results, table: pd.DataFrame) -> Iterator[Remark]:
     row = rows.iloc[0]
     computed = float(row["level_ustar_m_s"])
     measured = float(row["measured_level_ustar_m_s"])
-    if np.isnan(computed / measured) or single.is_measured(row):
+    if np.isnan(computed / measured) or row["verdict"] == USABLE:
         return
     ratio = computed / measured
     flow = "flow"

@@ -9,7 +9,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from orchestrator.digits import percent
-from orchestrator.physics.beside import FIELD, GOES_ON, LEVEL_DEG, NOT_MEASURED
+from orchestrator.physics import verdict
+from orchestrator.physics.beside import FIELD, GOES_ON, LEVEL_DEG
 from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.report.card import Card, Number, Worth, decimals
 from orchestrator.report.subjects import (
@@ -27,9 +28,10 @@ from orchestrator.report.subjects import (
 
 Row = Any
 """A row of a table with the columns of its scene, or a mapping with them."""
-NEAR = 1.1
-"""Factor from the measured friction velocity up to which no correction is named, where
-the measurements have no range."""
+
+
+WIDTH = 1.02
+"""Ratio of the ends from which force laws have a range: below they are the same."""
 
 
 def card(row: Row, holding: Mapping[str, float]) -> Card:
@@ -251,7 +253,8 @@ def numbers_of_grain(
     -------
     tuple of Number
         Speed, friction velocity and stress, each with the tested interval, or else the
-        range of the laws that hold.
+        range of the laws that hold. Where hopping on decides, which no law changes, or
+        where the laws agree, there is none.
     """
     ustar = float(row["ustar0_m_s"])
     theta = float(row["shields"])
@@ -261,7 +264,7 @@ def numbers_of_grain(
     if row["tested_rows"] > 0:
         low, high = tested(row, ustar)
         of_what = tested_on(row)
-    elif len(holding) < 2:
+    elif row.get("decides") == GOES_ON or not high > WIDTH * low:
         low = high = math.nan
     measured = measured_ustar(row, ustar)
     notes = {
@@ -363,9 +366,9 @@ def source(row: Row, told: Quantity, ustar: float | None = None) -> str:
         alike = ""
     if is_gas(float(row["rho_f_kg_m3"])):
         said = (
-            f"Squares: {alike}the threshold that wind tunnels measured on level beds "
+            f"Squares: {alike}the curve of Shao and Lu (2000) through wind tunnels in "
         )
-        said += f"of grains of {size} (Shao and Lu 2000)."
+        said += f"air, for a level bed of grains of {size}."
         return f"{said} {_field(row, told, ustar)}"
     if row["measured_rows"] > 0:
         rows = f"{row['measured_rows']:.0f} rows of flumes"
@@ -414,63 +417,26 @@ def worth(row: Row, few: bool = False) -> Worth:
     Returns
     -------
     Worth
-        Not usable where no law holds or another reason is against it; with a correction
-        where the computed threshold of one grain is outside what was measured.
+        That of its verdict, by `physics.verdict`.
     """
-    if not row["usable"]:
-        reason, *others = str(row["why_not"]).split("; ")
-        remedies = [part for part in others if part.startswith("choose ")]
-        has_remedy = reason.endswith(")") and " (" in reason
-        if has_remedy:
-            reason, _, remedy = reason.removesuffix(")").rpartition(" (")
-            remedies.insert(0, remedy)
-        has_measured = known(row["measured_level_ustar_m_s"]) > 0
-        if has_measured and not remedies and not reason.startswith(NOT_MEASURED):
-            remedies.append("take the measured value")
-        return Worth("bad", f"not usable: {reason}", _sentence("; ".join(remedies)))
+    if row["verdict"] == verdict.UNUSABLE:
+        word = f"{row['verdict']}: {row['why_not']}"
+        return Worth("bad", word, _sentence(row["remedy"]))
     if few:
         advice = (
             "Fewer than ten grains stand for some sizes; ask for more beds (seeds)."
         )
         return Worth("care", "usable, with doubt where grains are few", advice)
-    if is_measured(row):
+    if row["verdict"] == verdict.USABLE:
         return Worth("good", "usable", "It is within what was measured on level beds.")
-    what = "wind" if is_gas(float(row["rho_f_kg_m3"])) else "flow"
-    advice = f"For the {what} take the measured value."
-    advice += " To compare beds take the computed one."
+    advice = "No measurement is near; compare beds with each other alone."
+    if row["verdict"] == verdict.CORRECTED:
+        what = "wind" if is_gas(float(row["rho_f_kg_m3"])) else "flow"
+        advice = f"For the {what} take the measured value."
+        advice += " To compare beds take the computed one."
     if not is_level(row) and row["bed"] != "grain":
         advice = f"Take the place as computed. {advice}"
-    return Worth("care", "usable, with a correction", advice)
-
-
-def is_measured(row: Row) -> bool:
-    """Whether the computed threshold of one grain on a level bed is as measured.
-
-    Parameters
-    ----------
-    row
-        A threshold with the columns of its scene.
-
-    Returns
-    -------
-    bool
-        Whether its tested interval contains the measured value, or it is within the
-        range of the measured rows, the curve included; where there are neither, within
-        a factor of `NEAR` of the curve.
-    """
-    computed = float(row["level_ustar_m_s"])
-    measured = known(row["measured_level_ustar_m_s"])
-    if row["tested_rows"] > 0:
-        theta = (measured / computed) ** 2 * float(row["shields"])
-        if row["tested_low"] <= theta <= row["tested_high"]:
-            return True
-    if not row["measured_rows"] > 0:
-        return measured / NEAR <= computed <= NEAR * measured
-    density = float(row["rho_f_kg_m3"])
-    excess = (float(row["rho_sol_kg_m3"]) - density) * float(row["g_m_s2"])
-    theta = density * computed**2 / (excess * float(row["d_m"]))
-    ends = (row["measured_low"], row["measured_high"], row["measured_curve"])
-    return bool(min(ends) <= theta <= max(ends))
+    return Worth("care", row["verdict"], advice)
 
 
 def _sentence(text: str) -> str:

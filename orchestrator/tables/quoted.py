@@ -13,8 +13,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from orchestrator.physics import saltation
-from orchestrator.physics.beside import GOES_ON
-from orchestrator.physics.constants import GAS_BELOW, GRAIN_COLUMNS
+from orchestrator.physics.beside import GOES_ON, measured_level_ustar
+from orchestrator.physics.constants import GRAIN_COLUMNS
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.threshold import SingleGrain, thresholds_of
 from orchestrator.physics.velocity import measurable_speeds
@@ -85,13 +85,10 @@ def quoted(rows: pd.DataFrame, twins: "pd.Series[int] | None" = None) -> dict[st
         columns |= _first(rows, twins)
     level = grain_ustar(rows.assign(alpha_deg=0.0))
     measured = {}
-    for name in ("curve", "median", "low", "high"):
+    for name in ("low", "high"):
         theta = rows[f"measured_{name}"].to_numpy(float)
         measured[name] = np.sqrt(theta * _weight(rows) / density)
-    best = measured["curve"]
-    is_liquid = density >= GAS_BELOW
-    has_rows = is_liquid & np.isfinite(measured["median"])
-    best = np.where(has_rows, measured["median"], best)
+    best = measured_level_ustar(rows)
     columns["level_ustar_m_s"] = level
     columns["measured_level_ustar_m_s"] = best
     is_flat = _is_flat(rows)

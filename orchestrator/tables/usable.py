@@ -8,20 +8,16 @@ import pandas as pd
 
 from orchestrator.flow.case import SPEED_HEIGHT
 from orchestrator.grains.threshold import within
-from orchestrator.physics.beside import GOES_ON, NOT_MEASURED, ROW_HOLD, beside
+from orchestrator.physics import verdict
+from orchestrator.physics.beside import GOES_ON, ROW_HOLD, beside
 from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import standing_out, why_not
-from orchestrator.physics.velocity import (
-    LAMINAR_BELOW,
-    laminar,
-    open_water_reynolds,
-)
+from orchestrator.physics.velocity import open_water_reynolds
+from orchestrator.physics.verdict import Reason
 from orchestrator.study import fields
 from orchestrator.tables.check import Contradictions
-from orchestrator.tables.quoted import OF_PILE, quoted
+from orchestrator.tables.quoted import OF_PILE, grain_ustar, quoted
 
-EXPOSED_FROM = 0.25
-"""Part of a grain over the tops of its neighbours from which it is exposed."""
 CARRIED_OFF = 0.1
 """Share of the moved grains from which a threshold is one of lift-off."""
 KEPT_TO = 0.1
@@ -124,45 +120,56 @@ def with_usable(
     Returns
     -------
     DataFrame
-        The table with ``usable``, ``why_not``, what was measured, by `beside`, and the
-        columns of `quoted`.
+        The table with the columns of `verdict.columns`, what was measured, by `beside`,
+        and the columns of `quoted`.
     """
     if table.empty:
         return table
     columns = [name for name in scenes if name not in table or name == "scene_id"]
     rows = table.merge(scenes[columns], on="scene_id", how="left")
-    if "reynolds_closed_form" in rows:
+    is_pile = "share_carried_off" in rows
+    if not is_pile:
         is_dem = rows["method"] == "dem"
         rows["reynolds"] = rows["reynolds"].where(is_dem, rows["reynolds_closed_form"])
         rows["shields"] = rows["shields_dem"].where(is_dem, rows["shields_closed_form"])
     ustar = rows["reynolds"] * rows["nu_m2_s"] / rows["d_m"]
-    rows["law"] = ""
+    if not is_pile:
+        ustar = _leaving(rows, ustar)
+    rows["law"] = rows["law_remedy"] = ""
     for name, part in rows.groupby("force_law"):
-        rows.loc[part.index, "law"] = _beyond_law(str(name), part, ustar[part.index])
+        of_law = _beyond_law(str(name), part, ustar[part.index])
+        rows.loc[part.index, ["law", "law_remedy"]] = of_law
     rows["standing_out"] = standing_out(rows["relative_size"], rows["beta_deg"])
     rows["flow_reynolds"] = _flow_reynolds(rows)
     measured = beside(rows)
-    rows["tested_rows"] = measured["tested_rows"]
-    against = contradicted or {}
-    texts = []
-    for row in rows.to_dict("records"):
-        reasons = [*_reasons(row, tolerance), *_untested(row)]
-        key = (row["scene_id"], row.get("fraction", np.nan))
-        if key in against:
-            reasons.append(against[key])
-        texts.append("; ".join(reasons))
     rows = rows.assign(**measured)
     twins = None
     if "fraction" in rows:
         replicas = rows["scene_id"].map(_replicas(scenes.set_index("scene_id")))
         twins = rows.groupby([replicas, "fraction"], dropna=False).ngroup()
-    made = {
-        "usable": [not text for text in texts],
-        "why_not": texts,
-        **measured,
-        **quoted(rows, twins),
-    }
+    units = quoted(rows, twins)
+    records = rows.assign(**units).to_dict("records")
+    reasons = []
+    for row in records:
+        against = [*_reasons(row, tolerance)]
+        key = (row["scene_id"], row.get("fraction", np.nan))
+        if contradicted and key in contradicted:
+            against.append(Reason("contradicted", contradicted[key]))
+        reasons.append(against)
+    made = {**verdict.columns(records, reasons), **measured, **units}
     return pd.concat([table, pd.DataFrame(made, index=table.index)], axis=1)
+
+
+def _leaving(rows: pd.DataFrame, ustar: "pd.Series[float]") -> "pd.Series[float]":
+    """Friction velocity at which the force law of single grains is asked, m/s.
+
+    It is that at which a grain leaves its pocket: one that goes on does so in a gust.
+    """
+    if "criterion" not in rows:
+        return ustar
+    goes_on = rows["criterion"] == GOES_ON
+    steady = grain_ustar(rows[goes_on].drop(columns="criterion").assign(gusts=None))
+    return ustar.mask(goes_on, pd.Series(steady, rows.index[goes_on]))
 
 
 def _flow_reynolds(rows: pd.DataFrame) -> "pd.Series[float]":
@@ -190,8 +197,10 @@ def _flow_reynolds(rows: pd.DataFrame) -> "pd.Series[float]":
     return pd.Series(channel, rows.index).fillna(layer / nu)
 
 
-def _beyond_law(name: str, rows: pd.DataFrame, ustar: "pd.Series[float]") -> list[str]:
-    """Reasons against a force law in some rows at their u*, m/s; empty if none."""
+def _beyond_law(
+    name: str, rows: pd.DataFrame, ustar: "pd.Series[float]"
+) -> list[tuple[str, str]]:
+    """What is against a force law in some rows at their u*, m/s, and what helps."""
     law = LAWS[name]
     d = rows["d_m"].to_numpy()
     exposure = Exposure(
@@ -209,65 +218,64 @@ def _beyond_law(name: str, rows: pd.DataFrame, ustar: "pd.Series[float]") -> lis
         weights["gravity"] = rows["g_m_s2"].to_numpy()
     speeds = np.asarray(ustar, float)
     texts = why_not(law, speeds, exposure, **weights)
+    remedies = [""] * len(texts)
     if law.goes_on:
         holds = LAWS[law.goes_on].valid(speeds, exposure)
-        remedy = f'; choose forces.law = "{law.goes_on}"'
         for row in np.flatnonzero(holds).tolist():
             if texts[row]:
-                texts[row] += remedy
-    return texts
+                remedies[row] = f'choose forces.law = "{law.goes_on}"'
+    # without a threshold no law is beyond its range
+    is_known = np.isfinite(speeds)
+    return [
+        pair if known else ("", "")
+        for pair, known in zip(zip(texts, remedies, strict=True), is_known, strict=True)
+    ]
 
 
-def _untested(row: Mapping[Any, Any]) -> Iterator[str]:
-    """Why no interval holds the threshold of grains that go on, in closed form."""
-    is_closed = "share_carried_off" not in row or row.get("method") == "local"
-    if not is_closed or row.get("criterion") != GOES_ON or np.isnan(row["reynolds"]):
-        return
-    if not row["tested_rows"]:
-        yield f"{NOT_MEASURED} near such grains at Re* {row['reynolds']:.3g}"
-
-
-def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
+def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[Reason]:
     """Reasons against the threshold of a row."""
-    if np.isnan(row["reynolds"]):
-        yield f"not reached: {_reached(row)}"
-    elif row["law"]:
-        yield row["law"]
-    standing_out = row["standing_out"]
-    if standing_out <= 0:
-        yield "hidden grain: it lies below the tops of its neighbours"
-    elif standing_out < EXPOSED_FROM:
-        yield f"hidden grain: {standing_out:.0%} of it stands out of its neighbours"
-    flow = row["flow_reynolds"]
-    if flow < LAMINAR_BELOW:
-        yield laminar(flow)
-    if "share_carried_off" in row:
+    is_pile = "share_carried_off" in row
+    if is_pile and np.isnan(row["reynolds"]):
+        what, remedy = _reached(row)
+        yield Reason("not reached", f"not reached: {what}", remedy)
+    yield from verdict.of_grain(row)
+    if is_pile:
         yield from _reasons_of_pile(row, tolerance)
     elif isinstance(row.get("gusts"), str):
-        yield "the error of the closed form under gusts is not known"
+        what = "the error of the closed form under gusts is not known"
+        yield Reason("gusts", what)
+    is_closed = not is_pile or row.get("method") == "local"
+    yield from verdict.of_measurements(row, is_closed)
 
 
-def _reasons_of_pile(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
+def _reasons_of_pile(
+    row: Mapping[Any, Any], tolerance: float | None
+) -> Iterator[Reason]:
     """Reasons against the threshold of a pile, beside those that a grain has, too."""
     if row["share_carried_off"] > CARRIED_OFF:
-        yield f"lift carried off {row['share_carried_off']:.0%} of the moved grains"
+        share = f"{row['share_carried_off']:.0%} of the moved grains"
+        yield Reason("carried off", f"lift carried off {share}")
     yield from _reasons_of_bed(row)
     error = row["known_error"]
     if pd.isna(error):
-        yield "the error of its fidelity on such a bed is not known"
+        what = "the error of its fidelity on such a bed is not known"
+        yield Reason("error not known", what)
     elif tolerance and error > tolerance * (1 + 1e-9):
-        yield f"known error {error:.1%} is above the tolerance of {tolerance:.3g}"
+        what = f"known error {error:.1%} is above the tolerance of {tolerance:.3g}"
+        yield Reason("tolerance", what)
     if row["fraction"] * row["count"] < 1 - 1e-9:
-        yield f"{row['fraction']:.3g} of {row['count']:.0f} grains is less than one"
+        what = f"{row['fraction']:.3g} of {row['count']:.0f} grains is less than one"
+        yield Reason("few grains", what)
     yield from _open_ends(row)
     needed = row.get("smoothing_needed_m", 0.0)
     if needed > (row.get("smoothing") or 0.0) * (1 + 1e-9):
         what = "the profile is noise at the scale of the mesh, which disturbs its flow"
-        yield f"{what} (write bed.smoothing = {needed:g} and run again)"
+        remedy = f"write bed.smoothing = {needed:g} and run again"
+        yield Reason("noise", what, remedy)
     yield from _held_row(row)
 
 
-def _held_row(row: Mapping[Any, Any]) -> Iterator[str]:
+def _held_row(row: Mapping[Any, Any]) -> Iterator[Reason]:
     """Why a threshold is that of a row of touching grains; empty where it is not.
 
     The closed form along the bed line packs no rows: it is of single exposed grains.
@@ -276,42 +284,39 @@ def _held_row(row: Mapping[Any, Any]) -> Iterator[str]:
         return
     times = f"{row['row_hold']:.2g} times the u* of a single one"
     said = f"the row has no end: its neighbours hold the first grain up to {times}"
+    remedy = ""
     if row.get("packing") in ("aligned", "disordered"):
-        said += '; method.kind = "local" is of single exposed grains'
-    yield said
+        remedy = 'choose method.kind = "local", which is of single exposed grains'
+    yield Reason("row", said, remedy)
 
 
-def _reasons_of_bed(row: Mapping[Any, Any]) -> Iterator[str]:
+def _reasons_of_bed(row: Mapping[Any, Any]) -> Iterator[Reason]:
     """Reasons against how the grains of a pile lie and against a kept balance."""
     is_strip = (row.get("width") or 0) > 0
     is_plane = row.get("packing") == "poured" and not is_strip
     if is_plane and pd.isna(row.get("sizes")):
         remedy = "give sizes = { sigma_g = 1.2 }"
-        yield f"equal spheres in one plane settle into a crystal: {remedy}"
+        what = "equal spheres in one plane settle into a crystal"
+        yield Reason("crystal", what, remedy)
     is_renewed = row.get("method") == "peeling" or (row.get("update") or 0) > 0
     is_kept = row.get("sheltering") == "balanced" and not is_renewed
     if is_kept and row["fraction"] > KEPT_TO + 1e-9:
         beyond = f"beyond n/N = {KEPT_TO} grains that have gone still bear a part of it"
-        yield f"kept balance: {beyond}"
+        yield Reason("kept balance", f"kept balance: {beyond}")
 
 
-def _reached(row: Mapping[Any, Any]) -> str:
-    """How many grains of a pile have moved by the end of its run.
-
-    It is also said whether the run was to end there.
-    """
-    if "count" not in row:
-        return "the grain has not moved"
+def _reached(row: Mapping[Any, Any]) -> tuple[str, str]:
+    """How many grains of a pile have moved by the end of its run, and what helps."""
     highest = row.get("highest_fraction", 0.0)
     said = f"at most {highest:.0%} of {row['count']} grains moved"
     last = row.get("final_fraction")
     if last is not None and highest >= last - 1e-9:
         end = f"method.grains.final_fraction = {last:g}"
-        said += f", since the run ends at {end} (raise it)"
-    return said
+        return f"{said}, since the run ends at {end}", "raise it"
+    return said, ""
 
 
-def _open_ends(row: Mapping[Any, Any]) -> Iterator[str]:
+def _open_ends(row: Mapping[Any, Any]) -> Iterator[Reason]:
     """Why the interval of a threshold that was reached has no upper end.
 
     It is empty if the interval has one.
@@ -319,9 +324,11 @@ def _open_ends(row: Mapping[Any, Any]) -> Iterator[str]:
     low, high = (row.get(name, np.nan) for name in OF_PILE)
     if np.isnan(low) or not np.isnan(high) or np.isnan(row["shields"]):
         return
+    remedy = ""
     if row["known_error"] >= 1:
-        yield f"interval open above: the known error is {row['known_error']:.0%}"
+        why = f"the known error is {row['error_estimate']:.0%}"
     elif row.get("scatter", 0.0) >= 1:
-        yield f"interval open above: the scatter over seeds is {row['scatter']:.0%}"
+        why = f"the scatter over seeds is {row['scatter']:.0%}"
     else:
-        yield f"interval open above: {_reached(row)}"
+        why, remedy = _reached(row)
+    yield Reason("open", f"interval open above: {why}", remedy)

@@ -35,7 +35,7 @@ def test_every_point_and_law_is_the_closed_form_of_it() -> None:
         why = why_not(
             law, one.friction_velocity, here, density=2500.0, slope_deg=slopes
         )
-        assert rows["why_not"].tolist() == why
+        assert rows["law_ends"].tolist() == why
 
 
 def test_a_laminar_channel_is_not_valid() -> None:

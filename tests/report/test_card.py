@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.physics import saltation
+from orchestrator.physics import saltation, verdict
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.threshold import SingleGrain, thresholds_of
 from orchestrator.physics.velocity import measurable_speeds
@@ -69,20 +69,34 @@ def test_measured_is_the_same_flow_with_the_measured_threshold(
 def test_a_grain_that_is_within_what_was_measured_needs_no_correction(
     results: Results,
 ) -> None:
-    row = only(results, "grain").joined("single_grain").iloc[0].copy()
+    first = only(results, "grain").joined("single_grain").iloc[0]
+    row = {str(name): value for name, value in first.items()}
     row["ustar0_m_s"] = row["ustar_m_s"]
-    row["usable"] = True
+    row["shields"] = row["shields_closed_form"]
+    # a curve alone is no measurement
     row["tested_rows"] = 0
     row["measured_rows"] = 0
     row["measured_level_ustar_m_s"] = row["level_ustar_m_s"]
-    assert single.worth(row).mark == "good"
-    row["measured_level_ustar_m_s"] = 1.2 * row["level_ustar_m_s"]
-    assert single.worth(row).mark == "care"
-    row["usable"] = False
-    row["why_not"] = "Re* 9 is not below 3; choose forces.law = bridged"
-    worth = single.worth(row)
+    assert verdict.verdict(row, []) == verdict.CORRECTED
+    # an answer below its own interval is not within what was measured
+    theta = row["shields"]
+    row["tested_rows"] = 20
+    row["tested_low"], row["tested_high"] = theta / 2, 2 * theta
+    assert verdict.verdict(row, []) == verdict.USABLE
+    row["tested_low"] = 1.1 * theta
+    assert verdict.verdict(row, []) == verdict.CORRECTED
+    row["measured_level_ustar_m_s"] = math.nan
+    assert verdict.verdict(row, []) == verdict.COMPARED
+    # a correction has an upper limit
+    for factor, limit in ((1.9, 0), (2.1, 1)):
+        row["measured_level_ustar_m_s"] = factor * row["level_ustar_m_s"]
+        against = [*verdict.of_measurements(row, is_closed=True)]
+        assert [each.code for each in against] == ["correction"] * limit
+    reason = verdict.Reason("law", "Re* 9 is not below 3", 'choose "bridged"')
+    columns = verdict.columns([row], [[reason]])
+    worth = single.worth({**row, **{name: cell[0] for name, cell in columns.items()}})
     assert (worth.mark, worth.word) == ("bad", "not usable: Re* 9 is not below 3")
-    assert worth.advice == "Choose forces.law = bridged."
+    assert worth.advice == 'Choose "bridged".'
 
 
 def test_an_air_study_shows_what_was_measured_in_air(results: Results) -> None:

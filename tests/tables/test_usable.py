@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from orchestrator import plan, tables
-from orchestrator.physics.beside import interval
+from orchestrator.physics import beside
 from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.study import study
 from orchestrator.tables.usable import POURED, with_scatter, with_usable
@@ -92,7 +92,7 @@ UNREACHED = {"reynolds": NAN, "shields": NAN, "share_carried_off": NAN}
         (
             None,
             {"shields_numerical_high": NAN, **STOPPED},
-            ["final_fraction = 0.8 (raise it)"],
+            ["run ends at method.grains.final_fraction = 0.8"],
         ),
         (
             None,
@@ -350,7 +350,14 @@ def test_grains_of_a_pile_that_go_on_have_the_interval_of_one_grain(
     if not is_tested:
         assert not rows["tested_rows"].any()
         return
-    alone = interval("bridged, z0 d/30, grain, beta 60, goes on, air", 9.0)
+    grain = {
+        **{"d_m": 5e-4, "z0_m": 5e-4 / 30, "rho_f_kg_m3": 1.225, "g_m_s2": 9.81},
+        **{"rho_sol_kg_m3": 2650.0, "alpha_s": 1.615, "cohesion_n_m": 0.0},
+        **{"alpha_deg": 12.0, "beta_deg": 60.0, "reynolds": 9.0},
+        **{"force_law": "bridged", "criterion": "goes on"},
+    }
+    alone = beside.tested({name: [value] for name, value in grain.items()})[:, 0]
+    assert alone[2] == 11
     # slope laws of friction angles of 32 and 50 degrees
     most, least = (
         np.cos(np.radians(12.0)) + np.sin(np.radians(12.0)) / np.tan(np.radians(phi))

@@ -1,0 +1,258 @@
+"""Whether a threshold may be used, with the reasons against it as data.
+
+The command `threshold` and the tables of a study ask the same functions.
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, Literal, NamedTuple
+
+from orchestrator.physics import saltation
+from orchestrator.physics.beside import GOES_ON, MOST_COHESION
+from orchestrator.physics.constants import GAS_BELOW
+from orchestrator.physics.velocity import LAMINAR_BELOW, laminar
+
+Word = Literal[
+    "usable", "usable, with a correction", "usable, to compare", "not usable"
+]
+"""What an answer is worth."""
+USABLE: Word = "usable"
+CORRECTED: Word = "usable, with a correction"
+COMPARED: Word = "usable, to compare"
+"""No measurement is near: beds may be compared with each other."""
+UNUSABLE: Word = "not usable"
+NEAR = 1.1
+"""Factor from the measured friction velocity up to which no correction is named, where
+the measurements have no range."""
+MOST_CORRECTION = 2.0
+"""Factor from the measured friction velocity up to which the answer may be corrected.
+The tested intervals of the usual roughness reach as far: 0.21 to 3.5 in the stress."""
+EXPOSED_FROM = 0.25
+"""Part of a grain over the tops of its neighbours from which it is exposed."""
+COHESION = 1.65e-4
+"""Gamma of Shao and Lu, 2000, the least of theirs, N/m: over d it is a stress beside
+that of the weight. It is that of a cohesion of `MOST_COHESION`."""
+NO_START = f"not reached: no flow up to a Shields number of {saltation.MOST:g} does it"
+NO_END = "not known: hops have no end"
+NOT_REACHED = "not reached: the grain has not moved"
+"""Why a grain has no threshold."""
+COLUMNS = ("usable", "verdict", "reason", "why_not", "remedy")
+"""Columns of a verdict; `tables/columns.csv` explains them."""
+
+
+class Reason(NamedTuple):
+    """What speaks against the use of a threshold.
+
+    Attributes
+    ----------
+    code
+        A word that programs read.
+    text
+        What it is, for people.
+    remedy
+        What helps; empty where nothing does.
+    """
+
+    code: str
+    text: str
+    remedy: str = ""
+
+
+def of_grain(row: Mapping[Any, Any]) -> Iterator[Reason]:
+    """Find what speaks against the threshold of a grain, or of such a grain in a bed.
+
+    Parameters
+    ----------
+    row
+        The threshold with the columns of its scene and those of `beside`; `law`, what
+        its force law has against it, `law_remedy`; `standing_out`, the part of it above
+        its neighbours; and `flow_reynolds`, that of the flow.
+
+    Yields
+    ------
+    Reason
+        The reasons.
+    """
+    if not math.isfinite(row["reynolds"]) and "count" not in row:
+        yield Reason("not reached", _not_reached(row))
+    if row["law"]:
+        yield Reason("law", row["law"], row["law_remedy"])
+    standing_out = row["standing_out"]
+    if standing_out <= 0:
+        yield Reason("hidden", "hidden grain: it lies below the tops of its neighbours")
+    elif standing_out < EXPOSED_FROM:
+        part = f"{standing_out:.0%} of it stands out of its neighbours"
+        yield Reason("hidden", f"hidden grain: {part}")
+    if row["flow_reynolds"] < LAMINAR_BELOW:
+        yield Reason("laminar", laminar(row["flow_reynolds"]))
+
+
+def _not_reached(row: Mapping[Any, Any]) -> str:
+    """Why a single grain has no threshold."""
+    if row.get("criterion") != GOES_ON:
+        return NOT_REACHED
+    return NO_START if math.isinf(row["shields_goes_on"]) else NO_END
+
+
+def of_measurements(row: Mapping[Any, Any], is_closed: bool) -> Iterator[Reason]:
+    """Find what measurements have against a threshold.
+
+    Parameters
+    ----------
+    row
+        The threshold, as `of_grain` takes it, with the friction velocities of one grain
+        on a level bed, computed and measured.
+    is_closed
+        Whether it is of the closed form.
+
+    Yields
+    ------
+    Reason
+        The reasons.
+    """
+    if not math.isfinite(row["reynolds"]):
+        return
+    goes_on = row.get("criterion") == GOES_ON
+    if is_closed and goes_on and not row["tested_rows"] > 0:
+        what = f"nothing was measured near such grains at Re* {row['reynolds']:.3g}"
+        yield Reason("not measured", what)
+    if goes_on:
+        yield from _held_by_cohesion(row)
+    off = correction(row)
+    if off > MOST_CORRECTION:
+        computed, measured = row["level_ustar_m_s"], row["measured_level_ustar_m_s"]
+        what = f"one grain on a level bed has a friction velocity of {computed:.3g} m/s"
+        what = f"{what}, measured is {measured:.3g} m/s: more than {MOST_CORRECTION:g}"
+        yield Reason("correction", f"{what} times off", "take the measured value")
+
+
+def _held_by_cohesion(row: Mapping[Any, Any]) -> Iterator[Reason]:
+    """Why a grain in a gas is held by a cohesion that its scene leaves out."""
+    if not is_gas(row):
+        return
+    left_out = 1 - row["cohesion_n_m"] / MOST_COHESION
+    pull = COHESION * left_out / row["d_m"]
+    weight = row["rho_sol_kg_m3"] * row["g_m_s2"] * row["d_m"]
+    if pull > weight:
+        times = f"{pull / weight:.2g} times its weight"
+        what = f"cohesion holds such a grain by {times} (Shao and Lu 2000)"
+        yield Reason("cohesion", what, f"give a cohesion of {MOST_COHESION:g} N/m")
+
+
+def is_gas(row: Mapping[Any, Any]) -> bool:
+    """Say whether the fluid of a threshold is a gas.
+
+    Parameters
+    ----------
+    row
+        The threshold.
+
+    Returns
+    -------
+    bool
+        Whether it is lighter than any liquid.
+    """
+    return bool(row["rho_f_kg_m3"] < GAS_BELOW)
+
+
+def correction(row: Mapping[Any, Any]) -> float:
+    """Find how far the computed threshold of one grain is from the measured one.
+
+    Parameters
+    ----------
+    row
+        The threshold, with both friction velocities on a level bed.
+
+    Returns
+    -------
+    float
+        The factor between them, at least 1; NaN where one is not known.
+    """
+    ratio = float(row["level_ustar_m_s"]) / float(row["measured_level_ustar_m_s"])
+    return math.exp(abs(math.log(ratio))) if 0 < ratio < math.inf else math.nan
+
+
+def is_measured(row: Mapping[Any, Any]) -> bool:
+    """Say whether a threshold is within what was measured.
+
+    Parameters
+    ----------
+    row
+        The threshold, with the columns of `beside` and the friction velocities of one
+        grain on a level bed, computed and measured.
+
+    Returns
+    -------
+    bool
+        Whether rows were measured beside it, it lies in its tested interval, and one
+        grain on a level bed is as measured: in a liquid within 80 % of the rows of
+        flumes or between them and the curve, else its interval contains the measured
+        value.
+    """
+    theta = float(row["shields"])
+    has_interval = row["tested_rows"] > 0
+    if has_interval and not row["tested_low"] <= theta <= row["tested_high"]:
+        return False
+    computed = float(row["level_ustar_m_s"])
+    has_rows = row["measured_rows"] > 0
+    if has_interval and (is_gas(row) or not has_rows):
+        over = float(row["measured_level_ustar_m_s"]) / computed
+        return bool(row["tested_low"] <= theta * over**2 <= row["tested_high"])
+    if not has_rows:
+        return False
+    excess = row["rho_sol_kg_m3"] - row["rho_f_kg_m3"]
+    weight = excess * row["g_m_s2"] * row["d_m"]
+    ends = (row["measured_low"], row["measured_high"], row["measured_curve"])
+    level = row["rho_f_kg_m3"] * computed**2 / weight
+    return bool(min(ends) <= level <= max(ends))
+
+
+def verdict(row: Mapping[Any, Any], reasons: Sequence[Reason]) -> Word:
+    """Say what a threshold is worth.
+
+    Parameters
+    ----------
+    row
+        The threshold, as `is_measured` takes it.
+    reasons
+        What speaks against it.
+
+    Returns
+    -------
+    str
+        Not usable for any reason; usable where it is within what was measured; with a
+        correction where a measured value is near; else to compare.
+    """
+    if reasons:
+        return UNUSABLE
+    if is_measured(row):
+        return USABLE
+    return COMPARED if math.isnan(correction(row)) else CORRECTED
+
+
+def columns(
+    rows: Iterable[Mapping[Any, Any]], reasons: Iterable[Sequence[Reason]]
+) -> dict[str, list[Any]]:
+    """Make the columns of the verdicts on thresholds.
+
+    Parameters
+    ----------
+    rows
+        The thresholds, as `is_measured` takes them.
+    reasons
+        What speaks against each.
+
+    Returns
+    -------
+    dict of str to list
+        The `COLUMNS`.
+    """
+    made: dict[str, list[Any]] = {name: [] for name in COLUMNS}
+    for row, against in zip(rows, reasons, strict=True):
+        made["usable"].append(not against)
+        made["verdict"].append(verdict(row, against))
+        made["reason"].append("; ".join(each.code for each in against))
+        made["why_not"].append("; ".join(each.text for each in against))
+        remedies = dict.fromkeys(each.remedy for each in against if each.remedy)
+        made["remedy"].append("; ".join(remedies))
+    return made

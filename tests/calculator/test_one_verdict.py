@@ -1,0 +1,184 @@
+"""One grain, two commands: `threshold` and `study` have one answer and one verdict."""
+
+import math
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from orchestrator import plan, tables
+from orchestrator.calculator import answer
+from orchestrator.calculator.table import thresholds
+from orchestrator.errors import InputError
+from orchestrator.report import answers, sheets
+from orchestrator.report.results import Results
+from orchestrator.study import study
+
+COUNT = 200
+OTHER_BEDS = 0.02
+"""Number of grains, and the part of them on beds of another roughness."""
+FLUIDS = (
+    (999.1, 1.139e-6, 9.81),  # water
+    (1026.0, 1.19e-6, 9.81),
+    (900.0, 1e-5, 9.81),  # an oil
+    (1.225, 1.46e-5, 9.81),  # air
+    (0.2, 6e-5, 3.71),  # a thick air of Mars
+    (65.0, 5e-7, 8.87),  # Venus
+)
+"""Density, viscosity and gravity."""
+OTHERS = ("measured_rows", "tested_rows", "usable", "why_not", "remedy", "verdict")
+"""Columns that a row of either command has."""
+
+
+def grains() -> list[dict[str, Any]]:
+    """Grains at random, as the calculator names their numbers."""
+    chance = np.random.default_rng(47)
+    made = []
+    for _ in range(COUNT):
+        fluid_density, viscosity, gravity = FLUIDS[
+            chance.choice(6, p=[0.35, 0.1, 0.1, 0.35, 0.05, 0.05])
+        ]
+        densities = [2650.0, 2500.0, 1200.0, 19300.0, chance.uniform(1500, 5000)]
+        density = chance.choice(densities, p=[0.6, 0.1, 0.05, 0.05, 0.2])
+        finest = -5 if fluid_density < 100 else -3.8
+        diameter = 10 ** chance.uniform(finest, -1.5)
+        # hops over beds of another d/z0 than 30 are in no table: a second each
+        ratio = 30.0
+        if chance.uniform() < OTHER_BEDS:
+            ratio = chance.choice([10.0, 31.0, 20.0, chance.uniform(5, 60)])
+        made.append(
+            {
+                "diameter": float(f"{diameter:.4g}"),
+                "density": float(density),
+                "fluid_density": fluid_density,
+                "viscosity": viscosity,
+                "gravity": gravity,
+                "entrainment_angle_deg": float(
+                    chance.choice([60.0, 59.0, 50.0, chance.uniform(35, 60)])
+                ),
+                "roughness": f"d/{ratio:.4g}",
+                "slope_deg": float(chance.choice([0.0, 0.0, chance.uniform(0, 28)])),
+                "cohesion": float(
+                    chance.choice([0.0, 0.0, 0.0, 10 ** chance.uniform(-6, -4)])
+                ),
+            }
+        )
+    return made
+
+
+def by_threshold(grain: dict[str, Any]) -> dict[str, Any]:
+    """The row of a grain, and its card, by the command `threshold`."""
+    table = thresholds({name: [value] for name, value in grain.items()})
+    cells = zip(*(column.tolist() for column in table.values()), strict=True)
+    rows = [dict(zip(table, row, strict=True)) for row in cells]
+    (row,) = (row for row in rows if row["answer"])
+    return {**row, "card": answer.card(rows)}
+
+
+def by_study(asked: list[dict[str, Any]], out: Path) -> list[dict[str, Any]]:
+    """The same by one study of all of them."""
+    text = 'method.kind = "pivot"\n'
+    for number, grain in enumerate(asked):
+        text += f"""
+[[group]]
+name = "{number}"
+grain = {{ diameter = {grain["diameter"]}, density = {grain["density"]}, cohesion = {grain["cohesion"]} }}
+[group.fluid]
+density = {grain["fluid_density"]}
+viscosity = {grain["viscosity"]}
+gravity = {grain["gravity"]}
+[group.bed]
+slope_deg = {grain["slope_deg"]}
+entrainment_angle_deg = {grain["entrainment_angle_deg"]}
+roughness = "{grain["roughness"]}"
+"""
+    parsed = study.parse(text, name="t", where="t")
+    planned = plan.make(parsed)
+    made = tables.make(parsed, planned, out, ())
+    results = Results(parsed, planned, made, out)
+    order = {group.name: group.scenes[0].id for group in parsed.groups}
+    found = sheets.single_grains(results)
+    rows = []
+    for number in range(len(asked)):
+        (place,) = np.flatnonzero(found["scene_id"] == order[str(number)])
+        row = found.iloc[place]
+        cells = {str(name): value for name, value in row.items()}
+        rows.append({**cells, "card": answers.of_grain(row)})
+    return rows
+
+
+@pytest.fixture(scope="module")
+def pairs(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[Any, Any]]:
+    """What both commands say of each grain that neither refuses."""
+    asked: list[dict[str, Any]] = []
+    found = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for grain in grains():
+            try:
+                found.append(by_threshold(grain))
+            except InputError:  # no law holds
+                continue
+            asked.append(grain)
+        by_file = by_study(asked, tmp_path_factory.mktemp("one"))
+    assert len(asked) > 0.85 * COUNT
+    return list(zip(found, by_file, strict=True))
+
+
+def alike(one: Any, other: Any) -> bool:
+    """Whether two numbers agree but for rounding, or are not known; or two words."""
+    if isinstance(one, str):
+        return bool(one == other)
+    is_one_known = one is not None and not math.isnan(one)
+    is_other_known = other is not None and not math.isnan(other)
+    if not (is_one_known and is_other_known):
+        return is_one_known is is_other_known
+    return math.isclose(one, other, rel_tol=1e-6)
+
+
+def test_threshold_and_study_say_the_same_of_one_grain(
+    pairs: list[tuple[Any, Any]],
+) -> None:
+    for here, there in pairs:
+        told = (
+            f"d {here['d_m']:g}, {here['rho_sol_kg_m3']:g} in {here['rho_f_kg_m3']:g}"
+        )
+        one, other = here["card"], there["card"]
+        assert one.worth.mark == other.worth.mark, (told, one.worth, other.worth)
+        assert one.worth.word == other.worth.word, (told, one.worth, other.worth)
+        for number, same in zip(one.numbers, other.numbers, strict=True):
+            assert number.interval_of == same.interval_of, told
+            for name in ("value", "low", "high", "measured"):
+                ends = getattr(number, name), getattr(same, name)
+                assert alike(*ends), (told, name, ends)
+        for name in OTHERS:
+            assert alike(here[name], there[name]), (told, name, here[name], there[name])
+
+
+def test_a_usable_answer_has_measurements_and_lies_in_its_interval(
+    pairs: list[tuple[Any, Any]],
+) -> None:
+    marks = {"good": 0, "care": 0, "bad": 0}
+    for row, _ in pairs:
+        marks[row["card"].worth.mark] += 1
+        if row["card"].worth.mark != "good":
+            continue
+        assert row["tested_rows"] > 0 or row["measured_rows"] > 0
+        if row["tested_rows"] > 0:
+            assert row["tested_low"] <= row["shields"] <= row["tested_high"]
+    # the grains span all verdicts
+    assert min(marks.values()) > 0
+
+
+def test_no_interval_has_a_width_of_zero(pairs: list[tuple[Any, Any]]) -> None:
+    count = 0
+    for row, _ in pairs:
+        for number in row["card"].numbers:
+            if math.isnan(number.low) or math.isnan(number.high):
+                continue
+            count += 1
+            assert number.high > number.low * 1.01, (row["d_m"], number)
+            assert " … " in number.interval
+    assert count > 100
