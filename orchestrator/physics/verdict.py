@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
 from orchestrator.physics import saltation
-from orchestrator.physics.beside import GOES_ON, MOST_COHESION
+from orchestrator.physics.beside import GOES_ON, LIKE, MOST_COHESION
 from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.physics.velocity import LAMINAR_BELOW, laminar
 
@@ -118,8 +118,11 @@ def of_measurements(row: Mapping[Any, Any], is_closed: bool) -> Iterator[Reason]
         yield Reason("not measured", what)
     if goes_on:
         yield from _held_by_cohesion(row)
+    # measured are grains among their like
+    size = row.get("relative_size")
+    is_other = size is not None and abs(size - 1) > LIKE
     off = correction(row)
-    if off > MOST_CORRECTION:
+    if off > MOST_CORRECTION and not is_other:
         computed, measured = row["level_ustar_m_s"], row["measured_level_ustar_m_s"]
         what = f"one grain on a level bed has a friction velocity of {computed:.3g} m/s"
         what = f"{what}, measured is {measured:.3g} m/s: more than {MOST_CORRECTION:g}"

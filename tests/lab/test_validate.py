@@ -116,7 +116,7 @@ def test_the_interval_of_a_kind_holds_its_rows_in_flumes() -> None:
 def found(row: dict[str, Any]) -> list[float]:
     """The tested interval of a threshold."""
     table = {name: np.array([value], object) for name, value in row.items()}
-    return beside.tested(table)[:, 0].tolist()
+    return [float(each) for each in beside.tested(table)[:, 0]]
 
 
 SPANNED = {
@@ -134,7 +134,7 @@ SPANNED = {
 function of the Galileo number."""
 UNTESTED: dict[str, Any] = {
     **{"fluid.density": 1.2, "grain.diameter": 0.022, "grain.friction_angle_deg": 10.0},
-    **{"grain.cohesion": 1e-3, "grain.sizes": {"sigma_g": 1.4}, "bed.roughness": 1e-3},
+    **{"grain.cohesion": 0.1, "grain.sizes": {"sigma_g": 1.4}, "bed.roughness": 1e-3},
     **{
         "bed.poured_depth": 8.0,
         "bed.width": 12.0,
