@@ -108,15 +108,15 @@ def thresholds(
     # numbers beyond all floats end as laws that do not hold
     with np.errstate(all="ignore"):
         table = _of_all_laws(grains, asked, criterion)
-        judge(table)
     if criterion == GOES_ON and not np.isfinite(table["shields"]).any():
         remedy = f"take the criterion {LEAVES}, or a larger grain"
         raise InputError(verdict.NO_START, "threshold: criterion", remedy)
     if not table["valid"].any():
         place = int(np.argmax(table["answer"]))
-        reason = f"{table['law'][place]}: {table['why_not'][place]}"
+        reason = f"{table['law'][place]}: {table['law_ends'][place]}"
         remedy = "are all numbers in SI units?"
         raise InputError(f"no force law holds; {reason}", "threshold", remedy)
+    judge(table)
     return table
 
 
