@@ -326,7 +326,7 @@ def _open_ends(row: Mapping[Any, Any]) -> Iterator[Reason]:
         return
     remedy = ""
     if row["known_error"] >= 1:
-        why = f"the known error is {row['error_estimate']:.0%}"
+        why = f"the known error is {row['known_error']:.0%}"
     elif row.get("scatter", 0.0) >= 1:
         why = f"the scatter over seeds is {row['scatter']:.0%}"
     else:
