@@ -21,9 +21,6 @@ CORRECTED: Word = "usable, with a correction"
 COMPARED: Word = "usable, to compare"
 """No measurement is near: beds may be compared with each other."""
 UNUSABLE: Word = "not usable"
-NEAR = 1.1
-"""Factor from the measured friction velocity up to which no correction is named, where
-the measurements have no range."""
 MOST_CORRECTION = 2.0
 """Factor from the measured friction velocity up to which the answer may be corrected.
 The tested intervals of the usual roughness reach as far: 0.21 to 3.5 in the stress."""
@@ -74,7 +71,7 @@ def of_grain(row: Mapping[Any, Any]) -> Iterator[Reason]:
         The reasons.
     """
     if not math.isfinite(row["reynolds"]) and "count" not in row:
-        yield Reason("not reached", _not_reached(row))
+        yield _not_reached(row)
     if row["law"]:
         yield Reason("law", row["law"], row["law_remedy"])
     standing_out = row["standing_out"]
@@ -87,11 +84,13 @@ def of_grain(row: Mapping[Any, Any]) -> Iterator[Reason]:
         yield Reason("laminar", laminar(row["flow_reynolds"]))
 
 
-def _not_reached(row: Mapping[Any, Any]) -> str:
+def _not_reached(row: Mapping[Any, Any]) -> Reason:
     """Why a single grain has no threshold."""
     if row.get("criterion") != GOES_ON:
-        return NOT_REACHED
-    return NO_START if math.isinf(row["shields_goes_on"]) else NO_END
+        return Reason("not reached", NOT_REACHED)
+    if math.isinf(row["shields_goes_on"]):
+        return Reason("not reached", NO_START)
+    return Reason("not known", NO_END)
 
 
 def of_measurements(row: Mapping[Any, Any], is_closed: bool) -> Iterator[Reason]:
