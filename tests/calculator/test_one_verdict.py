@@ -11,29 +11,80 @@ import pytest
 from orchestrator import plan, tables
 from orchestrator.calculator import answer
 from orchestrator.calculator.table import thresholds
-from orchestrator.errors import InputError
+from orchestrator.physics.laws import LAWS
 from orchestrator.report import answers, sheets
 from orchestrator.report.results import Results
 from orchestrator.study import study
 
 COUNT = 200
-OTHER_BEDS = 0.02
-"""Number of grains, and the part of them on beds of another roughness."""
+OTHER_BEDS = 0.01
+"""Number of grains at random, and the part of them on beds of another roughness."""
+WATER = (999.1, 1.139e-6, 9.81)
+AIR = (1.225, 1.46e-5, 9.81)
+MARS = (0.02, 6.5e-4, 3.71)
+TITAN = (5.4, 1.2e-6, 1.35)
 FLUIDS = (
-    (999.1, 1.139e-6, 9.81),  # water
+    WATER,
     (1026.0, 1.19e-6, 9.81),
     (900.0, 1e-5, 9.81),  # an oil
-    (1.225, 1.46e-5, 9.81),  # air
+    AIR,
     (0.2, 6e-5, 3.71),  # a thick air of Mars
     (65.0, 5e-7, 8.87),  # Venus
 )
 """Density, viscosity and gravity."""
+GOOD, CARE, BAD = "good", "care", "bad"
+NAMED = (
+    ((1e-3, 2650.0, WATER), {"entrainment_angle_deg": 59.0}, GOOD),
+    ((1e-3, 2650.0, WATER), {"entrainment_angle_deg": 60.0}, GOOD),
+    ((1e-3, 2650.0, WATER), {"roughness": "d/31"}, GOOD),
+    ((1e-3, 2650.0, WATER), {"roughness": "d/30"}, GOOD),
+    # below the rows of flumes
+    ((6e-5, 2650.0, WATER), {}, CARE),
+    ((8e-5, 2650.0, WATER), {}, CARE),
+    ((1e-4, 2650.0, WATER), {}, CARE),
+    # of such densities nothing was measured
+    ((1e-3, 19300.0, WATER), {}, BAD),
+    ((1e-3, 11340.0, WATER), {}, BAD),
+    ((1e-3, 1001.0, WATER), {}, BAD),
+    # dust, which cohesion holds
+    ((1e-5, 2650.0, AIR), {}, BAD),
+    ((2e-4, 3000.0, MARS), {}, BAD),
+    ((5e-4, 1000.0, TITAN), {}, BAD),
+    # coarser than the rows of flumes
+    ((63e-3, 2650.0, WATER), {}, BAD),
+    ((100e-3, 2650.0, WATER), {}, BAD),
+    # above its interval
+    ((30e-3, 2650.0, WATER), {"roughness": "d/10"}, CARE),
+)
+"""Diameter, density and fluid of grains, what else they have, and their verdict."""
 OTHERS = ("measured_rows", "tested_rows", "usable", "why_not", "remedy", "verdict")
 """Columns that a row of either command has."""
 
 
-def grains() -> list[dict[str, Any]]:
-    """Grains at random, as the calculator names their numbers."""
+def named() -> list[dict[str, Any]]:
+    """The grains of `NAMED`, as the calculator names their numbers."""
+    made = []
+    for (diameter, density, fluid), others, _ in NAMED:
+        fluid_density, viscosity, gravity = fluid
+        made.append(
+            {
+                "diameter": diameter,
+                "density": density,
+                "fluid_density": fluid_density,
+                "viscosity": viscosity,
+                "gravity": gravity,
+                "entrainment_angle_deg": 60.0,
+                "roughness": "d/30",
+                "slope_deg": 0.0,
+                "cohesion": 0.0,
+                **others,
+            }
+        )
+    return made
+
+
+def at_random() -> list[dict[str, Any]]:
+    """Grains at random."""
     chance = np.random.default_rng(47)
     made = []
     for _ in range(COUNT):
@@ -68,13 +119,18 @@ def grains() -> list[dict[str, Any]]:
     return made
 
 
-def by_threshold(grain: dict[str, Any]) -> dict[str, Any]:
-    """The row of a grain, and its card, by the command `threshold`."""
-    table = thresholds({name: [value] for name, value in grain.items()})
+def by_threshold(asked: list[dict[str, Any]]) -> list[dict[str, Any] | None]:
+    """The row of each grain, and its card, by `threshold`; None where no law holds."""
+    table = thresholds({name: [grain[name] for grain in asked] for name in asked[0]})
     cells = zip(*(column.tolist() for column in table.values()), strict=True)
     rows = [dict(zip(table, row, strict=True)) for row in cells]
-    (row,) = (row for row in rows if row["answer"])
-    return {**row, "card": answer.card(rows)}
+    found: list[dict[str, Any] | None] = []
+    for start in range(0, len(rows), len(LAWS)):
+        laws = rows[start : start + len(LAWS)]
+        (row,) = (row for row in laws if row["answer"])
+        holds = any(each["valid"] for each in laws)
+        found.append({**row, "card": answer.card(laws)} if holds else None)
+    return found
 
 
 def by_study(asked: list[dict[str, Any]], out: Path) -> list[dict[str, Any]]:
@@ -111,20 +167,17 @@ roughness = "{grain["roughness"]}"
 
 @pytest.fixture(scope="module")
 def pairs(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[Any, Any]]:
-    """What both commands say of each grain that neither refuses."""
-    asked: list[dict[str, Any]] = []
-    found = []
+    """What both commands say: of the `NAMED`, then of the others for which a law holds."""
+    asked = [*named(), *at_random()]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        for grain in grains():
-            try:
-                found.append(by_threshold(grain))
-            except InputError:  # no law holds
-                continue
-            asked.append(grain)
-        by_file = by_study(asked, tmp_path_factory.mktemp("one"))
-    assert len(asked) > 0.85 * COUNT
-    return list(zip(found, by_file, strict=True))
+        here = by_threshold(asked)
+        held = [place for place, row in enumerate(here) if row is not None]
+        grains = [asked[place] for place in held]
+        there = by_study(grains, tmp_path_factory.mktemp("one"))
+    assert held[: len(NAMED)] == list(range(len(NAMED)))
+    assert len(held) > 0.85 * len(asked)
+    return list(zip([here[place] for place in held], there, strict=True))
 
 
 def alike(one: Any, other: Any) -> bool:
@@ -155,6 +208,19 @@ def test_threshold_and_study_say_the_same_of_one_grain(
                 assert alike(*ends), (told, name, ends)
         for name in OTHERS:
             assert alike(here[name], there[name]), (told, name, here[name], there[name])
+
+
+def test_named_grains_have_their_verdicts(pairs: list[tuple[Any, Any]]) -> None:
+    expected = [mark for _, _, mark in NAMED]
+    for rows in zip(*pairs[: len(NAMED)], strict=True):
+        assert [row["card"].worth.mark for row in rows] == expected
+
+
+def test_other_worlds_have_no_measurements(pairs: list[tuple[Any, Any]]) -> None:
+    for row, (given, _, _) in zip(pairs[: len(NAMED)], NAMED, strict=True):
+        if given[2] in (MARS, TITAN):
+            assert row[0]["measured_rows"] == row[0]["tested_rows"] == 0
+            assert math.isnan(row[0]["measured_level_ustar_m_s"])
 
 
 def test_a_usable_answer_has_measurements_and_lies_in_its_interval(

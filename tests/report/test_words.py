@@ -185,7 +185,7 @@ def test_a_study_of_single_grains_has_an_answer_too(results: Results) -> None:
 
 def test_a_threshold_that_is_not_usable_says_so(results: Results) -> None:
     bad = results.tables["pile_threshold"].assign(
-        usable=False, why_not="Re* 2 is below 30"
+        usable=False, verdict="not usable", why_not="Re* 2 is below 30"
     )
     study = changed(results, pile_threshold=bad)
     worth = answers.card(study).worth

@@ -133,6 +133,11 @@ def grain(bed: str, forces: str = "") -> str:
     return f"{WATER}bed = {{ {bed} }}\nforces = {{ {forces} }}\ngrain.diameter = 2e-4\n"
 
 
+def of_paper(text: str) -> str:
+    """The same by the criterion of the paper, that a grain leaves."""
+    return text.replace("fluid = {", 'fluid = { kind = "paper",')
+
+
 @pytest.mark.parametrize(
     ("text", "reason", "applies"),
     [
@@ -141,7 +146,10 @@ def grain(bed: str, forces: str = "") -> str:
         (pile(2e-4, CHANNEL), "laminar flow", True),
         (pile(1e-6, CHANNEL), "laminar flow", False),
         (grain('roughness = "d/30", relative_size = 0.1'), "hidden grain", True),
-        (grain('roughness = "d/30", relative_size = 0.5'), "", False),
+        (of_paper(grain('roughness = "d/30", relative_size = 0.5')), "", False),
+        # of grains that go on, none were measured among larger ones
+        (grain('roughness = "d/30", relative_size = 0.5'), "was measured near", True),
+        (grain('roughness = "d/30", relative_size = 0.5'), "hidden grain", False),
         (grain(STEEP, "lift_coefficient = 30.0"), "lift over", True),
         (grain(STEEP), "", False),
         (grain("roughness = 1e-12").replace("2e-4", "1e-3"), "smooth wall", True),
