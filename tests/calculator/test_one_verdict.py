@@ -33,7 +33,9 @@ FLUIDS = (
 )
 """Density, viscosity and gravity."""
 GOOD, CARE, BAD = "good", "care", "bad"
-NAMED = (
+Given = tuple[float, float, tuple[float, float, float]]
+"""Diameter, density and fluid of a grain."""
+NAMED: tuple[tuple[Given, dict[str, Any], str], ...] = (
     ((1e-3, 2650.0, WATER), {"entrainment_angle_deg": 59.0}, GOOD),
     ((1e-3, 2650.0, WATER), {"entrainment_angle_deg": 60.0}, GOOD),
     ((1e-3, 2650.0, WATER), {"roughness": "d/31"}, GOOD),
@@ -56,7 +58,7 @@ NAMED = (
     # above its interval
     ((30e-3, 2650.0, WATER), {"roughness": "d/10"}, CARE),
 )
-"""Diameter, density and fluid of grains, what else they have, and their verdict."""
+"""Grains, what else they have, and their verdict."""
 OTHERS = ("measured_rows", "tested_rows", "usable", "why_not", "remedy", "verdict")
 """Columns that a row of either command has."""
 

@@ -185,6 +185,9 @@ def test_an_interval_is_of_strips_that_differ_in_nothing_else_than_the_tested() 
     others |= {"bed.lee_slope_deg", "flow.depth", "bed.disorder", fields.SEED}
     # strips with grains that stand out were tested by themselves
     others.add("forces.exposure")
+    # the word for a fluid names numbers, and a criterion where none is asked for
+    assert rows(changed(strip, {"fluid.kind": "paper"})) == 81
+    others.add("fluid.kind")
     assert rows(changed(strip, {"forces.exposure": "protrusion"})) == 97
     assert asked - others <= SPANNED.keys() | UNTESTED.keys()
 
