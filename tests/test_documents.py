@@ -290,19 +290,19 @@ def test_the_script_of_a_flow_shows_the_pile(results: Results, tmp_path: Path) -
 
 
 def test_the_page_on_intervals_names_the_strips_that_were_tested() -> None:
-    kinds = pd.read_csv(beside.TABLE)["kind"]
-    strips = kinds[kinds.str.contains("strip")]
+    strips = pd.read_csv(beside.STRIPS)
     page = (ROOT / "docs" / "how-sure.md").read_text(encoding="utf-8")
-    for part, said in {
-        r"(\d+) d deep": "`poured_depth = {}`",
-        r"(\d+) d wide": "`width = {}`",
-        r"sigma_g ([\d.]+),": "σ_g = {}",
-        r"phi (\d+)": "φ = {}°",
-    }.items():
-        (value,) = set(strips.str.extract(part, expand=False))
-        assert said.format(value) in page
-    assert set(strips.str.extract(r"(\d+) layers", expand=False)) == {"4"}
-    assert set(strips.str.extract(r"n/N ([\d.]+)", expand=False)) == {"0.1"}
+    tested = {}
+    for name in ("poured_depth", "width", "phi_deg", "mobile_layers", "fraction"):
+        # the ends are a hundredth from what was tested
+        (tested[name],) = set((strips[f"{name}_low"] + strips[f"{name}_high"]).div(2))
+    assert f"`poured_depth = {tested['poured_depth']:g}`" in page
+    assert f"`width = {tested['width']:g}`" in page
+    assert f"φ = {tested['phi_deg']:g}°" in page
+    (sigma,) = set(strips["sizes"].str.extract(r"sigma_g ([\d.]+),", expand=False))
+    assert f"σ_g = {sigma}" in page
+    assert tested["mobile_layers"] == pytest.approx(4)
+    assert tested["fraction"] == pytest.approx(0.1)
     assert "four mobile layers" in page
     assert "n/N = 10 %" in page
     default = PileBed.model_fields["poured_depth"].default
