@@ -13,6 +13,7 @@ import numpy as np
 from orchestrator.bed.line import BedLine, triangle
 from orchestrator.flow import theory
 from orchestrator.flow.case import WALL_STRESS, FlowCase
+from orchestrator.flow.foam import SolvedFlow
 from orchestrator.flow.stress import Measure, WallStress, bubble
 from orchestrator.runs import case, engine
 from orchestrator.study.method import FlowMethod
@@ -31,6 +32,9 @@ LEVELS: dict[str, dict[str, object]] = {
     "growth 1.4": {"expansion_ratio": 1.4},
     "20 cells a face": {"cells_per_face": 20},
 }
+SIMILAR = ((15.0, 3.333e-5), (30.0, 3.333e-5), (15.0, 3.3e-6), (30.0, 1e-4))
+WAVES_DEG = (5.0, 10.0, 15.0, 20.0)
+WAVE_RATIOS = (1e3, 1e4, 1e5)
 MODELS: tuple[dict[str, object], ...] = (
     {},
     {"turbulence_model": "RNGkEpsilon"},
@@ -54,8 +58,10 @@ def other(one: FlowCase, **settings: object) -> FlowCase:
 
 
 def solved(one: FlowCase, cases: Path) -> WallStress:
-    """The stress of a case, run if it has not been."""
+    """The stress of a case, which is run after those that it starts from."""
     if not case.done_state(one, cases):
+        for coarser in one.needs:
+            solved(coarser, cases)
         engine.execute(one, cases, 3600.0)
     return WallStress.from_csv(cases / one.name / WALL_STRESS)
 
@@ -104,12 +110,7 @@ def similarity(cases: Path) -> None:
     """Change of u*/u*_0 with the speed at the lid."""
     print("\n| slope | z0, m | U_e, m/s | windward mean | largest change on the face |")
     print("|---|---|---|---|---|")
-    for slope, roughness in (
-        (15.0, 3.333e-5),
-        (30.0, 3.333e-5),
-        (15.0, 3.3e-6),
-        (30.0, 1e-4),
-    ):
+    for slope, roughness in SIMILAR:
         one = flow(slope, roughness)
         stress = solved(one, cases)
         face = HEIGHT / np.sin(np.radians(slope))
@@ -158,12 +159,11 @@ def on_grains(one: FlowCase, stress: WallStress) -> FloatArray:
 
 def spent(directory: Path) -> tuple[str, str, str]:
     """Cells, iterations and processor time of a case."""
+    flow = SolvedFlow(directory)
     log = (directory / "log.simpleFoam").read_text()
-    mesh = (directory / "constant" / "polyMesh" / "owner").read_text()
-    cells = re.findall(r"nCells: *(\d+)", mesh)[0]
     return (
-        cells,
-        re.findall(r"^Time = (\d+)", log, re.M)[-1],
+        str(len(flow.mesh.middles)),
+        flow.last_iteration.name,
         re.findall(r"ExecutionTime = (\S+)", log)[-1],
     )
 
@@ -216,8 +216,8 @@ def linear_theory(cases: Path) -> None:
 def waves(cases: Path) -> None:
     """A and B of waves of a cosine, solved and by linear theory: from the middle one of three."""
     print("\n| slope | lambda/z0 | solved: A | B | waves: A | B |\n" + "|---" * 6 + "|")
-    for slope in (5.0, 10.0, 15.0, 20.0):
-        for ratio in (1e3, 1e4, 1e5):
+    for slope in WAVES_DEG:
+        for ratio in WAVE_RATIOS:
             one = wavy(slope, 1 / ratio)
             assert one.line
             found = (solved(one, cases), theory.waves(one.line, 1 / ratio))
@@ -253,8 +253,13 @@ def phases(one: FlowCase, stress: WallStress) -> tuple[float, float]:
     return float(a), float(b)
 
 
-if __name__ == "__main__":
-    folder = Path(sys.argv[1]).absolute()
-    folder.mkdir(parents=True, exist_ok=True)
+def main(directory: Path) -> None:
+    """Print all tables."""
+    cases = directory.absolute()
+    cases.mkdir(parents=True, exist_ok=True)
     for measure in (similarity, levels, models, linear_theory, waves, meshes):
-        measure(folder)
+        measure(cases)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
