@@ -48,8 +48,8 @@ HEAD = """\
 # Gallery of results
 
 Each section has a preset, the answer that its command prints, and a picture of its page. A preset is a
-study file: copy it, change a value and run the copy. This page is made by `python tools/gallery.py`
-from runs of the presets.
+study file: copy it, change a value and run the copy. This page is made by `python tools/gallery.py DIRECTORY`
+from runs of the presets in that directory.
 """
 END = """\
 ## Where to go next

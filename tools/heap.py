@@ -70,13 +70,19 @@ def heap() -> bytes:
     return geotiff(EAST + axis, NORTH + axis, 100.0 + z + noise, {})
 
 
-def run(directory: Path) -> None:
-    """Write the files of the study, run it, and keep its map."""
+def write(directory: Path) -> Path:
+    """Write the files of the study; the file of the study itself."""
     directory.mkdir(parents=True, exist_ok=True)
     (directory / "heap.tif").write_bytes(heap())
     (directory / "year.csv").write_text(YEAR, encoding="utf-8")
     study = directory / "heap.toml"
     study.write_text(STUDY, encoding="utf-8")
+    return study
+
+
+def run(directory: Path) -> None:
+    """Write the files of the study, run it, and keep its map."""
+    study = write(directory)
     out = directory / "heap"
     if main(["study", str(study), "--out", str(out)]):
         raise SystemExit("the study of the heap has failed")
