@@ -27,9 +27,9 @@ GRAIN = 1e-3
 LEVELS: dict[str, dict[str, object]] = {
     "80 cells a face": {"cells_per_face": 80},
     "40, the standard": {},
-    "growth 1.15": {"expansion_ratio": 1.15},
-    "growth 1.2": {"expansion_ratio": 1.2},
-    "growth 1.4": {"expansion_ratio": 1.4},
+    "expansion ratio 1.15": {"expansion_ratio": 1.15},
+    "expansion ratio 1.2": {"expansion_ratio": 1.2},
+    "expansion ratio 1.4": {"expansion_ratio": 1.4},
     "20 cells a face": {"cells_per_face": 20},
 }
 SIMILAR = ((15.0, 3.333e-5), (30.0, 3.333e-5), (15.0, 3.3e-6), (30.0, 1e-4))
