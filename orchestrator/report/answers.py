@@ -417,7 +417,7 @@ def _first_of_several(
     bed = results.plan.piles[str(row["scene_id"])].bed
     number = _first_motion(row, float(row["first_ustar0_m_s"]), told)
     what = ", ".join(labels.told(row, list(telling)[:3]))
-    where = f"at x = {counted.place(float(row['first_x_m']), bed)} m"
+    where = counted.spot(float(row["first_x_m"]), bed)
     meaning = f"least {told.name} that moves the first grains, {where}: {what}"
     return replace(number, meaning=meaning)
 

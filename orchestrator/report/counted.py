@@ -70,6 +70,26 @@ def place(x: float, bed: PileBed) -> str:
     return place_of_file(x, bed.profile) if bed.profile else f"{x:.4g}"
 
 
+def spot(x: float, bed: PileBed) -> str:
+    """Say where a grain of a bed lies.
+
+    Parameters
+    ----------
+    x
+        Its place as the user has it, m.
+    bed
+        The bed.
+
+    Returns
+    -------
+    str
+        On a profile its x in the file, else its distance from the foot.
+    """
+    if bed.profile:
+        return f"at x = {place(x, bed)} m"
+    return f"{length(x)} from the foot"
+
+
 def way_up(profile: Profile) -> tuple[str, str] | None:
     """Find the range of x from the foot of the form of a profile to its top.
 

@@ -148,8 +148,9 @@ def _first_grains(
             named[PART] = "first grain"
             if not single.is_level(row):
                 bed = results.plan.piles[str(row["scene_id"])].bed
-                where = counted.place(float(row["first_x_m"]), bed)
-                named[PART] = f"first grain, at x = {where} m"
+                named[PART] = (
+                    f"first grain, {counted.spot(float(row['first_x_m']), bed)}"
+                )
             part = _first_grain(row, part, named)
         parts.append(part)
     return pd.concat(parts, ignore_index=True)
