@@ -19,10 +19,13 @@ from orchestrator.runs.case import templates
 from orchestrator.solvers import liggghts
 from tests import small_study
 from tests.faults import bench
+from tests.waiting import HANGS_S
 
 Deck = Callable[..., str]
 # no time decides a test, also on a machine that has much else to do
-settings.register_profile("any machine", suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile(
+    "any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
 settings.load_profile("any machine")
 
 
@@ -48,7 +51,7 @@ def run_check(tmp_path: Path) -> Deck:
             command += ["-var", name, repr(value)]
         log = folder / "log.check"
         ended = process.run(
-            command, cwd=folder, log=log, limit_s=60, env=liggghts.ENVIRONMENT
+            command, cwd=folder, log=log, limit_s=HANGS_S, env=liggghts.ENVIRONMENT
         )
         said = log.read_text()
         assert ended.returncode == 0, said
@@ -80,7 +83,7 @@ def orchestrator(tmp_path: Path) -> Command:
             env=env,
             capture_output=True,
             text=True,
-            timeout=300,
+            timeout=HANGS_S,
         )
 
     return run

@@ -6,6 +6,7 @@ from orchestrator import plan, tables
 from orchestrator.report.results import Results
 from orchestrator.runs import engine
 from orchestrator.study import study
+from tests.waiting import HANGS_S
 
 TITLE = """<script>alert(1)</script> & "sand" d'été"""
 TEXT = f"""title = '''{TITLE}'''
@@ -44,7 +45,7 @@ def run(out: Path, text: str = TEXT) -> Results:
     planned = plan.make(asked, cases=cases)
     done = planned.done(cases)
     todo = {name: one for name, one in planned.cases.items() if name not in done}
-    with engine.local(cases, workers=2, limit_s=300.0) as pool:
+    with engine.local(cases, workers=2, limit_s=HANGS_S) as pool:
         assert not engine.run(todo, pool, lambda *_: None)
     made = tables.make(asked, planned, cases, planned.done(cases))
     return Results(asked, planned, made, cases)

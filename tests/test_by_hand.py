@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.report.results import Results
+from tests.waiting import HANGS_S
 
 pytestmark = pytest.mark.long
 
@@ -27,7 +28,7 @@ def test_the_same_again_keeps_its_results_and_a_changed_case_leaves_none(
 
     def run() -> "subprocess.CompletedProcess[str]":
         return subprocess.run(
-            ["./Allrun"], cwd=copied, capture_output=True, text=True, timeout=300
+            ["./Allrun"], cwd=copied, capture_output=True, text=True, timeout=HANGS_S
         )
 
     def derived() -> list[str]:

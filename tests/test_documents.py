@@ -26,6 +26,7 @@ from orchestrator.stockpile import erosion
 from orchestrator.study import study
 from orchestrator.study.parts import PileBed
 from tests.conftest import Command
+from tests.waiting import HANGS_S
 
 ROOT = Path(__file__).parents[1]
 PAGES = [
@@ -229,7 +230,13 @@ def test_the_notebook_says_what_a_run_of_it_says(tmp_path: Path) -> None:
     written = nbformat.read(ROOT / "docs" / "example.ipynb", 4)  # type: ignore[no-untyped-call]
     again = copy.deepcopy(written)
     place = {"metadata": {"path": str(tmp_path)}}
-    nbclient.NotebookClient(again, resources=place, kernel_name="python3").execute()
+    nbclient.NotebookClient(
+        again,
+        resources=place,
+        kernel_name="python3",
+        startup_timeout=int(HANGS_S),
+        iopub_timeout=int(HANGS_S),
+    ).execute()
     assert _said(again) == _said(written)
     assert "Grains of 0.2 mm to 0.5 mm, a slope of 10°" in " ".join(_said(again))
     rows = orchestrator.open(tmp_path / "dune").thresholds

@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 
 from orchestrator.runs.case import CHECKSUMS, IDENTITY
+from tests.waiting import HANGS_S
 
 ROOT = Path(__file__).parents[1]
 POURED = """
@@ -135,7 +136,7 @@ def _run(setting: str, *arguments: str) -> "subprocess.CompletedProcess[str]":
         env={**inherited, "PYTHONPATH": str(ROOT), **SETTINGS[setting]},
         capture_output=True,
         text=True,
-        timeout=600,
+        timeout=HANGS_S,
     )
 
 

@@ -20,6 +20,7 @@ from orchestrator.runs.case import templates
 from orchestrator.study import study
 from orchestrator.study.parts import LogNormal, Sizes
 from orchestrator.types import FloatArray, IntArray
+from tests.waiting import HANGS_S
 
 SURFACE, WIDTH = 0.5 + 1 / 30, 4.0
 MIXED = LogNormal(sigma_g=1.3)
@@ -40,7 +41,7 @@ def _strip(length: float = 8.0, width: float = WIDTH) -> PouredBed:
 
 
 def _run(bed: PouredBed, cases: Path) -> Path:
-    engine.execute(bed, cases, 600.0)
+    engine.execute(bed, cases, HANGS_S)
     return cases / bed.name
 
 

@@ -16,6 +16,7 @@ from orchestrator.benchmark.export import export
 from orchestrator.runs.files import digest_files
 from orchestrator.study import study
 from tests.conftest import Shared
+from tests.waiting import HANGS_S
 
 ROOT = Path(__file__).parents[2]
 NATIVE = ROOT / "examples" / "native"
@@ -98,7 +99,7 @@ lift_off = _pack("lift_off", THEORY % ("low", "method.grains.mobile_layers = 1")
 level_rows = _pack("level_rows", THEORY % ("high", 'bed.packing = "horizontal"'), (4,))
 
 
-SCENE = Options(patterns=("2-incline-5",), seconds=60.0, memory=0.5)
+SCENE = Options(patterns=("2-incline-5",), seconds=HANGS_S, memory=0.5)
 RIGHT = f"{shlex.join([sys.executable, str(NATIVE / 'solver.py')])} {{case}} {{out}}"
 """Command of the example."""
 HEAD = """

@@ -16,6 +16,7 @@ from orchestrator.study import study
 from orchestrator.study.closed_form import regime_of
 from orchestrator.study.study import Group, Study
 from tests.benchmark.conftest import ROOT
+from tests.waiting import HANGS_S
 
 FOLDER = ROOT / "benchmark" / "paper"
 
@@ -57,7 +58,7 @@ def test_fresh_piles_are_as_expected(
     asked = dataclasses.replace(paper, groups=(Group("fresh", tuple(chosen), "fresh"),))
     planned = plan.make(asked)
     for one in planned.cases.values():
-        engine.execute(one, tmp_path, 300.0, threading.Event())
+        engine.execute(one, tmp_path, HANGS_S, threading.Event())
         assert case.done_state(one, tmp_path)
     results = tables.make(asked, planned, tmp_path, planned.done(tmp_path))
     names = scene_names(plan.make(paper), paper)

@@ -6,10 +6,13 @@ import os
 import shutil
 import socket
 import subprocess
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+
+import psutil
+
+from tests.waiting import HANGS_S, pause, until
 
 PROGRAMS = ("munged", "slurmctld", "slurmd", "sbatch", "squeue", "scancel", "sinfo")
 SBIN = "/usr/sbin"
@@ -52,7 +55,7 @@ class Slurm:
     def says(self, *command: str) -> str:
         """What one of its commands prints."""
         return subprocess.check_output(
-            command, env=self.environment, text=True, timeout=60
+            command, env=self.environment, text=True, timeout=HANGS_S
         )
 
     def jobs(self) -> dict[str, str]:
@@ -90,12 +93,22 @@ def _orphans_vanish() -> bool:
     said = subprocess.check_output(
         ["sh", "-c", "sleep 0.1 >/dev/null & echo $!"], text=True
     )
-    orphan = Path("/proc", said.strip())
-    for _ in range(200):
-        if not orphan.exists():
+    orphan = int(said)
+    until(lambda: _has_ended(orphan))
+    # a first process that takes leave of it does so at once
+    for _ in range(2000):
+        if not psutil.pid_exists(orphan):
             return True
-        time.sleep(0.05)
+        pause()
     return False
+
+
+def _has_ended(pid: int) -> bool:
+    """Whether the process of a number has ended, with a zombie or without."""
+    try:
+        return bool(psutil.Process(pid).status() == psutil.STATUS_ZOMBIE)
+    except psutil.NoSuchProcess:
+        return True
 
 
 @contextlib.contextmanager
@@ -136,13 +149,13 @@ def running(root: Path, *, nodes: int, cores: int) -> Iterator[Slurm]:
             )
             stack.callback(_end, daemon)
             started.append(daemon)
-            until((root / "munge.socket").exists, "munged", goes_on)
-        until(lambda: slurm.idle() == nodes, "idle nodes", goes_on)
+            until((root / "munge.socket").exists, goes_on)
+        until(lambda: slurm.idle() == nodes, goes_on)
         try:
             yield slurm
         finally:
             slurm.says("scancel", "--user", user)
-            until(lambda: not slurm.jobs(), "the end of all jobs")
+            until(lambda: not slurm.jobs())
 
 
 def _free_ports(count: int) -> int:
@@ -167,17 +180,3 @@ def _end(daemon: "subprocess.Popen[bytes]") -> None:
     except subprocess.TimeoutExpired:
         daemon.kill()
         daemon.wait()
-
-
-def until(
-    condition: Callable[[], object],
-    what: str,
-    goes_on: Callable[[], None] = lambda: None,
-) -> None:
-    """Wait for something, at most five minutes; `goes_on` raises where it can no longer come."""
-    for _ in range(6000):
-        if condition():
-            return
-        goes_on()
-        time.sleep(0.05)
-    raise RuntimeError(f"waited in vain for {what}")

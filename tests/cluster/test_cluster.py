@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.cluster import slurm
-from tests.cluster.slurm import Slurm, until
+from tests.cluster.slurm import Slurm
 from tests.conftest import Command, Shared
 from tests.faults.bench import (
     Bench,
@@ -19,12 +19,14 @@ from tests.faults.bench import (
     tables,
     undisturbed,
     wait_for,
+    wrapper,
 )
+from tests.waiting import HANGS_S, until
 
 pytestmark = pytest.mark.long
 
-STUDY = """
-time_limit = 100
+STUDY = f"""
+time_limit = {HANGS_S:g}
 [grain]
 diameter = 1e-3
 [bed]
@@ -74,10 +76,17 @@ def bench(tmp_path: Path, queue: Slurm, shared: Shared) -> Iterator[Bench]:
         yield bench
 
 
-def _at_work(bench: Bench) -> set[str]:
-    """Cases that a solver of LIGGGHTS is in the middle of."""
-    starts = {path.parent.name for path in bench.out.glob("cases/pile-*/samples.csv")}
-    return starts - {path.parent.name for path in bench.out.glob("cases/*/done.json")}
+def _holding(bench: Bench, count: int) -> Path:
+    """Programs of which LIGGGHTS, at its run of such a number, waits until `go` is there.
+
+    The runs before it are counted by directories, which no two of them can make.
+    """
+    script = f"""case $(basename "$(pwd -P)") in pile-*)
+    run=1
+    until mkdir ../../../run-$run 2>/dev/null; do run=$((run + 1)); done
+    [ $run -ne {count} ] || until [ -e ../../../go ]; do sleep 0.1; done;;
+esac"""
+    return wrapper(bench.folder / "bin", "liggghts", script)
 
 
 def test_two_nodes(bench: Bench, queue: Slurm) -> None:
@@ -88,13 +97,14 @@ def test_two_nodes(bench: Bench, queue: Slurm) -> None:
     assert "ON n1" in logs
     assert "ON n2" in logs
     assert not list((bench.out / "cases").glob(".*"))
-    until(lambda: not queue.jobs(), "the end of the jobs")
+    until(lambda: not queue.jobs())
 
 
 def test_a_cancelled_job(bench: Bench, queue: Slurm) -> None:
-    driver = bench.start()
-    assert wait_for(lambda: bool(_at_work(bench)), driver), ended(driver)
+    driver = bench.start(programs=_holding(bench, 1))
+    assert wait_for((bench.folder / "run-1").exists, driver), ended(driver)
     queue.says("scancel", *queue.jobs())
+    (bench.folder / "go").touch()
     code, printed = ended(driver)
     assert code == 0, printed
     assert tables(bench.out) == tables(bench.undisturbed)
@@ -102,18 +112,19 @@ def test_a_cancelled_job(bench: Bench, queue: Slurm) -> None:
 
 
 def test_a_killed_driver(bench: Bench) -> None:
-    driver = bench.start()
+    driver = bench.start(programs=_holding(bench, 2))
 
-    def second_runs() -> bool:
-        first = [*bench.out.glob("cases/pile-*/done.json")]
-        return bool(first) and bool(_at_work(bench))
+    def first_is_done() -> bool:
+        return any(bench.out.glob("cases/pile-*/done.json"))
 
-    assert wait_for(second_runs, driver), ended(driver)
+    assert wait_for(first_is_done, driver), ended(driver)
+    # the second cannot end, and the third may be done or not
     before = {
         path: path.stat().st_mtime_ns for path in bench.out.glob("cases/*/done.json")
     }
     driver.kill()
     driver.communicate()
+    (bench.folder / "go").touch()
     code, printed = bench.study()
     assert code == 0, printed
     assert tables(bench.out) == tables(bench.undisturbed)

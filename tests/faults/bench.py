@@ -6,7 +6,6 @@ import os
 import shutil
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,12 +14,13 @@ from typing import Any
 import psutil
 
 from orchestrator import cli
+from tests.waiting import HANGS_S, pause, until
 
 ROOT = Path(__file__).parents[2]
 ORCHESTRATOR = (sys.executable, "-m", "orchestrator")
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
-HEAD = """
-time_limit = 300
+HEAD = f"""
+time_limit = {HANGS_S:g}
 [threshold]
 fractions = [0.3, 0.5]
 
@@ -45,6 +45,23 @@ method.flow.cells_per_face = 10
 method.grains.mobile_layers = 1
 """
 Driver = subprocess.Popen[str]
+ENDLESS = {
+    "simpleFoam": (
+        "system/controlDict system/fvSolution",
+        "s/residualControl/unused/; s/endTime  *[0-9][0-9]*/endTime 1e9/",
+    ),
+    "liggghts": (
+        "parameters.liggghts",
+        "s/waiting_time equal [^ ]*/waiting_time equal 1e9/;"
+        " s/rest_energy equal [^ ]*/rest_energy equal 0/",
+    ),
+}
+"""Inputs of each solver, and the change of them by `sed` with which it never ends by itself."""
+AT_WORK = {
+    "flow": ("log.simpleFoam", b"\nTime = 2\n"),
+    "pile": ("samples.csv", b"\n1,"),
+}
+"""For each kind of case, a file that its solver writes and what it has once it is at work."""
 
 
 @dataclass
@@ -65,15 +82,22 @@ class Bench:
         return [*self.out.glob(f"cases/{kind}-*")]
 
     def start(
-        self, *, programs: Path | None = None, under: Sequence[str] = ()
+        self,
+        *,
+        programs: Path | None = None,
+        under: Sequence[str] = (),
+        halt_at: str = "",
     ) -> Driver:
-        """Start the study's driver, with programs before the real ones, under a command."""
+        """Start the study's driver, with programs before the real ones, under a command.
+
+        It halts when it first opens a file whose path fits the pattern `halt_at`.
+        """
         paths = [*([str(programs)] if programs else []), os.environ["PATH"]]
         variables = {"PYTHONPATH": str(ROOT), "PATH": os.pathsep.join(paths)}
         driver = subprocess.Popen(
             [
                 *under,
-                *ORCHESTRATOR,
+                *(halting(halt_at) if halt_at else ORCHESTRATOR),
                 "study",
                 "small.toml",
                 "--out",
@@ -108,7 +132,7 @@ class Bench:
         assert code == 0, printed
         assert (self.out / "report.html").is_file()
         assert tables(self.out) == tables(self.undisturbed)
-        assert none_left_in(self.folder)
+        await_none_in(self.folder)
         assert not list(self.out.rglob("*.tmp"))
 
 
@@ -138,9 +162,22 @@ def undisturbed(folder: Path, text: str) -> Path:
 
 def ended(driver: Driver) -> tuple[int, str]:
     """Wait for a driver; its exit code and all that it printed, which holds no traceback."""
-    out, printed = driver.communicate(timeout=600)
+    out, printed = driver.communicate(timeout=HANGS_S)
     assert "Traceback" not in printed
     return driver.returncode, out + printed
+
+
+def halting(pattern: str) -> tuple[str, ...]:
+    """The command of a driver that halts when it first opens a file of a pattern."""
+    return sys.executable, "-m", "tests.faults.halting", pattern
+
+
+def await_halt(driver: Driver) -> None:
+    """Wait until a driver has halted: all its threads, also if it only now comes there."""
+    look = os.WSTOPPED | os.WEXITED | os.WNOWAIT
+    state = os.waitid(os.P_PID, driver.pid, look)
+    assert state is not None
+    assert state.si_code == os.CLD_STOPPED, ended(driver)
 
 
 def tables(out: Path) -> dict[str, bytes]:
@@ -153,7 +190,7 @@ def wait_for(seen: Callable[[], bool], driver: Driver) -> bool:
     while not seen():
         if driver.poll() is not None:
             return False
-        time.sleep(0.001)
+        pause()
     return True
 
 
@@ -167,13 +204,9 @@ def processes_in(folder: Path) -> dict[int, str]:
     }
 
 
-def none_left_in(folder: Path) -> bool:
-    """Whether every process that works below a folder ends within a moment."""
-    for _ in range(100):
-        if not processes_in(folder):
-            return True
-        time.sleep(0.05)
-    return False
+def await_none_in(folder: Path) -> None:
+    """Wait until every process that works below a folder has ended."""
+    until(lambda: not processes_in(folder))
 
 
 def wrapper(folder: Path, program: str, before: str) -> Path:
@@ -183,3 +216,25 @@ def wrapper(folder: Path, program: str, before: str) -> Path:
     path.write_text(f'#!/bin/sh\n{before}\nexec {shutil.which(program)} "$@"\n')
     path.chmod(0o755)
     return folder
+
+
+def endless(program: str, kind: str) -> str:
+    """What a `wrapper` does first so that a solver never ends: of a kind, and the first time.
+
+    The solver is the real one at its real work, and only a signal ends it. The second time it
+    has its own inputs again.
+    """
+    names, change = ENDLESS[program]
+    return f"""case $(basename "$(pwd -P)") in {kind}-*)
+    if mkdir ../../../endless-{program} 2>/dev/null; then
+        sed -i.whole '{change}' {names}
+    else
+        for name in {names}; do [ ! -e $name.whole ] || mv $name.whole $name; done
+    fi;;
+esac"""
+
+
+def is_at_work(case: Path, kind: str) -> bool:
+    """Whether the solver of a case of a kind is in the midst of its iterations or load steps."""
+    log, line = AT_WORK[kind]
+    return (case / log).is_file() and line in (case / log).read_bytes()

@@ -3,13 +3,13 @@
 import contextlib
 import itertools
 import os
+import shutil
 import signal
 import subprocess
-import time
 from collections.abc import Sequence
 from functools import partial
+from typing import NamedTuple
 
-import psutil
 import pytest
 
 from orchestrator.runs import process
@@ -17,59 +17,65 @@ from tests.faults import bench
 from tests.faults.bench import (
     Bench,
     Driver,
+    await_halt,
+    await_none_in,
     ended,
-    none_left_in,
+    endless,
+    is_at_work,
     processes_in,
     wait_for,
     wrapper,
 )
+from tests.waiting import HANGS_S
 
-SINCE = ".started"
-"""A file in the study's parent: younger ones are of the driver that runs."""
-LOG, DONE = "cases/pile-*/log.liggghts", "cases/pile-*/done.json"
+SOLVERS = {"simpleFoam": "flow", "liggghts": "pile"}
+"""The solvers of a study in their order, by the kind of their case."""
+
+
+class Stage(NamedTuple):
+    """A stage of a study: where it is met, and a file that exists only after its end.
+
+    It is met where the driver opens a file `halts_at`, or where the solver `program` is at work.
+    """
+
+    after: str
+    halts_at: str = ""
+    program: str = ""
+
+
 STAGES = {
-    "mesh": ("cases/flow-*/parameters", b"\n", "cases/flow-*/case.json"),
-    "flow": ("cases/flow-*/log.simpleFoam", b"\n", "cases/flow-*/done.json"),
-    "grains": (LOG, b"\n", DONE),
-    "collecting": (LOG, b"the protocol has ended", DONE),
-    "tables": ("tables/*.csv", b"\n", "report.html"),
-    "figures": ("figures/*", b"\n", "report.html"),
+    "mesh": Stage("cases/flow-*/case.json", halts_at="*/flow-*/polyMesh/faces"),
+    "flow": Stage("cases/flow-*/done.json", program="simpleFoam"),
+    "grains": Stage("cases/pile-*/done.json", program="liggghts"),
+    "collecting": Stage("cases/pile-*/done.json", halts_at="*/pile-*/motion.csv"),
+    "tables": Stage("report.html", halts_at="*/tables/.methods.csv.tmp"),
+    "figures": Stage("report.html", halts_at="*/figures/.shields.svg.tmp"),
 }
-"""For each: a file that shows it and its content; a file that exists only after its end."""
 
 
-def _is_in(pile: Bench, stage: str) -> bool:
-    """Whether the driver that runs now has come to a stage."""
-    pattern, content, _ = STAGES[stage]
-    since = (pile.folder / SINCE).stat().st_mtime_ns
-    for path in pile.out.glob(pattern):
-        with contextlib.suppress(FileNotFoundError):
-            if path.stat().st_mtime_ns > since and content in path.read_bytes():
-                return True
-    return False
+def _is_at_work(pile: Bench, kind: str) -> bool:
+    """Whether the solver of a kind of case is at work."""
+    return any(is_at_work(case, kind) for case in pile.cases(kind))
 
 
-def _stopped(pile: Bench, under: Sequence[str], stage: str) -> Driver:
-    """A driver that is paused within a stage."""
-    after = STAGES[stage][-1]
-    for _ in range(20):
-        # a run that ended before its driver did has to be run again to be seen
-        for path in pile.out.glob(after):
-            path.unlink()
-        (pile.folder / SINCE).touch()
-        driver = pile.start(under=under)
-        if wait_for(partial(_is_in, pile, stage), driver):
-            driver.send_signal(signal.SIGSTOP)
-            stopped = (psutil.STATUS_STOPPED, psutil.STATUS_ZOMBIE)
-            while psutil.Process(driver.pid).status() not in stopped:
-                time.sleep(0.001)
-            if not list(pile.out.glob(after)):
-                return driver
-            # it was faster than this test: once more
-            driver.send_signal(signal.SIGCONT)
-        code, printed = ended(driver)
-        assert code == 0, printed
-    raise AssertionError(f"no driver was met before {after}")
+def _within(pile: Bench, under: Sequence[str], stage: Stage) -> Driver:
+    """A driver that is within a stage, which it cannot leave by itself."""
+    # what a run before has left, whose solver may have gone on until its driver ended
+    for path in pile.out.glob(stage.after):
+        path.unlink()
+    if stage.halts_at:
+        driver = pile.start(under=under, halt_at=stage.halts_at)
+        await_halt(driver)
+    else:
+        kind = SOLVERS[stage.program]
+        for case in pile.cases(kind):
+            shutil.rmtree(case)
+        before = endless(stage.program, kind)
+        programs = wrapper(pile.folder / "bin", stage.program, before)
+        driver = pile.start(under=under, programs=programs)
+        assert wait_for(partial(_is_at_work, pile, kind), driver), ended(driver)
+    assert not list(pile.out.glob(stage.after))
+    return driver
 
 
 KILL, TERM, INT, HUP = signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP
@@ -87,22 +93,24 @@ NOHUP = ("nohup",)
 def test_an_ended_driver(
     pile: Bench, numbers: list[signal.Signals], under: tuple[str, ...]
 ) -> None:
-    for number, stage in zip(itertools.cycle(numbers), STAGES, strict=False):
-        after, driver = STAGES[stage][-1], _stopped(pile, under, stage)
+    for number, (name, stage) in zip(
+        itertools.cycle(numbers), STAGES.items(), strict=False
+    ):
+        driver = _within(pile, under, stage)
         driver.send_signal(number)
         driver.send_signal(signal.SIGCONT)
         code, printed = ended(driver)
-        assert none_left_in(pile.folder), stage
+        await_none_in(pile.folder)
         if number == KILL:
             assert code == -number, printed
             # it was ended in this stage and in no later one
-            assert not list(pile.out.glob(after)), stage
+            assert not list(pile.out.glob(stage.after)), name
         else:
             assert code == 130, printed
             assert (
                 printed.count("orchestrator: stopped; the same command continues") == 1
             )
-            assert not (pile.out / "report.json").exists(), stage
+            assert not (pile.out / "report.json").exists(), name
     pile.check_finished()
 
 
@@ -114,7 +122,7 @@ def test_a_terminal_that_is_closed(pile: Bench, under: tuple[str, ...]) -> None:
             "setsid",
             "--ctty",
             *under,
-            *bench.ORCHESTRATOR,
+            *bench.halting("*/flow-*/log.Allrun"),
             "study",
             "small.toml",
             "--out",
@@ -128,16 +136,13 @@ def test_a_terminal_that_is_closed(pile: Bench, under: tuple[str, ...]) -> None:
         text=True,
     )
     os.close(slave)
-    assert wait_for(lambda: any(pile.out.glob("cases/flow-*/log.simpleFoam")), driver)
+    await_halt(driver)
     os.close(master)
-    assert driver.wait(600) == (0 if under else 130)
-    assert none_left_in(pile.folder)
+    driver.send_signal(signal.SIGCONT)
+    assert driver.wait(HANGS_S) == (0 if under else 130)
+    await_none_in(pile.folder)
     assert (pile.out / "report.html").exists() == bool(under)
     pile.check_finished()
-
-
-SOLVERS = {"simpleFoam": "flow", "liggghts": "pile"}
-"""The solvers of a study in their order, by the kind of their case."""
 
 
 def _kill_program(pile: Bench, kind: str, name: str) -> bool:
@@ -153,13 +158,13 @@ def _kill_program(pile: Bench, kind: str, name: str) -> bool:
 
 
 def test_each_solver_that_is_killed_once_is_run_again(pile: Bench) -> None:
-    for program in SOLVERS:
-        # the wait makes a program live long enough to be found
-        wait = 'case "$1" in -h*) ;; *) sleep 0.3;; esac'
-        programs = wrapper(pile.folder / "bin", program, wait)
+    for program, kind in SOLVERS.items():
+        before = endless(program, kind)
+        programs = wrapper(pile.folder / "bin", program, before)
     driver = pile.start(programs=programs)
     for program, kind in SOLVERS.items():
-        assert wait_for(partial(_kill_program, pile, kind, program), driver), program
+        assert wait_for(partial(_is_at_work, pile, kind), driver), ended(driver)
+        assert _kill_program(pile, kind, program), program
     code, printed = ended(driver)
     assert code == 0, printed
     pile.check_finished()

@@ -1,15 +1,23 @@
 """What can be wrong around a study: the disk, the clock, the solvers, streams, another driver."""
 
 import os
+import re
 import shutil
+import signal
 import subprocess
-import time
 
 import pytest
 
 from tests.conftest import Mount
 from tests.faults import bench
-from tests.faults.bench import Bench, ended, none_left_in, wait_for, wrapper
+from tests.faults.bench import (
+    Bench,
+    await_halt,
+    await_none_in,
+    ended,
+    wrapper,
+)
+from tests.waiting import until
 
 
 @pytest.mark.parametrize("size", ["16k", "300k", "900k"])
@@ -38,11 +46,11 @@ def test_a_disk_without_rights_to_run_or_write(pile: Bench, disk: Mount) -> None
 
 
 def test_a_clock_that_has_jumped_back(pile: Bench) -> None:
-    driver = pile.start()
-    assert wait_for(lambda: any(pile.out.glob("cases/flow-*/log.simpleFoam")), driver)
+    driver = pile.start(halt_at="*/flow-*/log.simpleFoam")
+    await_halt(driver)
     driver.kill()
     ended(driver)
-    assert none_left_in(pile.folder)
+    await_none_in(pile.folder)
     for _ in range(2):
         for path in pile.out.rglob("*"):
             os.utime(
@@ -52,16 +60,16 @@ def test_a_clock_that_has_jumped_back(pile: Bench) -> None:
 
 
 def test_a_solver_that_hangs(pile: Bench) -> None:
-    pile.source.write_text(
-        pile.source.read_text().replace("time_limit = 300", "time_limit = 8")
-    )
+    text = pile.source.read_text()
+    pile.source.write_text(re.sub("time_limit = .*", "time_limit = 8", text))
     programs = wrapper(
         pile.folder / "bin", "simpleFoam", '[ "$1" = -help ] || sleep 600'
     )
     code, printed = pile.study(programs=programs)
     assert code == 3, printed
     assert "did not end within 8 s" in printed
-    assert none_left_in(pile.folder)
+    await_none_in(pile.folder)
+    pile.source.write_text(text)
     pile.check_finished()
 
 
@@ -89,7 +97,12 @@ def test_a_run_that_fails_by_itself_is_not_repeated(pile: Bench, kind: str) -> N
 
 
 def test_two_drivers_at_once(pile: Bench) -> None:
-    drivers = [pile.start(), pile.start()]
+    # the one that has the study cannot end before the other has asked for it
+    hold = '[ "$1" = -help ] || until [ -e ../../../go ]; do sleep 0.1; done'
+    programs = wrapper(pile.folder / "bin", "simpleFoam", hold)
+    drivers = [pile.start(programs=programs), pile.start(programs=programs)]
+    until(lambda: any(driver.poll() is not None for driver in drivers))
+    (pile.folder / "go").touch()
     ends = [ended(driver) for driver in drivers]
     assert sorted(code for code, _ in ends) == [0, 1], ends
     loser = [code for code, _ in ends].index(1)
@@ -107,14 +120,14 @@ def test_a_limit_of_the_shell_that_is_too_low(cells: Bench, limit: str) -> None:
 
 
 def test_a_directory_that_vanishes(pile: Bench) -> None:
-    driver = pile.start()
-    assert wait_for(lambda: any(pile.out.glob("cases/*/log.liggghts")), driver)
-    for _ in range(50):  # its solvers may be at work on it
+    driver = pile.start(halt_at="*/pile-*/log.Allrun")
+    await_halt(driver)
+    while pile.out.exists():  # its solvers may be at work on it
         shutil.rmtree(pile.out, ignore_errors=True)
-        time.sleep(0.01)
+    driver.send_signal(signal.SIGCONT)
     code, printed = ended(driver)
     assert code in (1, 2, 3), printed
-    assert none_left_in(pile.folder)
+    await_none_in(pile.folder)
     shutil.rmtree(pile.out, ignore_errors=True)
     pile.check_finished()
 

@@ -13,6 +13,7 @@ from orchestrator.runs import case, process
 from orchestrator.runs.case import templates
 from orchestrator.study.method import FlowMethod
 from tests.conftest import Shared
+from tests.waiting import HANGS_S
 
 SETTINGS = FlowMethod(
     speed=10.0,
@@ -41,9 +42,9 @@ OPEN = changed(PILE, top="open water", depth=6.0 * PILE.height_m)
 Solve = Callable[[FlowCase], Path]
 
 
-def allrun(directory: Path, *, limit_s: float = 120.0, **env: str) -> process.Ended:
+def allrun(directory: Path, **env: str) -> process.Ended:
     log = directory / "log.Allrun"
-    return process.run(["./Allrun"], cwd=directory, log=log, limit_s=limit_s, env=env)
+    return process.run(["./Allrun"], cwd=directory, log=log, limit_s=HANGS_S, env=env)
 
 
 def edit(path: Path, old: str, new: str) -> None:

@@ -3,8 +3,6 @@
 import contextlib
 import os
 import subprocess
-import time
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -17,6 +15,7 @@ from orchestrator.grains.cells import GrainCase
 from orchestrator.grains.peeling import ForceTable, Loading
 from orchestrator.physics.laws import LAWS, Exposure, ForceLaw
 from tests.grains.test_motion import copied
+from tests.waiting import until
 
 WHERE = Exposure(diameter=1e-3, roughness=1e-4, fluid_density=1.0, viscosity=1e-5)
 TABLE = np.geomspace(5e-5, 5e3, 4001)
@@ -81,22 +80,24 @@ def test_processes_that_share_the_grains_find_the_same(tmp_path: Path) -> None:
     assert _solve(tmp_path / "again")[1] == results
 
 
-def _at_work_in(folder: Path, enough: Callable[[int], bool]) -> int:
-    """How many processes work in a folder, when they are enough or a minute is over."""
-    deadline, count = time.monotonic() + 60, -1
-    while not enough(count) and time.monotonic() < deadline:
-        time.sleep(0.05)
-        count = 0
-        for process in Path("/proc").glob("[0-9]*"):
-            with contextlib.suppress(OSError):
-                count += (process / "cwd").resolve() == folder.resolve()
+def _at_work_in(folder: Path) -> int:
+    """How many processes work in a folder."""
+    count = 0
+    for process in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            count += (process / "cwd").resolve() == folder.resolve()
     return count
 
 
 def test_processes_that_share_the_grains_die_with_their_shell(tmp_path: Path) -> None:
-    bed = copied(tmp_path / "bed", ranks=2, time_step=2e-4)
+    # it has no end: nothing comes to rest, and nothing has waited long enough
+    bed = copied(tmp_path / "bed", ranks=2, waiting_time=1e9, rest_energy=0.0)
     shell = subprocess.Popen(["./Allrun"], cwd=bed)
-    assert _at_work_in(bed, lambda count: count >= 4) >= 4
+
+    def goes_on() -> None:
+        assert shell.poll() is None
+
+    until(lambda: _at_work_in(bed) >= 4, goes_on)
     shell.kill()
     shell.wait()
-    assert _at_work_in(bed, lambda count: count == 0) == 0
+    until(lambda: _at_work_in(bed) == 0)

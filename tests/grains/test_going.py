@@ -20,6 +20,7 @@ from orchestrator.runs.case import templates
 from orchestrator.study import study
 from orchestrator.types import FloatArray
 from tests import small_study
+from tests.waiting import HANGS_S
 
 D, GRAIN, FLUID, NU, GRAVITY = 1e-3, 2650.0, 1000.0, 1e-6, 9.81
 """The grain of the template and its fluid, SI."""
@@ -27,7 +28,7 @@ UNIT = math.sqrt(D / (GRAVITY * (1 - FLUID / GRAIN)))
 
 
 def _run(directory: Path) -> Path:
-    subprocess.run(["./Allrun"], cwd=directory, check=True, timeout=300)
+    subprocess.run(["./Allrun"], cwd=directory, check=True, timeout=HANGS_S)
     return directory
 
 

@@ -11,6 +11,7 @@ import pytest
 
 from orchestrator.physics.saltation import BEADS, SIMULATED
 from orchestrator.runs.case import templates
+from tests.waiting import HANGS_S
 
 ROOT = Path(__file__).parents[2]
 TOOL = runpy.run_path(str(ROOT / "tools" / "rebound.py"))
@@ -22,7 +23,7 @@ def flights(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
     """The flights of the deck's own shots, run by hand."""
     case = tmp_path_factory.mktemp("rebound") / "case"
     shutil.copytree(templates() / "liggghts" / "rebound", case)
-    subprocess.run(["./Allrun"], cwd=case, check=True, timeout=300)
+    subprocess.run(["./Allrun"], cwd=case, check=True, timeout=HANGS_S)
     return pd.read_csv(case / "flights.csv", comment="#")
 
 

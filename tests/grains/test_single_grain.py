@@ -1,7 +1,6 @@
 """One grain by LIGGGHTS against the pivot law, and what happens when LIGGGHTS fails."""
 
 import os
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,8 @@ from orchestrator.grains.motion import MODES, Motion
 from orchestrator.runs import case, engine
 from orchestrator.study import study
 from orchestrator.study.parts import Grain
+from tests.faults.bench import endless, wrapper
+from tests.waiting import HANGS_S
 
 
 def _cells(text: str) -> SingleGrainCase:
@@ -21,7 +22,7 @@ def _cells(text: str) -> SingleGrainCase:
     return cells
 
 
-def _run(cells: SingleGrainCase, cases: Path, limit_s: float = 120.0) -> Motion:
+def _run(cells: SingleGrainCase, cases: Path, limit_s: float = HANGS_S) -> Motion:
     engine.execute(cells, cases, limit_s)
     return Motion.from_csv(cases / cells.name)
 
@@ -100,8 +101,10 @@ def test_grains_of_two_contact_laws_share_no_deck() -> None:
         assert decks == (1 if name in ("diameter", "density") else 2), name
 
 
-STOPPED = """pid=$$
-(until [ -s samples.csv ]; do :; done; kill -KILL $pid) &"""
+STOPPED = f"""{endless("liggghts", "cells")}
+pid=$$
+(until grep -q ^1, samples.csv; do sleep 0.01; done; kill -KILL $pid) 2>/dev/null &"""
+"""A solver that is killed at work, and that has no end but this."""
 
 
 @pytest.mark.parametrize(
@@ -111,11 +114,11 @@ STOPPED = """pid=$$
         # out; whether some of them are left is chance
         (
             "sed -i 's/time_step equal 0.2/time_step equal 3.0/' parameters.liggghts",
-            120,
+            HANGS_S,
             "lost|burst",
         ),
-        ("echo 'fix nothing' >>parameters.liggghts", 120, "ERROR"),
-        (STOPPED, 120, "before its protocol did"),
+        ("echo 'fix nothing' >>parameters.liggghts", HANGS_S, "ERROR"),
+        (STOPPED, HANGS_S, "before its protocol did"),
         ("kill -STOP $$", 1, "within 1 s"),
     ],
 )
@@ -127,11 +130,8 @@ def test_a_solver_that_fails_says_why(
     word: str,
 ) -> None:
     # the script runs before the real solver; what it does to the case, the solver then suffers
-    program = tmp_path / "bin" / "liggghts"
-    program.parent.mkdir()
-    program.write_text(f'#!/bin/sh\n{script}\nexec {shutil.which("liggghts")} "$@"\n')
-    program.chmod(0o755)
-    monkeypatch.setenv("PATH", f"{program.parent}:{os.environ['PATH']}")
+    programs = wrapper(tmp_path / "bin", "liggghts", script)
+    monkeypatch.setenv("PATH", f"{programs}:{os.environ['PATH']}")
     cells, cases = _cells(FEW), tmp_path / "cases"
     with pytest.raises(SolverError, match=word) as caught:
         _run(cells, cases, limit_s)

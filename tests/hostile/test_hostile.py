@@ -146,7 +146,10 @@ def test_a_study_file_without_an_end_is_not_read_whole(shell: Shell) -> None:
 QUICK = settings(
     deadline=None,
     max_examples=100,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
+    suppress_health_check=[
+        HealthCheck.function_scoped_fixture,
+        HealthCheck.too_slow,
+    ],
 )
 VALID = (
     Path(study.__file__)

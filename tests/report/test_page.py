@@ -26,6 +26,7 @@ from orchestrator.report.style import Figure
 from orchestrator.runs.files import Folder
 from tests.report.conftest import only, write
 from tests.small_study import TITLE
+from tests.waiting import HANGS_S
 
 VOID = {"meta", "img", "br", "link", "input", "hr"}
 
@@ -215,7 +216,7 @@ def test_in_a_browser_the_slider_moves_grains_above_the_fold(
                    f"--window-size={width},800", f"--user-data-dir={tmp_path / 'profile'}",
                    (tmp_path / "page.html").as_uri()]  # fmt: skip
         dom = subprocess.run(
-            command, capture_output=True, text=True, timeout=120
+            command, capture_output=True, text=True, timeout=HANGS_S
         ).stdout
         shown[width] = {
             name: int(dom.split(f'data-{name}="')[1].split('"')[0])

@@ -15,6 +15,7 @@ from orchestrator.errors import SolverError
 from orchestrator.runs import case, engine
 from orchestrator.runs.case import Case, templates
 from orchestrator.runs.engine import Cores, Display, Pool
+from tests.waiting import HANGS_S, until
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ def test_a_case_is_a_copy_of_its_template_with_inputs_and_then_results(
     assert identity["parameters"] == {"size": 1.0, "by": 1}
     assert "Allrun" in identity["inputs_sha256"]
     assert not case.done_state(step, tmp_path)
-    engine.execute(step, tmp_path, 60.0)
+    engine.execute(step, tmp_path, HANGS_S)
     assert case.done_state(step, tmp_path)
     subprocess.run(["sha256sum", "-c", case.CHECKSUMS], cwd=directory, check=True)
     # it is read again only if its time or size has changed
@@ -111,7 +112,7 @@ def test_a_failure_costs_the_cases_that_need_it_and_no_others(tmp_path: Path) ->
     third, fine = Step(4.0, (second,)), Step(5.0, by=7)
     ended: list[str] = []
     todo = {step.name: step for step in (fault, lost, second, third, fine)}
-    with engine.local(tmp_path, workers=2, limit_s=60.0) as pool:
+    with engine.local(tmp_path, workers=2, limit_s=HANGS_S) as pool:
         failed = engine.run(todo, pool, lambda step, *_: ended.append(step.name))
     assert failed.keys() == {step.name for step in (fault, lost, second, third)}
     assert "a fault of this program: ZeroDivisionError" in str(failed[fault.name])
@@ -147,8 +148,25 @@ def test_failures_that_are_an_answer_are_counted_and_not_told(
     assert "[1/2] failed" in said
 
 
+class Queue:
+    """A lock that counts who has asked for it since it was made."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self.asked = 0
+        self.locked = self._lock.locked
+
+    def __enter__(self) -> None:
+        # one asks after the other here, so that the count needs no lock
+        self.asked += 1
+        self._lock.acquire()
+
+    def __exit__(self, *_: object) -> None:
+        self._lock.release()
+
+
 def test_a_large_solver_is_served_before_those_that_ask_later() -> None:
-    cores, served = Cores(2), []
+    cores, served, queue = Cores(2), [], Queue()
 
     def solve(name: str, wanted: int) -> None:
         with cores.held(wanted):
@@ -159,12 +177,12 @@ def test_a_large_solver_is_served_before_those_that_ask_later() -> None:
         for args in (("large", 2), ("small", 1))
     ]
     with cores.held(1):
+        cores._queue = queue  # type: ignore[assignment]
         threads[0].start()
-        while not cores._queue.locked():
-            pass
+        until(queue.locked)
         threads[1].start()
+        until(lambda: queue.asked == 2 or not threads[1].is_alive())
         # one core is free, but the large one asked first
-        threads[1].join(timeout=0.2)
         assert served == []
     for thread in threads:
         thread.join()

@@ -1,12 +1,13 @@
 """External programs: their output, limits and ends, and what they answer about their version."""
 
+import math
 import os
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import psutil
 import pytest
@@ -16,29 +17,42 @@ from orchestrator.errors import Interrupted, SolverError
 from orchestrator.runs import process
 from orchestrator.runs.process import Ended
 from orchestrator.solvers import doctor, liggghts, openfoam
+from tests.waiting import HANGS_S, until
 
 ROOT = Path(__file__).parents[2]
 Put = Callable[[str], Path]
 Patch = pytest.MonkeyPatch
-FAMILY = "sleep 60 & echo $! >child; trap '' TERM; wait; wait"
+FAMILY = "trap '' TERM; sleep 100000 & echo $! >child; wait; wait"
+"""A program and its child, which hear no SIGTERM and end by no other than SIGKILL."""
 
 
 def _sh(folder: Path, script: str, **options: object) -> Ended:
-    options = {"limit_s": 30.0, **options}
+    options = {"limit_s": HANGS_S, **options}
     return process.run(["sh", "-c", script], cwd=folder, log=folder / "log", **options)  # type: ignore[arg-type]
 
 
-def _has_ended(file: Path) -> bool:
-    """Whether the process whose number a file holds ends within a moment."""
+def _is_written(file: Path) -> bool:
+    """Whether a file is there, with its line."""
+    return file.is_file() and file.read_text().endswith("\n")
+
+
+def _has_ended(pid: int) -> bool:
+    """Whether the process of a number has ended."""
+    try:
+        return bool(psutil.Process(pid).status() == psutil.STATUS_ZOMBIE)
+    except psutil.NoSuchProcess:
+        return True
+
+
+def _await_end(file: Path) -> None:
+    """Wait until the process whose number a file holds has ended."""
     pid = int(file.read_text())
-    for _ in range(200):
-        try:
-            if psutil.Process(pid).status() == psutil.STATUS_ZOMBIE:
-                return True
-        except psutil.NoSuchProcess:
-            return True
-        time.sleep(0.05)
-    return False
+    until(lambda: _has_ended(pid))
+
+
+def _clock(file: Path) -> SimpleNamespace:
+    """A clock that stands until a file is written, and then is beyond every limit."""
+    return SimpleNamespace(monotonic=lambda: math.inf if _is_written(file) else 0.0)
 
 
 def test_output_exit_code_and_environment(tmp_path: Path, monkeypatch: Patch) -> None:
@@ -51,17 +65,21 @@ def test_output_exit_code_and_environment(tmp_path: Path, monkeypatch: Patch) ->
 
 
 LIMITS: dict[str, tuple[str, dict[str, float], str]] = {
-    "time": (FAMILY, {"limit_s": 0.3}, "time"),
-    "output": (f"yes & {FAMILY}", {"output_limit": 10_000}, "output"),
-    "none": ("sleep 60 & echo $! >child", {}, ""),
+    "time": (FAMILY, {}, "time"),
+    "output": (FAMILY.replace("wait", "yes", 1), {"output_limit": 10_000}, "output"),
+    "none": ("sleep 100000 & echo $! >child", {}, ""),
 }
 
 
 @pytest.mark.parametrize("limit", LIMITS)
-def test_all_of_a_group_is_ended(tmp_path: Path, limit: str) -> None:
+def test_all_of_a_group_is_ended(
+    tmp_path: Path, monkeypatch: Patch, limit: str
+) -> None:
     script, options, over = LIMITS[limit]
+    if limit == "time":
+        monkeypatch.setattr(process, "time", _clock(tmp_path / "child"))
     assert _sh(tmp_path, script, **options).over == over
-    assert _has_ended(tmp_path / "child")
+    _await_end(tmp_path / "child")
 
 
 def test_a_file_may_not_grow_beyond_its_limit(tmp_path: Path) -> None:
@@ -71,28 +89,35 @@ def test_a_file_may_not_grow_beyond_its_limit(tmp_path: Path) -> None:
 
 
 def test_a_stop_ends_the_program(tmp_path: Path) -> None:
-    stop = threading.Event()
-    threading.Timer(0.3, stop.set).start()
+    stop, child = threading.Event(), tmp_path / "child"
+
+    def set_at_work() -> None:
+        until(lambda: _is_written(child))
+        stop.set()
+
+    threading.Thread(target=set_at_work).start()
     with pytest.raises(Interrupted):
         _sh(tmp_path, FAMILY, stop=stop)
-    assert _has_ended(tmp_path / "child")
+    _await_end(child)
 
 
 def test_a_killed_driver_leaves_nothing_at_work(tmp_path: Path) -> None:
     script = (
         "from pathlib import Path; from orchestrator.runs import process;"
-        "process.run(['sh', '-c', 'sleep 60 & echo $! >child; echo $$ >pid; wait; sleep 60'],"
-        " cwd=Path('.').absolute(), log=Path('log').absolute(), limit_s=60)"
+        "process.run(['sh', '-c', 'sleep 100000 & echo $! >child; echo $$ >pid; wait'],"
+        f" cwd=Path('.').absolute(), log=Path('log').absolute(), limit_s={HANGS_S})"
     )
     env = {**os.environ, "PYTHONPATH": str(ROOT)}
     driver = subprocess.Popen([sys.executable, "-c", script], cwd=tmp_path, env=env)
-    pid = tmp_path / "pid"
-    while not (pid.is_file() and pid.read_text().strip()):
+
+    def goes_on() -> None:
         assert driver.poll() is None
-        time.sleep(0.05)
+
+    until(lambda: _is_written(tmp_path / "pid"), goes_on)
     driver.kill()
     driver.wait()
-    assert all(_has_ended(tmp_path / name) for name in ("pid", "child"))
+    for name in ("pid", "child"):
+        _await_end(tmp_path / name)
 
 
 RUNS = {
@@ -122,7 +147,7 @@ STATED = {
 ANSWERS = (
     "printf '\\377\\376 \\300\\n'; echo '{stated}'",
     "echo '{stated}' >&2; head -c 30000000 /dev/zero; exit 3",
-    "sleep 1000 & echo '{stated}'",
+    "sleep 100000 & echo '{stated}'",
 )
 REFUSALS = {
     "exit 4": "it ended with 4 and printed nothing",
@@ -139,7 +164,8 @@ def name(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture
 def put(tmp_path: Path, name: str, monkeypatch: Patch) -> Put:
-    """Put a program of a name in front of the real one."""
+    """Put a program of a name in front of the real one; no time ends its answer."""
+    monkeypatch.setattr(solvers, "QUERY_S", HANGS_S)
 
     def put(script: str) -> Path:
         path = tmp_path / name
@@ -161,13 +187,16 @@ def test_a_version_among_other_output(put: Put, name: str, script: str) -> None:
 def test_no_version_is_refused(
     put: Put, name: str, script: str, tmp_path: Path, monkeypatch: Patch
 ) -> None:
-    monkeypatch.setattr(solvers, "QUERY_S", 2.0 if "CHILD" in script else 30.0)
-    monkeypatch.setenv("CHILD", str(tmp_path / "child"))
+    child = tmp_path / "child"
+    monkeypatch.setenv("CHILD", str(child))
     path = put(script)
+    if "CHILD" in script:
+        monkeypatch.setattr(process, "time", _clock(child))
     with pytest.raises(SolverError, match=REFUSALS[script]) as caught:
         VERSIONS[name]()
     assert str(caught.value).startswith(str(path))
-    assert "CHILD" not in script or _has_ended(tmp_path / "child")
+    if "CHILD" in script:
+        _await_end(child)
 
 
 def test_the_home_of_another_openfoam(tmp_path: Path, monkeypatch: Patch) -> None:

@@ -67,7 +67,7 @@ def solved(one: SurfaceFlowCase, shared: Shared) -> Path:
     with shared("flows") as cases:
         if not case.done_state(one, cases):
             directory = case.prepare(one, cases)
-            ended = allrun(directory, limit_s=600.0)
+            ended = allrun(directory)
             one.collect(directory)
             times = {"solver_s": ended.seconds, "cpu_s": ended.cpu_s}
             case.finish(one, directory, **times, wall_s=ended.seconds)
