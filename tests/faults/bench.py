@@ -218,16 +218,21 @@ def wrapper(folder: Path, program: str, before: str) -> Path:
     return folder
 
 
-def endless(program: str, kind: str) -> str:
-    """What a `wrapper` does first so that a solver never ends: of a kind, and the first time.
+def endless(program: str) -> str:
+    """What a `wrapper` does first so that a solver never ends.
 
-    The solver is the real one at its real work, and only a signal ends it. The second time it
-    has its own inputs again.
+    The solver is the real one at its real work, and only a signal ends it.
     """
     names, change = ENDLESS[program]
+    return f"sed -i.whole '{change}' {names}"
+
+
+def endless_once(program: str, kind: str) -> str:
+    """The same for the first run of a kind of case; the next one has its own inputs again."""
+    names, _ = ENDLESS[program]
     return f"""case $(basename "$(pwd -P)") in {kind}-*)
     if mkdir ../../../endless-{program} 2>/dev/null; then
-        sed -i.whole '{change}' {names}
+        {endless(program)}
     else
         for name in {names}; do [ ! -e $name.whole ] || mv $name.whole $name; done
     fi;;

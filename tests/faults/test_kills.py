@@ -20,7 +20,7 @@ from tests.faults.bench import (
     await_halt,
     await_none_in,
     ended,
-    endless,
+    endless_once,
     is_at_work,
     processes_in,
     wait_for,
@@ -70,7 +70,7 @@ def _within(pile: Bench, under: Sequence[str], stage: Stage) -> Driver:
         kind = SOLVERS[stage.program]
         for case in pile.cases(kind):
             shutil.rmtree(case)
-        before = endless(stage.program, kind)
+        before = endless_once(stage.program, kind)
         programs = wrapper(pile.folder / "bin", stage.program, before)
         driver = pile.start(under=under, programs=programs)
         assert wait_for(partial(_is_at_work, pile, kind), driver), ended(driver)
@@ -159,7 +159,7 @@ def _kill_program(pile: Bench, kind: str, name: str) -> bool:
 
 def test_each_solver_that_is_killed_once_is_run_again(pile: Bench) -> None:
     for program, kind in SOLVERS.items():
-        before = endless(program, kind)
+        before = endless_once(program, kind)
         programs = wrapper(pile.folder / "bin", program, before)
     driver = pile.start(programs=programs)
     for program, kind in SOLVERS.items():
