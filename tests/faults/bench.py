@@ -210,10 +210,14 @@ def await_none_in(folder: Path) -> None:
 
 
 def wrapper(folder: Path, program: str, before: str) -> Path:
-    """A folder with a program that does something first, and then becomes the real one."""
+    """A folder with a program that does something first, and then becomes the real one.
+
+    Asked for its version it does nothing first.
+    """
     folder.mkdir(exist_ok=True)
     path = folder / program
-    path.write_text(f'#!/bin/sh\n{before}\nexec {shutil.which(program)} "$@"\n')
+    at_work = f'case "$1" in -h*) ;; *)\n{before}\n;; esac'
+    path.write_text(f'#!/bin/sh\n{at_work}\nexec {shutil.which(program)} "$@"\n')
     path.chmod(0o755)
     return folder
 
