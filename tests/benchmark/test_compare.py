@@ -57,7 +57,7 @@ FAULTS = {
     AFTER + "out.write_text(text.replace('ustar', 'speed'))": "lacks ustar_m_s",
     # wrong numbers
     AFTER
-    + "out.write_text(text.replace('ustar_m_s,,', 'ustar_m_s,,9'))": "ustar_m_s is 90.*, not 0",
+    + "out.write_text(text.replace('ustar_m_s,,', 'ustar_m_s,,9'))": "ustar_m_s is 91.4.*, not 1.4",
 }
 """Bodies of solvers, and what is said of each."""
 
