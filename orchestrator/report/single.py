@@ -439,8 +439,11 @@ def worth(row: Row, few: bool = False) -> Worth:
     return Worth("care", row["verdict"], advice)
 
 
-def _sentence(text: str) -> str:
-    """A text with a capital at its beginning and one point at its end."""
-    if not text:
+def _sentence(text: object) -> str:
+    """A text with a capital at its beginning and one point at its end.
+
+    An empty cell of a table that was read is no text.
+    """
+    if not isinstance(text, str) or not text:
         return ""
     return f"{text[0].upper()}{text[1:].rstrip('.')}."
