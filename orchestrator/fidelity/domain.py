@@ -26,10 +26,11 @@ from orchestrator.fidelity.classes import (
 from orchestrator.fidelity.fidelities import FIDELITIES
 from orchestrator.study.closed_form import outer_roughness
 from orchestrator.study.criterion import GOES_ON, LEAVES
-from orchestrator.study.fields import APPLIES, FIELDS, SEED
+from orchestrator.study.fields import FIELDS, SEED
 from orchestrator.study.fields import Quantity as Field
 from orchestrator.study.parts import LogNormal, PileBed
 from orchestrator.study.scene import Scene, default_first_cell_height
+from orchestrator.study.scopes import APPLIES
 
 FILE = Path(__file__).with_name("calibration") / "domain.csv"
 NEAR = 0.02

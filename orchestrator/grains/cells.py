@@ -109,7 +109,7 @@ class SingleGrainCase(GrainCase):
     @property
     def parameters(self) -> dict[str, Any]:
         """The scenes, but for what only the reading of the results depends on."""
-        values = [one.model_dump(mode="json", exclude=UNUSED) for one in self.scenes]
+        values = [one.described(exclude=UNUSED) for one in self.scenes]
         return {"scenes": values}
 
     @property
@@ -289,8 +289,8 @@ def batches(scenes: Iterable[Scene]) -> Iterator[SingleGrainCase]:
     """
     groups: dict[str, list[Scene]] = {}
     for scene in scenes:
-        alike = scene.model_dump(
-            mode="json", include={"grain", "threshold", "method"}, exclude=DIFFERENT
+        alike = scene.described(
+            include={"grain", "threshold", "method"}, exclude=DIFFERENT
         )
         groups.setdefault(canonical_json(alike), []).append(scene)
     for _, group in sorted(groups.items()):

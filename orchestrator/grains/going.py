@@ -138,7 +138,7 @@ class GoingCase(Case):
     def parameters(self) -> dict[str, Any]:
         """The scene, but for what only the reading of the results depends on."""
         unused = {"fluid": {"kind"}, "threshold": {"fractions"}}
-        return self.scene.model_dump(mode="json", exclude=unused)
+        return self.scene.described(exclude=unused)
 
     @property
     def cost_s(self) -> float:

@@ -187,7 +187,7 @@ class WornFlow(Case):
     @property
     def parameters(self) -> dict[str, Any]:
         """The scene, but for what only the reading of the results depends on."""
-        return self.scene.model_dump(mode="json", exclude=READ_LATER)
+        return self.scene.described(exclude=READ_LATER)
 
     @property
     def cost_s(self) -> float:
@@ -482,7 +482,7 @@ class PileCase(GrainCase):
     @property
     def parameters(self) -> dict[str, Any]:
         """The scene, but for what only the reading of the results depends on."""
-        asked = self.scene.model_dump(mode="json", exclude=READ_LATER)
+        asked = self.scene.described(exclude=READ_LATER)
         asked["method"]["grains"]["final_fraction"] = self.scene.last_fraction
         if self.scene.threshold.update:
             asked["threshold"]["goal"] = goal_part(self.scene, self.flow)

@@ -53,7 +53,7 @@ class Info:
     column
         Its column in tables, with the unit, where that is not its name; "-" for none.
     scope
-        The scenes on which it has an effect, a key of `fields.APPLIES`.
+        The scenes on which it has an effect, a key of `scopes.APPLIES`.
     choices
         Meanings of its words.
     read

@@ -25,7 +25,8 @@ from orchestrator.study.parts import (
     Threshold,
 )
 from orchestrator.study.profile import Profile
-from orchestrator.study.scene import CLOSED, Scene
+from orchestrator.study.scene import Scene
+from orchestrator.study.scopes import APPLIES
 
 QUESTION: Mapping[str, type[Part]] = {
     "fluid": Fluid,
@@ -80,6 +81,21 @@ class Quantity:
         """Whether it says how a scene is answered."""
         return table_of(self.name) in METHOD
 
+    def applies(self, scene: Scene) -> bool:
+        """Tell whether it has an effect on a scene.
+
+        Parameters
+        ----------
+        scene
+            The scene.
+
+        Returns
+        -------
+        bool
+            Whether it has.
+        """
+        return APPLIES[self.info.scope](scene)
+
     def asked(self, scene: Scene) -> Any:
         """Find its value as a scene has it written.
 
@@ -93,7 +109,7 @@ class Quantity:
         Any
             The value; None where it has no effect or is left open.
         """
-        if not APPLIES[self.info.scope](scene):
+        if not self.applies(scene):
             return None
         return plain(self.read(scene))
 
@@ -110,7 +126,7 @@ class Quantity:
         Any
             The value; None where it has no effect.
         """
-        if not APPLIES[self.info.scope](scene):
+        if not self.applies(scene):
             return None
         if self.info.read:
             return plain(getattr(scene, self.info.read))
@@ -196,37 +212,6 @@ def _item(item: Any) -> str:
         diameter, part = item
         return f"{1e3 * diameter:g} mm {100 * part:g} %"
     return str(item)
-
-
-def _of_piles(condition: Callable[[Scene, PileBed], Any]) -> Callable[[Scene], bool]:
-    return lambda scene: (
-        isinstance(scene.bed, PileBed) and bool(condition(scene, scene.bed))
-    )
-
-
-RANDOM = ("disordered", "poured")
-MAYBE_DEM = ("dem", "auto")
-APPLIES: Mapping[str, Callable[[Scene], bool]] = {
-    "every scene": lambda scene: True,
-    "single grains": lambda scene: not isinstance(scene.bed, PileBed),
-    "piles": _of_piles(lambda scene, bed: True),
-    "dunes": _of_piles(lambda scene, bed: "windward" in bed.form.fields),
-    "beds with level parts": _of_piles(lambda scene, bed: "length" in bed.form.fields),
-    "profiles": _of_piles(lambda scene, bed: bed.profile),
-    "disordered piles": _of_piles(lambda scene, bed: bed.packing == "disordered"),
-    "poured beds": lambda scene: scene.is_poured,
-    "random beds and replicas": _of_piles(
-        lambda _, bed: bed.packing in RANDOM or bed.is_replica
-    ),
-    "solved flows": _of_piles(lambda scene, bed: scene.method.flow.model == "solve"),
-    "DEM": lambda scene: scene.method.kind in MAYBE_DEM,
-    "DEM of piles": _of_piles(lambda scene, bed: scene.method.kind in MAYBE_DEM),
-    "DEM and peeling": lambda scene: scene.method.kind not in CLOSED,
-    "DEM and peeling of piles": _of_piles(
-        lambda scene, bed: scene.method.kind not in CLOSED
-    ),
-}
-"""The scenes on which a field has an effect, by the `scope` of its `Info`."""
 
 
 def quantity(table: str, name: str, declared: FieldInfo) -> Quantity:

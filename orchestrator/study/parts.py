@@ -209,11 +209,17 @@ class Drag(Part):
 class Forces(Drag):
     """How the grains feel the flow."""
 
-    stress: Literal["wall", "eq10"] = _pile("wall")
+    stress: Literal["wall", "eq10"] = field("wall", scope="solved flows")
     """stress on the bed: at the wall, or at the first cell
     - wall: wall stress
     - eq10: stress of Eq. 10"""
-    averaging_length: float = _pile(1 / 40, unit="h", ge=1e-4, le=100)
+    averaging_length: float = field(
+        1 / 40,
+        unit="h",
+        scope="flows that change along the bed, and shared stress",
+        ge=1e-4,
+        le=100,
+    )
     """least length of bed that a grain's stress is averaged on: the crest's own never
     converges with the mesh"""
     loaded_grains: Literal["exposed", "all but crest", "all but toe"] = _pile("exposed")

@@ -15,6 +15,7 @@ from orchestrator.study.declare import UnfitError
 from orchestrator.study.method import Method
 from orchestrator.study.parts import GrainBed, PileBed, Sizes, percentile
 from orchestrator.study.question import LEAST_DEPTH, OUT, Question
+from orchestrator.study.scopes import CLOSED, effective
 
 SOLVE_VISCOSITY = 1e-5
 """Viscosity at which flows are solved, m2/s, where it is low enough for their cells."""
@@ -40,8 +41,6 @@ READ_LATER: dict[str, Any] = {
 }
 """Fields that no run of a solver depends on, only the reading of its results."""
 LEFT_OPEN_METHOD = 'leave it out, or method.kind = "pivot"'
-CLOSED = ("pivot", "local")
-"""Methods without contacts: nothing that moves changes the bed."""
 LEFT_OPEN = 'method.kind = "auto", which takes one that does'
 
 
@@ -61,13 +60,28 @@ class Scene(Question):
     @cached_property
     def digest(self) -> str:
         """Digest of all that a run may depend on: of the fluid its numbers alone."""
-        asked = self.model_dump(mode="json", exclude={"fluid": {"kind"}})
+        asked = self.described(exclude={"fluid": {"kind"}})
         return digest_text(canonical_json(asked))[:12]
 
     @cached_property
     def id(self) -> str:
-        """Digest of the scene's canonical JSON."""
-        return digest_text(canonical_json(self.model_dump(mode="json")))[:12]
+        """Digest of the scene's canonical JSON, of the fields that have an effect."""
+        return digest_text(canonical_json(self.described()))[:12]
+
+    def described(self, **chosen: Any) -> dict[str, Any]:
+        """List the fields; one that has no effect on the scene has its default.
+
+        Parameters
+        ----------
+        **chosen
+            Which fields: `include` and `exclude` of pydantic's `model_dump`.
+
+        Returns
+        -------
+        dict
+            The fields as JSON.
+        """
+        return effective(self, self).model_dump(mode="json", **chosen)
 
     @cached_property
     def question(self) -> Question:
@@ -211,6 +225,9 @@ def _check_flow(scene: Scene, bed: PileBed) -> None:
             least = f"{LEAST_DEPTH:g} heights of the forms or obstacles"
             what = f"{lid:g} m is less than {least}"
             raise UnfitError("method.flow.lid", what, "raise it")
+    if bed.is_level and scene.method.flow.model == "waves":
+        what = "over a level bed it is the flat flow"
+        raise UnfitError("method.flow.model", what, 'leave it out, or choose "flat"')
     if scene.flow.top != "boundary layer" and scene.method.flow.model == "waves":
         what = "linear theory has no top"
         raise UnfitError("method.flow.model", what, 'choose "solve" or "flat"')

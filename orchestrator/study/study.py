@@ -25,7 +25,7 @@ from orchestrator.study import units
 from orchestrator.study.closed_form import resolved
 from orchestrator.study.declare import List, Part, UnfitError
 from orchestrator.study.fidelities import AUTO, fields_of
-from orchestrator.study.fields import PARTS, SEED
+from orchestrator.study.fields import FIELDS, PARTS, SEED, default_of
 from orchestrator.study.hints import HINTS
 from orchestrator.study.keys import Table, Tables, by_name, check_moved, nested
 from orchestrator.study.parts import Erosion, PileBed, Sizes, percentile
@@ -347,6 +347,16 @@ def _groups(file: _File, where: str, files: Files) -> tuple[Group, ...]:
         for part, table in by_name(dict(group)).items():
             tables[part] |= table
         listed.append([*_scenes(tables, axes, place, files)])
+        own = [
+            f"{table}.{key}"
+            for table, keys in by_name(dict(group)).items()
+            for key in keys
+        ]
+        _check_effect(own, listed[-1], place)
+    top = [
+        f"{table}.{key}" for table, keys in by_name(dict(file)).items() for key in keys
+    ]
+    _check_effect(top, [*itertools.chain(*listed)], where)
     # force laws are found for the scenes of all groups at once
     laws = resolved([*itertools.chain(*listed)])
     groups = []
@@ -357,6 +367,16 @@ def _groups(file: _File, where: str, files: Files) -> tuple[Group, ...]:
         name = group.name or f"group {number + 1}"
         groups.append(Group(name, tuple(scenes), places[number]))
     return tuple(groups)
+
+
+def _check_effect(names: Sequence[str], scenes: Sequence[Scene], where: str) -> None:
+    """Refuse a field that is written for some scenes, and has an effect on none."""
+    for each in FIELDS:
+        if each.name not in names or any(map(each.applies, scenes)):
+            continue
+        if any(each.read(scene) != default_of(each.name) for scene in scenes):
+            what = f"it has an effect on {each.info.scope} alone"
+            raise InputError(what, f"{where}: {each.name}", "leave it out")
 
 
 def _check_keys(data: Mapping[str, Any], where: str) -> None:

@@ -66,15 +66,36 @@ def test_a_study_file_names_a_fidelity(name: str, packing: str) -> None:
 
 
 def test_a_number_that_a_file_writes_stands_before_that_of_the_fidelity() -> None:
-    scene = _named(
-        "quick",
-        "",
-        "method.flow.cells_per_face = 80\nmethod.grains.load_increment = 0.05",
-    )
+    scene = _named("quick", "", "method.flow.cells_per_face = 80")
     assert scene.method.kind == "pivot"
     assert scene.method.flow.cells_per_face == 80
+    assert fidelity_of(scene) is OWN_NUMBERS
+    scene = _named("standard", "", "method.grains.load_increment = 0.05")
+    assert scene.method.kind == "dem"
     assert scene.method.grains.load_increment == 0.05
     assert fidelity_of(scene) is OWN_NUMBERS
+
+
+@pytest.mark.parametrize(
+    "asked",
+    ['method.kind = "pivot"', 'method.kind = "peeling"', "method.fidelity = 'quick'"],
+)
+def test_load_steps_are_refused_where_the_file_names_a_method_without(
+    asked: str,
+) -> None:
+    """A tolerance keeps such a method; one that is left open may become DEM."""
+    text = """
+        tolerance = 0.02
+        grain.diameter = 1e-3
+        bed = { kind = "pile", slope_deg = 15.0 }
+        method.grains.load_increment = 0.05
+    """
+    with pytest.raises(
+        InputError, match="load_increment: it has an effect on DEM alone"
+    ):
+        study.parse(f"{text}\n{asked}", name="one", where="one")
+    (scene,) = study.parse(text, name="one", where="one").scenes
+    assert scene.method.grains.load_increment == 0.05
 
 
 def test_fidelities_are_an_axis() -> None:

@@ -169,7 +169,7 @@ bed = { kind = "pile", slope_deg = 15.0, height = 0.01 }
 method.flow.model = "waves"
 """
 ONE = '[[group]]\nname = "one"\nmethod.kind = "pivot"\n'
-OTHER = '[[group]]\nname = "other"\nmethod.kind = "peeling"\nmethod.grains.load_increment = 0.02\n'
+OTHER = '[[group]]\nname = "other"\nmethod.kind = "peeling"\nmethod.grains.mobile_layers = 1\n'
 LONG = '[[group]]\nname = "long"\nbed.height = 2.0\n'
 
 

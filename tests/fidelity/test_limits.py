@@ -90,7 +90,7 @@ ALLOWED: list[dict[str, object]] = [
     {**GRAIN, "bed.slope_deg": 25.0},
     {**LONG, "bed.slope_deg": 1.0, "bed.lee_slope_deg": 34.0, "bed.height": 0.01},
     {**LONG, "bed.height": 20.0, "bed.counted": [10.0, 12.0]},
-    {"method.flow.model": "waves", "method.flow.first_cell_height": 3e-5},
+    {"method.flow.model": "waves"},
     {"method.flow.model": "flat", "bed.shape": "flat", "bed.slope_deg": 0.0},
     {**POURED, "bed.shape": "step up", "bed.slope_deg": 30.0},
 ]

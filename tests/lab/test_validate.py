@@ -15,7 +15,7 @@ from orchestrator.flow.stress import WallStress
 from orchestrator.lab import strips, validate
 from orchestrator.physics import beside, saltation
 from orchestrator.physics.curves import Air, iversen_white
-from orchestrator.study import fields, study
+from orchestrator.study import fields, scopes, study
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import changed
 
@@ -176,7 +176,7 @@ def test_an_interval_is_of_strips_that_differ_in_nothing_else_than_the_tested() 
     asked = {
         field.name
         for field in fields.FIELDS
-        if not field.is_method and fields.APPLIES[field.info.scope](strip)
+        if not field.is_method and scopes.APPLIES[field.info.scope](strip)
     }
     # forms of a train, profiles and obstacles are no level beds, depth and lee side are not set
     others = {

@@ -96,7 +96,9 @@ def test_springs_that_throw_poured_grains_apart_are_refused_in_dem() -> None:
     text = f"grain = {{ diameter = 1e-3 }}\nmethod.grains.stiffness = 2e5\n{BED % 'd/30'}\n"
     with pytest.raises(InputError, match=r"such springs throw poured grains"):
         _parse(text)
-    _parse(f'{text}method.kind = "pivot"')
+    # pivots know no springs
+    with pytest.raises(InputError, match=r"stiffness: it has an effect on DEM alone"):
+        _parse(f'{text}method.kind = "pivot"')
 
 
 FILES = {
