@@ -54,8 +54,9 @@ column in the results is empty. The *column* of a field has the name of the fiel
 given. The table `scenes` of the results has the question, the table `methods` has how each scene was
 answered. The method `auto` and a tolerance may change the fields of the method
 ([ladder.md](ladder.md#how-a-scene-is-answered)); `methods` has the values that were used. A default
-that is written in the file has the same effect as one that is left out. Ranges are intervals; a
-parenthesis excludes the end. Within the ranges, a study refuses what the [limits](#limits) name. A key
+that is written in the file has the same effect as one that is left out, except in `[fluid]`: any density
+or viscosity there means a fluid by its numbers, in which grains go on, and without one the fluid is the
+paper's gas (`kind = "paper"`). Ranges are intervals; a parenthesis excludes the end. Within the ranges, a study refuses what the [limits](#limits) name. A key
 of an earlier version is refused, and the message names the present key.
 """
 DAMPED = ", ".join(

@@ -96,7 +96,9 @@ def _help(name: str) -> str:
     if isinstance(default, float):
         default = f"{default:g}"
     if default is not None:
-        of_paper = ", that of the paper's gas" if name in OF_FLUID else ""
+        of_paper = ""
+        if name in OF_FLUID:
+            of_paper = ", that of the paper's gas, which any number of a fluid replaces"
         parts.append(f"default {default}{of_paper}")
     return "; ".join(parts)
 

@@ -113,7 +113,11 @@ def of_measurements(row: Mapping[Any, Any], is_closed: bool) -> Iterator[Reason]
         return
     goes_on = row.get("criterion") == GOES_ON
     if is_closed and goes_on and not row["tested_rows"] > 0:
-        what = f"nothing was measured near such grains at Re* {row['reynolds']:.3g}"
+        at = f"at Re* {row['reynolds']:.3g}"
+        what = f"nothing was measured near such grains {at}"
+        if row["measured_rows"] > 0:
+            # rows of that Re*, but no interval for the angle, z0, slope or densities
+            what = f"no interval was tested for beds and densities like these {at}"
         yield Reason("not measured", what)
     if goes_on:
         yield from _held_by_cohesion(row)
