@@ -35,10 +35,11 @@ def piles(flow: str) -> list[Pile]:
 
 
 def test_a_theory_needs_no_case(tmp_path: Path) -> None:
-    # nor is it refused for a mesh that it has not
-    flat, waves = piles(
-        'first_cell_height = 0.01\n[axes]\n"method.flow.model" = ["flat", "waves"]\n'
-    )
+    # a mesh that it has not is refused by name
+    axes = '[axes]\n"method.flow.model" = ["flat", "waves"]\n'
+    with pytest.raises(InputError, match="an effect on solved flows alone"):
+        piles(f"first_cell_height = 0.01\n{axes}")
+    flat, waves = piles(axes)
     assert flat.model.cases == waves.model.cases == ()
     np.testing.assert_allclose(flat.speed(tmp_path), 1)
     rising = waves.speed(tmp_path)

@@ -148,7 +148,7 @@ def of_paper(text: str) -> str:
         (grain('roughness = "d/30", relative_size = 0.1'), "hidden grain", True),
         (of_paper(grain('roughness = "d/30", relative_size = 0.5')), "", False),
         # of grains that go on, none were measured among larger ones
-        (grain('roughness = "d/30", relative_size = 0.5'), "was measured near", True),
+        (grain('roughness = "d/30", relative_size = 0.5'), "interval was tested", True),
         (grain('roughness = "d/30", relative_size = 0.5'), "hidden grain", False),
         (grain(STEEP, "lift_coefficient = 30.0"), "lift over", True),
         (grain(STEEP), "", False),
