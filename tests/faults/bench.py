@@ -21,14 +21,10 @@ ORCHESTRATOR = (sys.executable, "-m", "orchestrator")
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
 HEAD = f"""
 time_limit = {HANGS_S:g}
-[threshold]
-fractions = [0.3, 0.5]
-
 [method.grains]
 load_increment = 0.05
 waiting_time = 6.0
 time_step = 0.3
-final_fraction = 0.8
 stiffness = 1e3
 """
 CELLS = """
@@ -41,8 +37,10 @@ PILE = """
 name = "pile"
 grain = { diameter = 2e-3 }
 bed = { kind = "pile", slope_deg = 20.0, roughness = "d/30" }
+threshold.fractions = [0.3, 0.5]
 method.flow.cells_per_face = 10
 method.grains.mobile_layers = 1
+method.grains.final_fraction = 0.8
 """
 Driver = subprocess.Popen[str]
 ENDLESS = {
