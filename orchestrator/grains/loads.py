@@ -262,11 +262,6 @@ class Geometry:
         return self.packed_line.x[-2] - self.packed_line.x[1]
 
     @property
-    def joined_length(self) -> float:
-        """Length of a strip whose ends are one, a whole number of d."""
-        return float(math.floor(self.length + digits.SLACK))
-
-    @property
     def surface(self) -> float:
         """Height over the bed line of the centre of an exposed grain, d."""
         return 0.5 + self.bed.roughness / self.scene.grain.diameter
@@ -354,11 +349,6 @@ class Geometry:
         for run in self.pouring:
             assert self.cases is not None, "the grains of a poured bed lie in its run"
             directory = self.cases / run.name
-            if self.scene.forces.drag == "relative":
-                length = self.joined_length
-                layers = self.scene.method.grains.mobile_layers
-                rules = (self.surface, layers, bed.width)
-                return poured.joined(directory, length, *rules)
             return _poured(
                 state_of(directory / poured.BED),
                 directory,

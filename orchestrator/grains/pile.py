@@ -28,7 +28,6 @@ from orchestrator.flow.case import WALL_STRESS, FlowCase
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains import motion
 from orchestrator.grains.cells import GrainCase
-from orchestrator.grains.going import GoingCase
 from orchestrator.grains.loads import Geometry, Loads
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.threshold import PileThreshold, of_grains, of_pile
@@ -942,30 +941,6 @@ class Dem(Method):
         return Worn.from_csv(cases / self.runs[-1].name)
 
 
-class GoingOn(Method):
-    """A run of LIGGGHTS in which the drag is that of the relative velocity.
-
-    Attributes
-    ----------
-    geometry
-        The pile.
-    """
-
-    @cached_property
-    def run(self) -> GoingCase:
-        """The run."""
-        return GoingCase(self.geometry.scene)
-
-    @property
-    def cases(self) -> tuple[Case, ...]:
-        """The run."""
-        return (self.run,)
-
-    def motion(self, cases: Path) -> Motion:
-        """When each grain has gone on, as the finished run left it."""
-        return Motion.from_csv(cases / self.run.name)
-
-
 METHODS: dict[str, type[Method]]
 METHODS = {"local": Pivot, "pivot": Pivot, "peeling": Peeling, "dem": Dem}
 """The methods by what a study file calls them, from fast to accurate."""
@@ -993,8 +968,6 @@ class Pile(Geometry):
 
         The scene's method is not left open (``auto``).
         """
-        if self.scene.forces.drag == "relative":
-            return GoingOn(self)
         return METHODS[self.scene.method.kind](self)
 
     @cached_property
@@ -1033,8 +1006,6 @@ class Pile(Geometry):
     @property
     def case(self) -> Case:
         """The last run of LIGGGHTS, of a scene that asks for DEM."""
-        if isinstance(self.method, GoingOn):
-            return self.method.run
         assert isinstance(self.method, Dem)
         return self.method.runs[-1]
 

@@ -40,7 +40,7 @@ def goes_on(scene: Scene) -> bool:
     criterion = scene.threshold.criterion
     if criterion != AUTO:
         return criterion == GOES_ON
-    if scene.flow.gusts is not None or _is_followed(scene):
+    if scene.flow.gusts is not None or _is_single_by_dem(scene):
         return False
     if scene.fluid.is_paper or scene.grain.sizes is not None:
         return False
@@ -48,15 +48,9 @@ def goes_on(scene: Scene) -> bool:
     return is_alone and not why_not_going_on(scene)
 
 
-def _is_followed(scene: Scene) -> bool:
-    """Whether LIGGGHTS itself follows what is asked for.
-
-    It follows a single grain as it leaves, and knows none of its hops; with the drag of
-    the relative velocity it follows the hops of all grains.
-    """
-    is_single = isinstance(scene.bed, GrainBed)
-    is_relative = scene.forces.drag == "relative"
-    return scene.method.kind == "dem" and (is_single or is_relative)
+def _is_single_by_dem(scene: Scene) -> bool:
+    """Whether LIGGGHTS follows a single grain, of which it knows no hops."""
+    return scene.method.kind == "dem" and isinstance(scene.bed, GrainBed)
 
 
 class GoingOn(NamedTuple):

@@ -231,11 +231,6 @@ class Forces(Drag):
     """height at which the flow meets a grain
     - alike: every exposed grain stands z₀ above the bed, as in the paper
     - protrusion: each stands at its own height over the local bed"""
-    drag: Literal["at rest", "relative"] = _poured("at rest")
-    """velocity of which the drag on a grain is
-    - at rest: that of the fluid, as if the grain were at rest, as in the paper
-    - relative: that of the fluid at its place less its own; by DEM of level strips,
-      where a grain counts when it goes on for 20 d after a gust"""
     sheltering: Literal["none", "balanced"] = _pile("none", since=True)
     """how the exposed grains of a pile share the stress of the flow
     - none: each feels the flow as if it stood alone, as in the paper

@@ -287,28 +287,12 @@ def _check_forces(question: Question) -> None:
             raise UnfitError("forces.exposure", what, remedy)
         if forces.sheltering == "balanced":
             raise UnfitError("forces.sheltering", what, remedy)
-    if forces.drag == "relative":
-        _check_drag(question)
     if question.is_turned and question.is_poured:
         what = f"{law} turns the grain, which no method knows on a poured bed"
         raise UnfitError("forces.law", what, "choose another law")
     if question.is_turned and question.threshold.update > 0:
         what = f"{law} turns the grain, which no method knows on a bed that changes"
         raise UnfitError("threshold.update", what, OUT)
-
-
-def _check_drag(question: Question) -> None:
-    """Refuse the drag of the relative velocity but on level strips, for DEM alone."""
-    bed = question.bed
-    if not isinstance(bed, PileBed) or not bed.width or not bed.is_level:
-        what = "relative is of level strips of poured grains"
-        remedy = 'bed.shape = "flat" with bed.width, or leave it out'
-        raise UnfitError("forces.drag", what, remedy)
-    if question.unknown_to_dem:
-        raise UnfitError("forces.drag", question.unknown_to_dem, OUT)
-    if question.forces.sheltering == "balanced":
-        what = "the drags of the relative velocity always share the stress"
-        raise UnfitError("forces.sheltering", what, OUT)
 
 
 def _check_not_poured(question: Question) -> None:

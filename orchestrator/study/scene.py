@@ -187,9 +187,6 @@ def _check_kind(scene: Scene) -> None:
     law = scene.forces.law
     if kind == "local":
         _check_local(scene)
-    if scene.forces.drag == "relative" and kind not in ("auto", "dem"):
-        what = f"{kind} moves no grains"
-        raise UnfitError("forces.drag", what, LEFT_OPEN)
     if kind == "peeling" and isinstance(scene.bed, PileBed) and scene.bed.width:
         raise UnfitError("bed.width", "peeling needs a bed in a plane", OUT)
     if kind in ("dem", "peeling") and scene.is_turned:

@@ -40,7 +40,7 @@ UNTESTED = {
     *("bed.relative_size", "bed.poured_depth", "bed.width"),
     *("grain.friction_angle_deg", "grain.cohesion", "flow.gusts", "flow.towards"),
     *("forces.averaging_length", "forces.lift_coefficient", "forces.loaded_grains"),
-    *("forces.exposure", "forces.drag", "forces.sheltering"),
+    *("forces.exposure", "forces.sheltering"),
     *("method.flow.turbulence_model", "method.flow.convection_scheme"),
     *("method.flow.non_orthogonal_correctors", "method.flow.lid"),
     *("method.flow.upstream", "method.flow.downstream", "method.grains.damping"),

@@ -1,6 +1,7 @@
 """Grains that go on by LIGGGHTS: the drag in the deck, the zero level, and strips without an end."""
 
 import math
+import runpy
 import shutil
 import subprocess
 from pathlib import Path
@@ -12,16 +13,14 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from orchestrator.bed import deck, poured
-from orchestrator.errors import InputError
-from orchestrator.grains import going
 from orchestrator.physics import velocity
 from orchestrator.physics.laws import CLIFT_GAUVIN
-from orchestrator.runs.case import templates
 from orchestrator.study import study
 from orchestrator.types import FloatArray
-from tests import small_study
 from tests.waiting import HANGS_S
 
+ROOT = Path(__file__).parents[2]
+TOOL = runpy.run_path(str(ROOT / "tools" / "going.py"))
 D, GRAIN, FLUID, NU, GRAVITY = 1e-3, 2650.0, 1000.0, 1e-6, 9.81
 """The grain of the template and its fluid, SI."""
 UNIT = math.sqrt(D / (GRAVITY * (1 - FLUID / GRAIN)))
@@ -47,7 +46,7 @@ def _fluid(height: FloatArray, ustar: float) -> FloatArray:
 
 def test_a_grain_in_a_flow_moves_as_its_equation_of_motion(tmp_path: Path) -> None:
     """From rest at 20 d it falls through a gust and the mean flow after it, as in the template."""
-    case = shutil.copytree(templates() / "liggghts" / "going", tmp_path / "case")
+    case = shutil.copytree(ROOT / "tools" / "going", tmp_path / "case")
     looks = pd.read_csv(_run(case) / "samples.csv", comment="#")
     inertia = np.pi / 6 * D**3 * (GRAIN + FLUID / 2)
     weight = np.pi / 6 * D**3 * (GRAIN - FLUID) * GRAVITY
@@ -89,11 +88,11 @@ def test_a_grain_in_a_flow_moves_as_its_equation_of_motion(tmp_path: Path) -> No
     way = mean.sol(looks["time"].iloc[-1] * UNIT)[0] - gust.y[0, -1]
     assert steps["went_on"].tolist() == [1]
     assert gone["id"].tolist() == [2]
-    assert gone["way"].iloc[0] > way > going.DISTANCE * D
+    assert gone["way"].iloc[0] > way > TOOL["DISTANCE"] * D
 
 
 def test_at_the_zero_level_the_drags_add_up_to_the_stress(tmp_path: Path) -> None:
-    case = shutil.copytree(templates() / "liggghts" / "going", tmp_path / "case")
+    case = shutil.copytree(ROOT / "tools" / "going", tmp_path / "case")
     side, spacing, ustar = 6, 2, 0.02
     floor = np.indices((side, side)).reshape(2, -1).T + 0.5
     upper = spacing * np.indices((side // spacing,) * 2).reshape(2, -1).T + 1.0
@@ -142,7 +141,7 @@ def test_the_ends_of_a_strip_are_made_one(tmp_path: Path) -> None:
         columns=["x_over_d", "y_over_d", "z_over_d", "size", "fixed"],
     )
     rows.to_csv(tmp_path / poured.BED, index=False)
-    packed = poured.joined(tmp_path, 8.0, 0.5, 2, 4.0)
+    packed = TOOL["joined"](tmp_path, 8.0, 0.5, 2, 4.0)
     kept = np.column_stack([packed.centres[:, 0], packed.across]).tolist()
     # neither the grain before the strip nor the one that lies too deep is part of it
     assert [0.2, 1.0] not in kept or [7.5, 1.0] not in kept
@@ -154,7 +153,6 @@ def test_the_ends_of_a_strip_are_made_one(tmp_path: Path) -> None:
 STRIP = """
 title = "A strip"
 fluid = { density = 1000.0, viscosity = 1e-6 }
-forces = { drag = "relative" }
 [grain]
 diameter = 1e-3
 density = 2650.0
@@ -183,32 +181,11 @@ final_fraction = 0.05
 
 
 @pytest.mark.long
-def test_a_strip_is_answered_by_the_grains_that_go_on(tmp_path: Path) -> None:
-    results = small_study.run(tmp_path, STRIP)
-    (pile,) = results.plan.piles.values()
-    assert [run.kind for run in pile.method.cases] == ["going"]
-    assert pile.packing.width == 4.0
-    (row,) = results.tables["pile_threshold"].to_dict("records")
+def test_grains_of_a_strip_go_on_near_the_closed_form(tmp_path: Path) -> None:
+    (scene,) = study.parse(STRIP, name="strip", where="strip").scenes
+    steps = TOOL["run"](TOOL["GoingCase"](scene), tmp_path)
+    assert steps["went_on"].iloc[0] == 0
+    goes = steps[steps["went_on"] >= 0.05 * steps["exposed"]]
     # between half and four times the closed form
-    assert 0.5 < row["shields"] / going.GoingCase(pile.scene).closed_form < 4.0
-    # no error is known of it
-    assert not row["usable"]
-    motion = pile.motion(results.cases)
-    steps = deck.read_table(results.cases / pile.case.name / going.GOING)
-    np.testing.assert_allclose(motion.flow[1:], steps["flow"])
-    assert 0 < motion.moved[-1] <= steps["went_on"].sum()
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "field"),
-    [
-        ("width = 4.0\n", "", "forces.drag"),
-        ('kind = "dem"', 'kind = "pivot"', "forces.drag"),
-        ('"relative"', '"relative", sheltering = "balanced"', "forces.sheltering"),
-    ],
-)
-def test_other_beds_and_methods_have_no_relative_drag(
-    old: str, new: str, field: str
-) -> None:
-    with pytest.raises(InputError, match=field):
-        study.parse(STRIP.replace(old, new), name="strip", where="strip")
+    assert 0.5 < goes["shields"].iloc[0] / goes["closed_form"].iloc[0] < 4.0
+    assert (steps["went_on"] <= steps["moved"]).all()

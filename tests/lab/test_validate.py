@@ -150,7 +150,7 @@ UNTESTED: dict[str, Any] = {
     **{"forces.law": "profile", "forces.lift_coefficient": 1.0},
     **{"forces.loaded_grains": "all but crest", "forces.sheltering": "balanced"},
     **{"method.kind": "dem", "threshold.fractions": (0.3,)},
-    **{"forces.drag": "relative", "threshold.criterion": "goes on"},
+    **{"threshold.criterion": "goes on"},
 }
 """Other values of the fields of a strip for which none was tested."""
 

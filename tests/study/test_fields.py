@@ -40,13 +40,6 @@ NEEDED: dict[str, dict[str, Any]] = {
     "bed.spacing": {"bed.forms": 3, "bed.spacing": 0.5},
     "bed.counted": {"bed.counted": "windward"},
     "bed.width": {"bed.packing": "poured", "bed.width": 5.0},
-    "forces.drag": {
-        "bed.packing": "poured",
-        "bed.shape": "flat",
-        "bed.slope_deg": 0.0,
-        "bed.width": 5.0,
-        "method.flow.model": "flat",
-    },
     "flow.top": {"flow.top": "open water", "flow.depth": 1.0},
     "flow.depth": {"flow.top": "open water", "flow.depth": 1.0},
     "flow.gusts": {"method.kind": "pivot"},

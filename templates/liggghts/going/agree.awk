@@ -1,1 +1,0 @@
-../bed/agree.awk

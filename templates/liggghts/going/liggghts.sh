@@ -1,1 +1,0 @@
-../bed/liggghts.sh

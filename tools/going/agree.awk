@@ -1,0 +1,1 @@
+../../templates/liggghts/bed/agree.awk
