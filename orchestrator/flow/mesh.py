@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from orchestrator.bed.line import BedLine
 from orchestrator.digits import FORMAT, whole_up
@@ -40,6 +41,8 @@ LEVEL = 1e-9
 """Rise of a piece, h, below which it is level."""
 NO_BEND_DEG = 1e-9
 """Bend, degrees, below which the bed does not bend."""
+ALIKE = 1e-6
+"""Growth of the cells of a piece below which they are alike."""
 STEADY = 1e-9
 """Difference from 1 below which a ratio of cells is 1."""
 GROUPS = frozenset({"air", "bed", "lid", "inlet", "outlet", "sides"})
@@ -218,7 +221,7 @@ def along(line: BedLine, slope_deg: float, cells_per_face: int, growth: float) -
     face = line.h / tan(radians(slope_deg)) if slope_deg else 4 * line.h
     cell = face / cells_per_face
     # A face has a short cell at its sharp top, and this one at its foot.
-    face_ratio = ratio_of(cells_per_face, TOP * cell, face)
+    face_ratio = float(ratio_of(cells_per_face, TOP * cell, face))
     foot = cell
     if slope_deg:
         foot = TOP * cell * face_ratio ** (cells_per_face - 1)
@@ -227,9 +230,7 @@ def along(line: BedLine, slope_deg: float, cells_per_face: int, growth: float) -
     line = _divided(line.with_corners(inside), cell)
     sizes = _sizes(line, cell, foot, max(growth, face_ratio))
     lengths = np.diff(line.x)
-    inner = []
-    for at in range(1, len(lengths) - 1):
-        inner.append(_piece(lengths[at], sizes[at], sizes[at + 1]))
+    inner = _pieces(lengths[1:-1], sizes[1:-2], sizes[2:-1])
     far = growth_far(growth, cells_per_face)
     upstream = _away(lengths[0], inner[0].first_cell(lengths[1]), far)
     last_cell = inner[-1].reversed().first_cell(lengths[-2])
@@ -237,43 +238,51 @@ def along(line: BedLine, slope_deg: float, cells_per_face: int, growth: float) -
     return Grid(line, (upstream.reversed(), *inner, downstream))
 
 
-def ratio_of(cells: int, first: float, length: float) -> float:
-    """The ratio of neighbouring cells that fill a length.
+def ratio_of(cells: ArrayLike, first: ArrayLike, length: ArrayLike) -> FloatArray:
+    """The ratios of neighbouring cells that fill lengths.
 
     Parameters
     ----------
     cells
-        How many there are.
+        How many cells there are in each length.
     first
         Length of the first one.
     length
-        The length that they fill, in the same unit.
+        The length that they fill, in the same unit. The three broadcast.
 
     Returns
     -------
-    float
-        The ratio, at least 1.
+    FloatArray
+        The ratios, below 1 where even cells would not find room. It is 1 for a cell
+        alone, and where the first cell is as long as the whole.
 
     Examples
     --------
-    >>> round(ratio_of(3, 1.0, 7.0), 9)
-    2.0
+    >>> ratio_of(3, 1.0, [7.0, 3.0, 1.75]).round(9).tolist()
+    [2.0, 1.0, 0.5]
     """
-    if cells < 2 or first * cells >= length:
-        return 1.0
+    from scipy.optimize.elementwise import find_root  # slow to import: no page waits
 
-    def beyond(ratio: float) -> float:
-        return first * float(expm1(cells * log(ratio))) / (ratio - 1) - length
+    count, start, whole = np.broadcast_arrays(
+        np.asarray(cells, float), np.asarray(first, float), np.asarray(length, float)
+    )
+    ratios = np.ones(count.shape)
+    grow = (count > 1) & (start < whole)
+    given = count[grow], start[grow] / whole[grow]
+    # An endless series fills the length at the lower end, the last cell alone at the
+    # upper one.
+    ends = 1 - given[1], given[1] ** (1 / (1 - given[0]))
+    ratios[grow] = find_root(_beyond, ends, args=given).x
+    # Cells that fill all but the last digits of a length are alike.
+    return np.where(np.abs(ratios - 1) < STEADY, 1.0, ratios)
 
-    # cells that fill all but the last digits of a length are alike
-    if beyond(1 + STEADY) >= 0:
-        return 1.0
 
-    from scipy.optimize import brentq  # a third of a second, for which no page waits
-
-    # The last cell alone would fill the length at the upper end.
-    most = (length / first) ** (1 / (cells - 1))
-    return float(brentq(beyond, 1 + STEADY, most, xtol=1e-15))
+def _beyond(ratio: FloatArray, count: FloatArray, first: FloatArray) -> FloatArray:
+    """How far cells reach beyond a length of 1."""
+    are_alike = ratio == 1
+    growth = np.where(are_alike, 1.0, ratio - 1)
+    over_first = np.expm1(count * np.log(ratio)) / growth
+    return np.asarray(first * np.where(are_alike, count, over_first) - 1)
 
 
 def _is_level(line: BedLine) -> BoolArray:
@@ -318,28 +327,36 @@ def _sizes(line: BedLine, cell: float, foot: float, growth: float) -> FloatArray
     return sizes
 
 
-def _piece(length: float, start: float, end: float) -> Piece:
-    """The piece whose first and last cells are about `start` and `end`."""
-    shorter = min(start, end)
-    longer = max(start, end)
+def _pieces(lengths: FloatArray, starts: FloatArray, ends: FloatArray) -> list[Piece]:
+    """The pieces whose first and last cells are about `starts` and `ends`."""
+    counts = []
+    for length, start, end in zip(lengths, starts, ends, strict=True):
+        counts.append(_count(length, min(start, end), max(start, end)))
+    shorter = np.minimum(starts, ends)
+    cells = np.array(counts)
+    ratios = ratio_of(cells, shorter, lengths)
+    ratios[(cells < 3) | (ratios < 1 + ALIKE)] = 1.0
+    falling = starts > ends
+    ratios[falling] = 1 / ratios[falling]
+    return list(map(Piece, counts, ratios.tolist()))
+
+
+def _count(length: float, shorter: float, longer: float) -> int:
+    """How many cells fill a length, if they grow from one to the other."""
     if longer >= length:
-        return Piece(1, 1.0)
+        return 1
     ratio = (length - shorter) / (length - longer)
     if ratio - 1 < STEADY:
         count = length / shorter
     else:
         count = 1 + log(longer / shorter) / log(ratio)
-    cells = max(whole_up(count), 1)
-    if cells < 3 or ratio - 1 < 1e-6 or shorter * cells >= length:
-        return Piece(cells, 1.0)
-    growing = Piece(cells, ratio_of(cells, shorter, length))
-    return growing if start <= end else growing.reversed()
+    return max(whole_up(count), 1)
 
 
 def _away(length: float, first: float, growth: float) -> Piece:
     """Cells that begin with `first` and grow until they fill a length."""
     cells = whole_up(log(1 + length * (growth - 1) / first) / log(growth))
-    return Piece(cells, ratio_of(cells, first, length))
+    return Piece(cells, max(float(ratio_of(cells, first, length)), 1.0))
 
 
 def made_by_gmsh(directory: Path) -> "meshio.Mesh":

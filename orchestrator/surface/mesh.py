@@ -31,8 +31,6 @@ FIRST_CELL = 1 / 40
 """Height of the cells on the bed, in heights of the form."""
 STEEPEST = 2.0
 """Largest tangent of a slope along which a first cell is made higher: 63 degrees."""
-BISECTIONS = 60
-"""Steps in which the ratio of neighbouring cells of a column is found: all digits."""
 BACKWARDS = [0, 3, 2, 1]
 """Corners of a face as they are seen from its other side."""
 
@@ -115,41 +113,6 @@ def wind_axes(from_deg: float) -> FloatArray:
     return np.round([[east, north], [-north, east]], 12) + 0.0
 
 
-def ratios(first: FloatArray, length: FloatArray, count: int) -> FloatArray:
-    """Find the ratios at which cells fill columns.
-
-    Parameters
-    ----------
-    first
-        Height of the lowest cell of each column, m.
-    length
-        Height of each column, m, of the same shape.
-    count
-        Number of cells of a column.
-
-    Returns
-    -------
-    FloatArray
-        Height of each cell over that of the one below it, of the same shape.
-
-    Examples
-    --------
-    >>> ratios(np.array([1.0]), np.array([7.0]), 3).round(9).tolist()
-    [2.0]
-    """
-    low = np.full_like(first, 0.5)
-    high = np.full_like(first, 4.0)
-    for _ in range(BISECTIONS):
-        middle = (low + high) / 2
-        filled = first
-        for _ in range(count - 1):
-            filled = filled * middle + first
-        is_short = filled < length
-        low = np.where(is_short, middle, low)
-        high = np.where(is_short, high, middle)
-    return (low + high) / 2
-
-
 def axis(
     start: float, end: float, cell: float, before: float, behind: float, growth: float
 ) -> FloatArray:
@@ -183,7 +146,7 @@ def _outwards(cell: float, length: float, growth: float) -> FloatArray:
     """Ends of cells that grow from a cell of the given length, which they follow, m."""
     first = cell * growth
     count = _count(first, length, growth)
-    ratio = ratio_of(count, first, length)
+    ratio = max(float(ratio_of(count, first, length)), 1.0)
     ends = np.cumsum(ratio ** np.arange(count))
     return np.asarray(ends * length / ends[-1])
 
@@ -326,7 +289,7 @@ class Columns:
         steepness = np.minimum(np.hypot(slope_x, slope_y), STEEPEST)
         first = self.first_cell * np.sqrt(1 + steepness**2)
         length = self.lid - self.bed
-        ratio = ratios(first, length, self.count)
+        ratio = ratio_of(self.count, first, length)
         powers = ratio[..., None] ** np.arange(self.count)
         heights = np.cumsum(powers, axis=-1)
         heights *= (length / heights[..., -1])[..., None]

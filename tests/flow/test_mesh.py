@@ -153,3 +153,14 @@ def test_beds_and_settings_without_a_mesh_are_refused_with_their_field(
 
 def test_cells_that_fill_a_length_but_for_round_off_are_alike() -> None:
     assert ratio_of(5, 0.09999999999999987, 0.5) == 1.0
+
+
+def test_cells_fill_lengths() -> None:
+    first = np.array([0.01, 0.1, 0.5])
+    length = np.array([2.0, 2.0, 2.0])
+    ratio = ratio_of(20, first, length)
+    powers = ratio[:, None] ** np.arange(20)
+    filled = first * powers.sum(axis=1)
+    np.testing.assert_allclose(filled, length, rtol=1e-12)
+    assert ratio[2] < 1 < ratio[0]
+    assert ratio[1] == pytest.approx(1.0, abs=1e-12)

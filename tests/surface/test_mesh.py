@@ -164,14 +164,3 @@ def test_the_wind_blows_from_where_it_comes(
     # to the left: a quarter of a turn against the clock
     np.testing.assert_array_equal(axes[1], (-along[1], along[0]))
     assert not np.signbit(axes[axes == 0]).any()
-
-
-def test_columns_are_filled() -> None:
-    first = np.array([0.01, 0.1, 0.5])
-    length = np.array([2.0, 2.0, 2.0])
-    ratio = mesh.ratios(first, length, 20)
-    powers = ratio[:, None] ** np.arange(20)
-    filled = first * powers.sum(axis=1)
-    np.testing.assert_allclose(filled, length, rtol=1e-12)
-    assert ratio[2] < 1 < ratio[0]
-    assert ratio[1] == pytest.approx(1.0, abs=1e-12)
