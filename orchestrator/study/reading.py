@@ -19,7 +19,7 @@ from orchestrator.physics import fluids
 from orchestrator.study import units
 from orchestrator.study.declare import Part, UnfitError
 from orchestrator.study.fields import FIDELITY, PARTS, default_of, table_of
-from orchestrator.study.keys import GONE_KEYS, GONE_VALUES, Table, Tables
+from orchestrator.study.keys import Table, Tables
 from orchestrator.study.profile import LARGEST_NUMBER
 
 TIME_LIMIT_S = 3600.0
@@ -323,9 +323,6 @@ def explained(
     names = [str(step) for step in path if step not in TAGS]
     name = ".".join(names)
     value = first.get("input")
-    gone = _gone(name, value, where)
-    if gone is not None:
-        return gone
     place = f"{where}: {name}"
     if first["type"] == "missing":
         return InputError(MISSING, place, "add it to the file")
@@ -335,21 +332,7 @@ def explained(
     if known is not None:
         what, remedy = known
         return InputError(what, place, remedy)
-    return InputError(UNKNOWN, place, _meant(names, own, tables))
-
-
-def _gone(name: str, value: Any, where: str) -> InputError | None:
-    """The refusal of a key or a value that study files had before.
-
-    It is None for any other.
-    """
-    if name in GONE_KEYS:
-        what, remedy = GONE_KEYS[name]
-        return InputError(what, f"{where}: {name}", remedy)
-    if isinstance(value, str) and (name, value) in GONE_VALUES:
-        what, remedy = GONE_VALUES[name, value]
-        return InputError(f"{value!r}: {what}", f"{where}: {name}", remedy)
-    return None
+    return InputError(UNKNOWN, place, _meant(names, value, own, tables))
 
 
 def _not_accepted(value: Any, message: str, place: str) -> InputError:
@@ -363,9 +346,15 @@ def _not_accepted(value: Any, message: str, place: str) -> InputError:
 
 
 def _meant(
-    names: Sequence[str], keys: Sequence[str], tables: Mapping[str, type[Part]]
+    names: Sequence[str],
+    value: Any,
+    keys: Sequence[str],
+    tables: Mapping[str, type[Part]],
 ) -> str:
-    """The key that an unknown one is nearest to, or the page that lists all."""
+    """The key that an unknown one is nearest to, or the page that lists all.
+
+    Of an unknown table its name is compared first, then the keys in it.
+    """
     here = ".".join(names[:-1])
     written = {}
     for key in keys:
@@ -380,7 +369,8 @@ def _meant(
         keys = [*tables[here].model_fields]
     for key in keys:
         written[key] = key
-    close = difflib.get_close_matches(names[-1], written, n=1)
-    if not close:
-        return "known keys: docs/study-file.md"
-    return f"did you mean {written[close[0]]}?"
+    words = [names[-1], *(value if isinstance(value, dict) else ())]
+    for word in words:
+        for near in difflib.get_close_matches(word, written, n=1):
+            return f"did you mean {written[near]}?"
+    return "known keys: docs/study-file.md"

@@ -27,7 +27,7 @@ from orchestrator.study.declare import List, Part, UnfitError
 from orchestrator.study.fidelities import AUTO, fields_of
 from orchestrator.study.fields import FIELDS, PARTS, SEED, default_of
 from orchestrator.study.hints import HINTS
-from orchestrator.study.keys import Table, Tables, by_name, check_moved, nested
+from orchestrator.study.keys import Table, Tables, by_name, nested
 from orchestrator.study.parts import Erosion, PileBed, Sizes, percentile
 from orchestrator.study.profile import WITH_X, Files
 from orchestrator.study.reading import (
@@ -292,7 +292,6 @@ def parse(text: str, *, name: str, where: str, files: Files | None = None) -> St
         With the field and the remedy.
     """
     data = tables_of(text, where)
-    _check_keys(data, where)
     try:
         file = _File.model_validate(data)
     except ValidationError as error:
@@ -377,17 +376,6 @@ def _check_effect(names: Sequence[str], scenes: Sequence[Scene], where: str) -> 
         if any(each.read(scene) != default_of(each.name) for scene in scenes):
             what = f"it has an effect on {each.info.scope} alone"
             raise InputError(what, f"{where}: {each.name}", "leave it out")
-
-
-def _check_keys(data: Mapping[str, Any], where: str) -> None:
-    """Refuse keys that study files had before, at the top and in the groups."""
-    check_moved(data, where)
-    groups = data.get("group")
-    if not isinstance(groups, list):
-        return
-    for number, group in enumerate(groups):
-        if isinstance(group, dict):
-            check_moved(group, place_of(where, number))
 
 
 def _axes(file: "_File", table: "_Group", where: str) -> dict[str, list[Any]]:

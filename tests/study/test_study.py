@@ -1,5 +1,6 @@
 """Study files: what they mean, and the refusal of each way in which they can be wrong."""
 
+import re
 import subprocess
 import sys
 import warnings
@@ -15,7 +16,6 @@ from orchestrator.grains.loads import Geometry
 from orchestrator.physics.laws import LAWS
 from orchestrator.runs.files import canonical_json
 from orchestrator.study import closed_form, fields, parts, study
-from orchestrator.study.keys import MOVED
 from orchestrator.study.parts import Forces, Grain, GrainBed
 from orchestrator.study.scene import Scene
 
@@ -152,7 +152,7 @@ BAD = [
     (
         "[protocol]\ngravity = 3.7\n",
         "protocol",
-        "what counts as motion is in [threshold]",
+        "did you mean fluid.gravity?",
     ),
     (f"name = 'one'\n{GRAIN}", "name", "known keys"),
     ("gravity = 3.7\n", "gravity", "did you mean fluid.gravity?"),
@@ -170,12 +170,10 @@ BAD = [
     (f"{PILE}surface = 'a.tif'\n", "bed.surface", "beds in three dimensions alone"),
     (f"{PILE}[flow]\nfrom_deg = 90.0\n", "flow.from_deg", "beds in three dimensions"),
     (f"{PILE}[method.flow]\nlevel = 'coarse'\n", "method.flow.level", "dimensions"),
-    (f"{PILE}[flow]\nnodes = true\n", "flow.nodes", "method.flow.roughness"),
-    (f"{PILE}[flow]\nnodes = false\n", "flow.nodes", "leave it out"),
     (
         f'{PILE}[axes]\n"method.flow.model" = ["hill"]\n',
         "method.flow.model",
-        'write "waves"',
+        "'solve', 'waves' or 'flat'",
     ),
     (PILE + "height = 2e-3\n", "bed.height", "at least 0.005 m"),
     (
@@ -343,25 +341,39 @@ def test_presets_are_studies_and_are_read_without_what_solves_them() -> None:
     assert ended.stdout.split() == []
 
 
-def test_a_key_that_moved_is_refused_with_the_new_one() -> None:
-    """At the top, in a group and on an axis, each of all keys."""
-    for old, new in MOVED.items():
-        table, _, key = old.partition(".")
-        for text, where in (
-            (f"{PILE}[{table}]\n", ""),
-            (f"{GRAIN}[[group]]\n[group.{table}]\n", "group 1: "),
-        ):
-            if f"[{table}]" in text.replace(f"[{table}]\n", "", 1):
-                text = f"[{table}]\n"
-            with pytest.raises(InputError, match=f"it is now {new}") as caught:
-                _parse(f"{text}{key} = 1\n")
-            assert caught.value.where == f"test.toml: {where}{old}"
-        with pytest.raises(InputError, match=f"it is now {new}") as caught:
-            _parse(f"{PILE}[axes]\n'{old}' = [1]\n")
-        assert caught.value.where == f"test.toml: axes.{old}"
-        # and the new one is one of a study file
-        moved_to, _, name = new.rpartition(".")
-        assert new == fields.FIDELITY or name in fields.PARTS[moved_to].model_fields
+ELSEWHERE = {
+    "grain.stiffness": "method.grains.stiffness",
+    "bed.mobile_layers": "method.grains.mobile_layers",
+    "flow.model": "method.flow.model",
+    "flow.lid": "method.flow.lid",
+    "flow.roughness": "bed.roughness",
+    "protocol.fidelity": "method.fidelity",
+    "protocol.fractions": "threshold.fractions",
+    "protocol.time_step": "method.grains.time_step",
+    "threshold.gravity": "fluid.gravity",
+    "method.height": "bed.height",
+}
+"""Keys in a table that has none of that name, and where they are."""
+
+
+@pytest.mark.parametrize(("written", "meant"), ELSEWHERE.items())
+def test_a_key_in_another_table_is_refused_with_its_own(
+    written: str, meant: str
+) -> None:
+    """At the top and in a group, also where the table itself is unknown."""
+    remedy = re.escape(f"unknown key (did you mean {meant}?)")
+    for text in (f"{D}bed.kind = 'pile'\n", f"{D}[[group]]\n"):
+        with pytest.raises(InputError, match=remedy):
+            _parse(f"{text}{written} = 1\n")
+
+
+@pytest.mark.parametrize("field", [each.name for each in fields.FIELDS])
+def test_a_misspelt_key_is_refused_with_the_known_one(field: str) -> None:
+    table, _, key = field.rpartition(".")
+    misspelt = key[0] + key
+    needed = "" if table == "grain" else D
+    with pytest.raises(InputError, match=rf"unknown key \(did you mean {key}\?"):
+        _parse(f"{needed}{table}.{misspelt} = 1\n")
 
 
 def test_the_question_does_not_depend_on_the_method() -> None:
