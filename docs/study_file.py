@@ -108,7 +108,6 @@ LIMITS = {
     ),
     "method.grains.damping": (f"below {limits.LEAST_DAMPING:g} in DEM", "0.1"),
     "method.grains.time_step": (f"above {DAMPED}", "lower it"),
-    "forces.law": ("`zeng-torque` by peeling or DEM", "the method `auto` or `pivot`"),
     "flow.gusts": ("DEM of single grains", "the method `auto` or `pivot`"),
     "grain.cohesion": ("by DEM", "the method `auto`, `peeling` or `pivot`"),
 }

@@ -41,7 +41,7 @@ from orchestrator.physics.beside import (
     OF_STRIPS,
 )
 from orchestrator.physics.constants import GRAVITY
-from orchestrator.physics.laws import LAWS
+from orchestrator.physics.laws import DEFAULT, LAWS
 from orchestrator.physics.threshold import PAPER
 from orchestrator.study import fields as columns
 from orchestrator.study import study
@@ -60,7 +60,7 @@ IN_AIR = (0.35, 52.0)
 DECADES = (0.1, 1.0, 10.0, 100.0, 1000.0, 1e4)
 LEAST = 10
 """Ranges of Re* of the intervals, and the fewest rows of one."""
-GOING_ON = ("bridged", "bridged-gravel")
+GOING_ON = (DEFAULT, LAWS[DEFAULT].goes_on)
 """Force laws of the grains that go on whose intervals are found: those of the default."""
 BETAS = {60.0: (55.0, 60.0), 50.0: (47.5, 55.0), 45.0: (42.5, 47.5)}
 """Entrainment angles of the intervals, deg, each with the range that it stands for."""

@@ -24,7 +24,7 @@ from orchestrator.errors import InputError
 from orchestrator.physics import saltation, verdict
 from orchestrator.physics.beside import beside, measured_level_ustar
 from orchestrator.physics.constants import GAS_BELOW, GRAIN_COLUMNS
-from orchestrator.physics.laws import LAWS, Exposure, law
+from orchestrator.physics.laws import DEFAULT, LAWS, Exposure, law
 from orchestrator.physics.threshold import (
     AUTO,
     LAWS_OF,
@@ -134,7 +134,7 @@ def _of_all_laws(grains: Table, asked: str, criterion: str) -> Table:
     inputs = {each.column: grains[name] for name, each in PARAMETERS.items()}
     by_law = {name: _threshold(name, exposure, grains) for name in LAWS}
     regimes = regime(by_law["low"], by_law["high"]).astype(object)
-    picked = _picked(asked, regimes, by_law["bridged"].friction_velocity, exposure)
+    picked = _picked(asked, regimes, by_law[DEFAULT].friction_velocity, exposure)
     hopping = _hopping(grains) if criterion == GOES_ON else None
     level = _level_ustar(grains, criterion, by_law, hopping)
     blocks = []
@@ -448,7 +448,7 @@ def _picked(
     ustar: FloatArray,
     exposure: Exposure,
 ) -> list[tuple[str, ...]]:
-    """The laws that answer each point; `ustar` is its threshold under `bridged`."""
+    """The laws that answer each point; `ustar` is its threshold under `DEFAULT`."""
     if asked == PAPER:
         return [LAWS_OF[regime] for regime in regimes]
     if asked == AUTO:

@@ -360,8 +360,6 @@ def method_of(scene: Scene) -> tuple[str, str]:
         return "dem", "by DEM: a single grain"
     if is_along(scene):
         return "local", ALONG
-    if scene.is_turned:
-        return "pivot", f"by pivots: {unknown}"
     if unknown and bed.width:
         return "pivot", f"by pivots: {unknown}, peeling no bed in space"
     if unknown:

@@ -833,8 +833,7 @@ class Loads:
     def _by_tables(self) -> FloatArray:
         """Local mean u* (m/s) at which each counted grain of a lattice rolls.
 
-        By drag and lift of the tables of forces, as in peeling, without a torque of the
-        law.
+        By drag and lift of the tables of forces, as in peeling.
         """
         scene = self.geometry.scene
         beta = np.radians(scene.pocket_angle_deg)

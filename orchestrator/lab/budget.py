@@ -172,14 +172,14 @@ class _FirstCell(Choice):
 
 
 class _ForceLaw(Choice):
-    """The force law: every law that holds, but for those whose torque peeling lacks."""
+    """The force law: every law that holds and takes part in the interval of a grain."""
 
     def _holds(self, other: Scene) -> bool:
         return law_holds(other)
 
     def _alternatives(self, scene: Scene) -> dict[str, Fields]:
-        plain = {name: law for name, law in LAWS.items() if not law.turns}
-        return {law.label: {self.field: name} for name, law in plain.items()}
+        compared = [law for law in LAWS.values() if law.in_interval]
+        return {law.label: {self.field: law.name} for law in compared}
 
 
 class _Packing(Choice):

@@ -1,6 +1,7 @@
 """Force laws: the forces of the flow on an exposed grain, and their ranges.
 
-A new law is a subclass of `ForceLaw` and an entry in `LAWS`.
+A new law is a subclass of `ForceLaw` and an entry in `LAWS`. It takes part in the
+interval of an answer only where its class says so.
 """
 
 from abc import ABC, abstractmethod
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from orchestrator.errors import InputError
 from orchestrator.physics import velocity
-from orchestrator.physics.constants import INVERSE_KARMAN, LIFT_COEFFICIENT
+from orchestrator.physics.constants import LIFT_COEFFICIENT
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
 _EQUATIONS = "Eqs. 2 and 4 of the paper"
@@ -322,10 +323,11 @@ def reasons(ranges: Iterable[Validity], count: int) -> list[str]:
 
 
 class ForceLaw(ABC):
-    """Drag along the bed, lift normal to it and a torque, as functions of u*.
+    """Drag along the bed and lift normal to it, as functions of u*.
 
     All methods are vectorised: the friction velocity `ustar` (m/s, >= 0) and the fields
-    of the exposure `at` broadcast, and the results have the broadcast shape.
+    of the exposure `at` broadcast, and the results have the broadcast shape. Whether a
+    law is `in_interval` is a keyword of its class, which no subclass inherits.
 
     Attributes
     ----------
@@ -343,10 +345,11 @@ class ForceLaw(ABC):
         Particle Reynolds number at which the drag law ends.
     goes_on
         Name of the law of the same flow whose drag law goes on there; empty for none.
-    turns
-        Whether the flow also turns the grain about its centre.
     protrudes
         Whether a grain's own height over the bed matters.
+    in_interval
+        Whether its threshold takes part in the interval of a single grain, which is the
+        range of such laws where nothing was measured.
 
     Examples
     --------
@@ -364,8 +367,12 @@ class ForceLaw(ABC):
     drag_law: ClassVar[str] = "the drag law"
     drag_end: ClassVar[float] = np.inf
     goes_on: ClassVar[str] = ""
-    turns: ClassVar[bool] = False
     protrudes: ClassVar[bool] = False
+    in_interval: ClassVar[bool]
+
+    def __init_subclass__(cls, *, in_interval: bool = False) -> None:
+        super().__init_subclass__()
+        cls.in_interval = in_interval
 
     @abstractmethod
     def speed(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
@@ -417,23 +424,6 @@ class ForceLaw(ABC):
         FloatArray
             Lift, N.
         """
-
-    def torque(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
-        """Compute the torque of the flow about the grain's centre; none by default.
-
-        Parameters
-        ----------
-        ustar
-            Friction velocity, m/s.
-        at
-            The grain and the fluid.
-
-        Returns
-        -------
-        FloatArray
-            Torque, N m, positive where it rolls the grain with the flow.
-        """
-        return at.zeros(ustar)
 
     def particle_reynolds(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
         """Compute the particle Reynolds number V d/nu.
@@ -546,9 +536,9 @@ class DragAndSaffman(ForceLaw):
 
     sphere: ClassVar[SphereDrag]
 
-    def __init_subclass__(cls) -> None:
+    def __init_subclass__(cls, *, in_interval: bool = False) -> None:
         """Take the name and the end of the drag from the sphere's."""
-        super().__init_subclass__()
+        super().__init_subclass__(in_interval=in_interval)
         cls.drag_law = cls.sphere.name
         cls.drag_end = cls.sphere.highest
 
@@ -590,7 +580,7 @@ class DragAndSaffman(ForceLaw):
         return np.asarray(scale * speed * np.sqrt(shear))
 
 
-class Low(DragAndSaffman):
+class Low(DragAndSaffman, in_interval=True):
     """Stokes' drag and Saffman's lift on the linear profile u = z u*^2/nu (Eq. 2)."""
 
     name = "low"
@@ -607,7 +597,7 @@ class Low(DragAndSaffman):
         return speed, shear
 
 
-class High(DragAndSaffman):
+class High(DragAndSaffman, in_interval=True):
     """Schiller and Naumann's drag and Saffman's lift on the log profile (Eq. 4)."""
 
     name = "high"
@@ -627,7 +617,7 @@ class High(DragAndSaffman):
         return np.multiply(ustar, speed), np.multiply(ustar, shear)
 
 
-class Bridged(DragAndSaffman):
+class Bridged(DragAndSaffman, in_interval=True):
     """Drag and lift where viscosity and turbulence carry the stress together.
 
     At the scale of the grain ``ustar^2 = nu V/(d/2 + z0) + (V/c_V)^2`` and
@@ -654,7 +644,7 @@ class Bridged(DragAndSaffman):
         return speed, shear
 
 
-class BridgedGravel(Bridged):
+class BridgedGravel(Bridged, in_interval=True):
     """The bridged flow with a drag that goes on to a particle Reynolds number of 3e5.
 
     Coarse sand and gravel in water lie beyond Schiller and Naumann's 1000; Clift and
@@ -672,7 +662,7 @@ class BridgedGravel(Bridged):
     sphere = CLIFT_GAUVIN
 
 
-class Profile(DragAndSaffman):
+class Profile(DragAndSaffman, in_interval=True):
     """Drag and lift on van Driest's profile over a rough wall.
 
     The drag is Schiller and Naumann's, the lift Saffman's. Speed and shear are averaged
@@ -706,93 +696,17 @@ class Profile(DragAndSaffman):
         return (*super().ranges(ustar, at), rough)
 
 
-_ZENG_ET_AL = "L. Zeng, F. Najjar, S. Balachandar and P. Fischer"
-
-
-class Zeng(ForceLaw):
-    """Drag and lift on a sphere at a wall in shear; the lift is that in contact.
-
-    C_D is that of a gap z0 under the grain (their Eqs. 13 and 14), C_L that of no gap
-    (Eq. 19). The simulations have a linear profile and no roughness. Here the speed at
-    the centre is bridged between that of the linear and that of the logarithmic profile
-    at the height d/2 + z0. Above Re* of about 10, where the profile bends, it is an
-    extrapolation. The lift ignores `lift_coefficient`.
-
-    The coefficients, the equations' numbers and the limit 5.87 of C_L at Re -> 0
-    (Leighton and Acrivos, 1985) agree with waLBerla (ForcesOnSphereNearPlane), which
-    takes Re from the speed at the centre as here.
-    """
-
-    name = "zeng"
-    label = "Zeng et al. 2009, no torque"
-    reference = f"{_ZENG_ET_AL}, Phys. Fluids 21, 033302, 2009"
-    drag_law = "Zeng et al."
-    drag_end = 200.0
-
-    def speed(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
-        """Speed at the grain's centre, m/s."""
-        viscous_length = velocity.viscous_length(at.diameter, at.gap)
-        viscous = np.asarray(at.viscosity / viscous_length)
-        rough = np.asarray(INVERSE_KARMAN * np.log1p(0.5 / at.ratio))
-        return velocity.bridge(np.asarray(ustar, float), viscous, rough)
-
-    def drag(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
-        """Drag, N."""
-        gap = at.ratio
-        speed = self.speed(ustar, at)
-        reynolds = speed * at.diameter / at.viscosity
-        wall = 1 + 0.138 * np.exp(-2 * gap) + 9 / (16 * (1 + 2 * gap))
-        factor = 0.15 - 0.046 * (1 - 0.16 * gap**2) * np.exp(-0.7 * gap)
-        exponent = 0.687 + 0.066 * (1 - 0.76 * gap**2) * np.exp(-(gap**0.9))
-        stokes = 3 * np.pi * at.fluid_density * at.viscosity * at.diameter * speed
-        return np.asarray(stokes * wall * (1 + factor * reynolds**exponent))
-
-    def lift(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
-        """Lift in contact with the wall, N."""
-        speed = self.speed(ustar, at)
-        reynolds = speed * at.diameter / at.viscosity
-        coefficient = 3.663 / (reynolds**2 + 0.1173) ** 0.22
-        pressure_area = np.pi / 8 * at.fluid_density * at.diameter**2 * speed**2
-        return np.asarray(pressure_area * coefficient)
-
-
-class ZengTorque(Zeng):
-    """The same forces, and the torque of the drag about the grain's centre.
-
-    The shear pulls more at the top than at the bottom: the drag of a sphere that
-    touches the wall in creeping flow acts 0.37 R above the centre, 0.944
-    (4 pi mu G R^3) over 1.7005 (6 pi mu G R^2) (M. E. O'Neill, 1968; A. J. Goldman et
-    al., 1967, doi:10.1016/0009-2509(67)80048-4). Both numbers agree with a public table
-    after the second; 1.7005 is also the limit of Zeng's drag. The arm is kept at every
-    Reynolds number.
-
-    Attributes
-    ----------
-    arm
-        Torque over drag, d.
-    """
-
-    name = "zeng-torque"
-    label = "Zeng et al. 2009, with torque"
-    turns = True
-    arm: ClassVar[float] = 2 * 0.944 / (3 * 1.7005) / 2
-
-    def torque(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
-        """Torque about the centre, N m."""
-        return np.asarray(self.arm * at.diameter * self.drag(ustar, at))
-
-
 _EVERY: tuple[ForceLaw, ...] = (
     Low(),
     High(),
     Bridged(),
     BridgedGravel(),
     Profile(),
-    Zeng(),
-    ZengTorque(),
 )
 LAWS: dict[str, ForceLaw] = {each.name: each for each in _EVERY}
 """Every force law by its name."""
+DEFAULT = Bridged.name
+"""The law where none is asked for, up to the end of its drag; then its `goes_on`."""
 
 
 def law(name: str) -> ForceLaw:

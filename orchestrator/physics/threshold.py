@@ -8,7 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from orchestrator.physics.constants import GRAIN_COLUMNS, GRAVITY, LIFT_COEFFICIENT
-from orchestrator.physics.laws import LAWS, Exposure, ForceLaw, Validity, reasons
+from orchestrator.physics.laws import (
+    DEFAULT,
+    LAWS,
+    Exposure,
+    ForceLaw,
+    Validity,
+    reasons,
+)
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
 Regime = Literal["low", "high", "transition"]
@@ -19,10 +26,7 @@ LAWS_OF: dict[Regime, tuple[str, ...]] = {
 }
 """Names of the laws that the paper's rule picks in each regime."""
 AUTO = "auto"
-"""The default force law.
-
-It is `bridged`, or `bridged-gravel` where the drag law of that ends.
-"""
+"""The default force law: `DEFAULT`, or that which it goes on with."""
 PAPER = "paper"
 """The paper's rule as a force law: Eq. 2 or Eq. 4 where each holds, else both."""
 RUNGS = np.geomspace(1e-9, 1e9, 37)
@@ -191,15 +195,13 @@ class _Balances:
     exposure: Exposure
     along: FloatArray
     outward: FloatArray
-    turning: FloatArray
     target: FloatArray
 
     def excess(self, ustar: FloatArray) -> FloatArray:
         """The sum of the forces at local friction velocities (m/s), less its target."""
         drag = self.law.drag(ustar, self.exposure) * self.along
         lift = self.law.lift(ustar, self.exposure) * self.outward
-        torque = self.law.torque(ustar, self.exposure) * self.turning
-        return np.asarray(drag + lift + torque - self.target)
+        return np.asarray(drag + lift - self.target)
 
     def at(self, places: IntArray) -> "_Balances":
         """The balances at some places of the arrays."""
@@ -208,7 +210,6 @@ class _Balances:
             exposure=self.exposure.at(places),
             along=self.along[places],
             outward=self.outward[places],
-            turning=self.turning[places],
             target=self.target[places],
         )
 
@@ -259,16 +260,15 @@ def friction_velocity_at(
     *,
     along: ArrayLike = 1.0,
     outward: ArrayLike = 0.0,
-    turning: ArrayLike = 0.0,
     speed_up: ArrayLike = 1.0,
 ) -> FloatArray:
     """Find the least undisturbed friction velocity at which forces reach a target.
 
-    The sum ``along drag + outward lift + turning torque`` is that at the local friction
-    velocity, which is `speed_up` times the undisturbed one. Where the flow runs
-    backwards (`speed_up` < 0) drag and torque change their sign. About a contact,
-    `along` and `outward` are the arms of drag and lift over a length, `turning` is one
-    over it, and the target is the moment of the weight over the same length.
+    The sum ``along drag + outward lift`` is that at the local friction velocity, which
+    is `speed_up` times the undisturbed one. Where the flow runs backwards (`speed_up` <
+    0) the drag changes its sign. About a contact, `along` and `outward` are the arms of
+    drag and lift over a length, and the target is the moment of the weight over the
+    same length.
 
     Parameters
     ----------
@@ -280,8 +280,6 @@ def friction_velocity_at(
         The target, N.
     along, outward
         Weights of drag and lift in the sum.
-    turning
-        Weight of the torque, 1/m.
     speed_up
         Local over undisturbed friction velocity.
 
@@ -306,14 +304,13 @@ def friction_velocity_at(
         *exposure.fields.values(),
         direction * along,
         np.asarray(outward),
-        direction * turning,
         np.asarray(target, float),
         np.abs(local),
     )
     flat = [np.ravel(array).astype(float) for array in given]
-    *fields, along, outward, turning, target, ratio = flat
+    *fields, along, outward, target, ratio = flat
     of_grains = Exposure(**dict(zip(exposure.fields, fields, strict=True)))
-    balances = _Balances(law, of_grains, along, outward, turning, target)
+    balances = _Balances(law, of_grains, along, outward, target)
     found = balances.roots()
     with np.errstate(divide="ignore", invalid="ignore"):
         # without a local flow a grain goes that needs none, and no other
@@ -415,10 +412,9 @@ def threshold(
 ) -> Threshold:
     """Find the threshold of one grain on its two neighbours under a force law.
 
-    Solves ``f_d sin(beta) + f_l cos(beta) + T/(d/2) = W cos(alpha - beta) +
-    F_a sin(2 beta)``, the third of Eqs. 1 with the torque T of the flow about the
-    grain's centre and the pull F_a = cohesion x d of the contact that opens, for the
-    least u*. Inputs are not validated here.
+    Solves ``f_d sin(beta) + f_l cos(beta) = W cos(alpha - beta) + F_a sin(2 beta)``,
+    the third of Eqs. 1 with the pull F_a = cohesion x d of the contact that opens, for
+    the least u*. Inputs are not validated here.
 
     Parameters
     ----------
@@ -469,7 +465,6 @@ def threshold(
         of_weight + pull * np.sin(2 * beta),
         along=np.sin(beta),
         outward=np.cos(beta),
-        turning=2 / exposure.diameter,
     )
     # where no flow moves the grain the forces are those of an infinite one: NaN
     with np.errstate(invalid="ignore"):
@@ -603,9 +598,8 @@ def shields_at(
     beta = np.radians(np.asarray(entrainment_angle_deg, float))
     of_drag = law.drag(ustar, unit) * np.sin(beta)
     of_lift = law.lift(ustar, unit) * np.cos(beta)
-    moment = of_drag + of_lift + 2 * law.torque(ustar, unit)
     resistance = np.pi / 6 * pivot_resistance(slope_deg, entrainment_angle_deg)
-    return np.asarray(resistance * ustar**2 / moment)
+    return np.asarray(resistance * ustar**2 / (of_drag + of_lift))
 
 
 def default_laws(ustar: ArrayLike, exposure: Exposure) -> NDArray[np.str_]:
@@ -614,7 +608,7 @@ def default_laws(ustar: ArrayLike, exposure: Exposure) -> NDArray[np.str_]:
     Parameters
     ----------
     ustar
-        Friction velocity of its threshold under the law `bridged`, m/s.
+        Friction velocity of its threshold under the law `DEFAULT`, m/s.
     exposure
         The grain and its fluid.
 
@@ -632,11 +626,11 @@ def default_laws(ustar: ArrayLike, exposure: Exposure) -> NDArray[np.str_]:
     >>> default_laws([0.018, 0.25], sizes).tolist()
     ['bridged', 'bridged-gravel']
     """
-    bridged = LAWS["bridged"]
+    default = LAWS[DEFAULT]
     with np.errstate(invalid="ignore"):  # no flow moves the grain: its u* is infinite
-        reynolds = bridged.particle_reynolds(ustar, exposure)
-    has_ended = reynolds >= bridged.drag_end
-    return np.where(has_ended, bridged.goes_on, bridged.name)
+        reynolds = default.particle_reynolds(ustar, exposure)
+    has_ended = reynolds >= default.drag_end
+    return np.where(has_ended, default.goes_on, default.name)
 
 
 def regime(low: Threshold, high: Threshold) -> NDArray[np.str_]:
@@ -802,7 +796,7 @@ def usual_law(grain: SingleGrain) -> str:
     >>> usual_law(SingleGrain(**sand, **bed, **water, gravity=9.81))
     'bridged'
     """
-    (at,) = thresholds_of("bridged", [grain])
+    (at,) = thresholds_of(DEFAULT, [grain])
     return str(default_laws(at.friction_velocity, grain.exposure))
 
 

@@ -11,6 +11,7 @@ from typing import Any
 from orchestrator.digits import percent
 from orchestrator.physics import verdict
 from orchestrator.physics.beside import FIELD, GOES_ON, LEVEL_DEG
+from orchestrator.physics.laws import LAWS
 from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.report.card import Card, Number, Worth, decimals
 from orchestrator.report.subjects import (
@@ -258,9 +259,10 @@ def numbers_of_grain(
     """
     ustar = float(row["ustar0_m_s"])
     theta = float(row["shields"])
-    low = min(holding.values(), default=math.nan)
-    high = max(holding.values(), default=math.nan)
-    of_what = f"the {len(holding)} force laws that hold here"
+    compared = [each for name, each in holding.items() if LAWS[name].in_interval]
+    low = min(compared, default=math.nan)
+    high = max(compared, default=math.nan)
+    of_what = f"the {len(compared)} force laws that hold here"
     if row["tested_rows"] > 0:
         low, high = tested(row, ustar)
         of_what = tested_on(row)

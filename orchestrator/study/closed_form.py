@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import cast
 
 from orchestrator.physics import velocity
+from orchestrator.physics.laws import DEFAULT
 from orchestrator.physics.threshold import (
     AUTO,
     LAWS_OF,
@@ -180,7 +181,7 @@ def resolved(scenes: Sequence[Scene]) -> Iterator[tuple[Scene, ...]]:
         # the tables have the regime of each scene, whatever its law
         asked["low"].append(grain)
         asked["high"].append(grain)
-        name = "bridged" if scene.forces.law == AUTO else scene.forces.law
+        name = DEFAULT if scene.forces.law == AUTO else scene.forces.law
         if name != PAPER:
             asked.setdefault(name, []).append(grain)
     for name, of_law in asked.items():

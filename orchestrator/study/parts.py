@@ -17,7 +17,7 @@ from pydantic import Field, InstanceOf, PlainSerializer, model_validator
 from orchestrator.digits import rounded
 from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
 from orchestrator.physics.fluids import PAPER
-from orchestrator.physics.laws import LAWS
+from orchestrator.physics.laws import DEFAULT, LAWS
 from orchestrator.study.declare import (
     Fraction,
     Height,
@@ -33,7 +33,9 @@ from orchestrator.study.shapes import SHAPES, Shape
 from orchestrator.types import FloatArray
 
 LAW_LABELS = {
-    "auto": "bridged, or bridged-gravel where the drag law of bridged ends",
+    "auto": (
+        f"{DEFAULT}, or {LAWS[DEFAULT].goes_on} where the drag law of {DEFAULT} ends"
+    ),
     "paper": "Eq. 2 or Eq. 4 where each holds, both in the transition",
     **{name: law.label for name, law in LAWS.items()},
 }

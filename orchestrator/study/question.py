@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from orchestrator.digits import SLACK, rounded
 from orchestrator.physics.gusts import peak_over_mean
-from orchestrator.physics.laws import LAWS
+from orchestrator.physics.laws import DEFAULT, LAWS
 from orchestrator.physics.threshold import LAWS_OF, PAPER, weight
 from orchestrator.study.declare import Part, UnfitError
 from orchestrator.study.parts import (
@@ -109,19 +109,11 @@ class Question(Part):
         return tuple(moved)
 
     @property
-    def is_turned(self) -> bool:
-        """Whether its force law turns the grain about its centre."""
-        law = self.forces.law
-        return law in LAWS and LAWS[law].turns
-
-    @property
     def unknown_to_dem(self) -> str:
         """What of the question DEM does not know, in words.
 
         It is empty where DEM knows all.
         """
-        if self.is_turned:
-            return f"DEM does not know how {self.forces.law} turns the grain"
         if self.grain.cohesion:
             return "DEM knows no cohesion"
         if self.flow.gusts and not isinstance(self.bed, PileBed):
@@ -282,17 +274,11 @@ def _check_forces(question: Question) -> None:
     law = forces.law
     if law in LAWS and not LAWS[law].protrudes:
         what = f"the law {law} has none"
-        remedy = 'choose "bridged"'
+        remedy = f'choose "{DEFAULT}"'
         if forces.exposure == "protrusion":
             raise UnfitError("forces.exposure", what, remedy)
         if forces.sheltering == "balanced":
             raise UnfitError("forces.sheltering", what, remedy)
-    if question.is_turned and question.is_poured:
-        what = f"{law} turns the grain, which no method knows on a poured bed"
-        raise UnfitError("forces.law", what, "choose another law")
-    if question.is_turned and question.threshold.update > 0:
-        what = f"{law} turns the grain, which no method knows on a bed that changes"
-        raise UnfitError("threshold.update", what, OUT)
 
 
 def _check_not_poured(question: Question) -> None:

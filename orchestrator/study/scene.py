@@ -184,14 +184,10 @@ def _check(scene: Scene) -> None:
 def _check_kind(scene: Scene) -> None:
     """Refuse a method that does not know the question; ``auto`` takes one that does."""
     kind = scene.method.kind
-    law = scene.forces.law
     if kind == "local":
         _check_local(scene)
     if kind == "peeling" and isinstance(scene.bed, PileBed) and scene.bed.width:
         raise UnfitError("bed.width", "peeling needs a bed in a plane", OUT)
-    if kind in ("dem", "peeling") and scene.is_turned:
-        what = f"{law} turns the grain, which {kind} does not know"
-        raise UnfitError("forces.law", what, LEFT_OPEN)
     if kind != "dem":
         return
     if isinstance(scene.bed, GrainBed) and scene.threshold.criterion == "goes on":

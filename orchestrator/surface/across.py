@@ -5,7 +5,7 @@ pocket that is alike all around leaves it when the moment of the forces along th
 drag and the weight's component together, exceeds that of the forces normal to it:
 N. H. Brooks, discussion of Boundary shear stress in curved trapezoidal channels,
 J. Hydraul. Div. ASCE 89 (HY3), 1963; W. Wu, Computational River Dynamics, 2007,
-Eq. 3.46. Lift, torque and cohesion are added here as the pivot of Eq. 1 has them.
+Eq. 3.46. Lift and cohesion are added here as the pivot of Eq. 1 has them.
 """
 
 from dataclasses import dataclass
@@ -36,8 +36,7 @@ class _Moments:
 
     def excess(self, ustar: FloatArray) -> FloatArray:
         """Moment along the bed less that which holds, at friction velocities (m/s)."""
-        turning = 2 / self.exposure.diameter * self.law.torque(ustar, self.exposure)
-        drag = self.law.drag(ustar, self.exposure) * np.sin(self.beta) + turning
+        drag = self.law.drag(ustar, self.exposure) * np.sin(self.beta)
         lift = self.law.lift(ustar, self.exposure) * np.cos(self.beta)
         return np.asarray(np.hypot(drag - self.down, self.aside) + lift - self.held)
 
@@ -96,10 +95,10 @@ def threshold_across(
 
     ``|F| sin(beta) = (W cos(b) - f_l) cos(beta) + F_a sin(2 beta)``
 
-    and F is the sum of two forces along the bed: drag, with the torque T as the force
-    T/(d/2 sin(beta)), and the weight's W sin(b) straight down the slope. Without lift
-    and torque the drag over that on a level bed is ``cos(c) sin(b)/tan(p) +
-    sqrt(cos(b)^2 - sin(c)^2 sin(b)^2/tan(p)^2)`` with ``p = 90 deg - beta``, which is
+    and F is the sum of two forces along the bed: drag, and the weight's W sin(b)
+    straight down the slope. Without lift the drag over that on a level bed is ``cos(c)
+    sin(b)/tan(p) + sqrt(cos(b)^2 - sin(c)^2 sin(b)^2/tan(p)^2)`` with ``p = 90 deg -
+    beta``, which is
     that of Brooks. Straight up and down the slope it is that of
     `orchestrator.physics.threshold.threshold`, but where lift lets the grain roll back
     down a slope that the flow goes up.

@@ -6,17 +6,19 @@ from typing import get_args
 import numpy as np
 import pandas as pd
 import pytest
+from numpy.typing import ArrayLike
 
-from orchestrator.calculator import LARGEST_DEPTH, PARAMETERS, QUANTITIES
+from orchestrator.calculator import LARGEST_DEPTH, PARAMETERS, QUANTITIES, answer
 from orchestrator.calculator.table import thresholds
 from orchestrator.fidelity import limits
 from orchestrator.physics.fluids import numbers_of
-from orchestrator.physics.laws import LAWS, Exposure
+from orchestrator.physics.laws import LAWS, Bridged, Exposure
 from orchestrator.physics.saltation import Grains, hops
 from orchestrator.physics.threshold import threshold, why_not
 from orchestrator.study.declare import Length
 from orchestrator.study.fields import FIELDS, PARTS
 from orchestrator.study.study import parse
+from orchestrator.types import FloatArray
 
 
 def test_every_point_and_law_is_the_closed_form_of_it() -> None:
@@ -118,3 +120,34 @@ def test_pages_name_the_size_from_which_quartz_hops_in_water() -> None:
     docs = Path(__file__).parents[2] / "docs"
     for page in ("model.md", "threshold.md"):
         assert f"below {first:.2f} mm" in (docs / page).read_text(encoding="utf-8")
+
+
+class Weak(Bridged):
+    """Half the drag, and no part in an interval."""
+
+    name = "weak"
+    label = "weak"
+
+    def drag(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
+        return np.asarray(0.5 * super().drag(ustar, at))
+
+
+class Compared(Weak, in_interval=True):
+    """The same, and a part in it."""
+
+
+def test_a_law_widens_the_interval_of_a_grain_only_where_it_says_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def width(*more: Bridged) -> float:
+        for law in more:
+            monkeypatch.setitem(LAWS, law.name, law)
+        table = thresholds({"diameter": [5e-4], "roughness": [5e-5]}, "bridged")
+        cells = zip(*(column.tolist() for column in table.values()), strict=True)
+        rows = [dict(zip(table, row, strict=True)) for row in cells]
+        number = answer.card(rows).numbers[0]
+        assert number.low is not None
+        assert number.high is not None
+        return number.high / number.low
+
+    assert 1 < width() == width(Weak()) < width(Compared())

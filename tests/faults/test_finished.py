@@ -163,7 +163,7 @@ grain = { diameter = 1e-3, sizes = "sieve.csv" }
 [[group]]
 name = "grain"
 [group.forces]
-law = "zeng"
+law = "profile"
 """
 SCAN = "x_m,z_m\n0,0\n0.04,0.01\n0.06,0\n"
 SIEVE = "diameter_m,fraction\n8e-4,0.5\n1.25e-3,0.5\n"
@@ -291,7 +291,7 @@ def test_the_command_and_python_answer_an_edited_study_alike(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file, out = tmp_path / "t.toml", tmp_path / "out"
-    whole = "grain.diameter = 1e-3\nmethod.kind = 'pivot'\n[forces]\nlaw = 'zeng'\n"
+    whole = "grain.diameter = 1e-3\nmethod.kind = 'pivot'\n[forces]\nlaw = 'profile'\n"
     cut = whole.partition("[forces]")[0]
     answers: list[str] = []
     for text in (whole, cut):

@@ -36,7 +36,7 @@ VALUES: dict[str, list[Any]] = {
     "method.flow.expansion_ratio": [1.1, 1.2],
     "method.flow.speed": [1.0, 10.0],
     "method.flow.model": ["solve", "waves"],
-    "forces.law": ["bridged", "zeng-torque"],
+    "forces.law": ["bridged", "profile"],
     "forces.stress": ["wall", "eq10"],
 }
 """Values of fields of which groups are made, the default among them but for the method."""

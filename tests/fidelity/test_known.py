@@ -121,7 +121,7 @@ def test_every_measured_class_has_its_reference_and_every_fidelity() -> None:
         {"forces.law": "low"},  # with more lift than was measured
         *({"grain.friction_angle_deg": angle} for angle in (20.0, 60.0, 80.0)),
         *({"method.grains.damping": damping} for damping in (0.05, 0.5, 1.0)),
-        *({"forces.law": law} for law in ("zeng", "profile", "bridged-gravel")),
+        *({"forces.law": law} for law in ("profile", "bridged-gravel")),
         {"bed.forms": 5},
         {"bed.counted": "all"},
         {"forces.lift_coefficient": 0.0},

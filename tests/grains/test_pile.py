@@ -173,8 +173,8 @@ def test_load_steps_begin_below_the_first_grain_that_is_held(tmp_path: Path) -> 
     assert ustar0 == pytest.approx(first)
 
 
-@pytest.mark.parametrize("law", ["bridged", "zeng-torque"])
-def test_a_torque_of_the_law_is_no_hold_of_a_row(tmp_path: Path, law: str) -> None:
+@pytest.mark.parametrize("law", ["bridged", "profile"])
+def test_no_law_makes_a_hold_of_a_row(tmp_path: Path, law: str) -> None:
     text = STATIC.replace("slope_deg = 20.0", 'shape = "step up"\nslope_deg = 15')
     text = text.replace("cells_per_face = 20", 'model = "waves"')
     text += f'[method]\nkind = "pivot"\n[forces]\nlaw = "{law}"\n'

@@ -27,7 +27,7 @@ TEXT = """
 grain = { diameter = 1e-3 }
 threshold.fractions = [0.1]
 method.kind = "dem"
-forces = { law = "zeng" }
+forces = { law = "profile" }
 
 [bed]
 kind = "pile"
@@ -73,9 +73,9 @@ def test_other_code_of_the_same_recipe_does_not_get_old_results(
         assert about[case_states.CODE] == "other code"
 
     # a drag twice as large is in no name of a case, and in the inputs of the piles
-    drag = laws.LAWS["zeng"].__class__.drag
+    drag = laws.Profile.drag
     monkeypatch.setattr(
-        laws.LAWS["zeng"].__class__, "drag", lambda *given: np.multiply(2, drag(*given))
+        laws.Profile, "drag", lambda *given: np.multiply(2, drag(*given))
     )
     monkeypatch.setattr("orchestrator.runs.reuse.code_digest", lambda: "a law")
     monkeypatch.setattr(case_states, "code_digest", lambda: "a law")

@@ -107,7 +107,7 @@ OTHERS: Mapping[str, tuple[Any, ...]] = {
     "flow.depth": (0.12,),
     "flow.gusts": ({"intensity": 0.4, "events": 10},),
     "fluid.kind": ("air",),
-    "forces.law": ("zeng",),
+    "forces.law": ("profile",),
     "grain.sizes": ({"sigma_g": 1.2},),
     "method.flow.first_cell_height": (1e-3,),
     "method.flow.roughness": (2e-4,),

@@ -13,7 +13,6 @@ from orchestrator import guests, plan
 from orchestrator.errors import InputError
 from orchestrator.fidelity import limits
 from orchestrator.grains.loads import Geometry
-from orchestrator.physics.laws import LAWS
 from orchestrator.runs.files import canonical_json
 from orchestrator.study import closed_form, fields, parts, study
 from orchestrator.study.parts import Forces, Grain, GrainBed
@@ -99,25 +98,15 @@ AXES = (
     "'bed.slope_deg' = [0, 0.0]\n'grain.diameter' = [1e-3]",
     "'bed.roughness' = ['d/10', 1e-4]\n'grain.diameter' = [1e-3]",
 )
-TURNING = [name for name, law in LAWS.items() if law.turns]
-TURNED = "forces.law = '%s'\n"
 D, BY_DEM = "grain.diameter = 1e-3\n", "method.kind = 'dem'\n"
 BED = "bed = { kind = 'pile', slope_deg = 15.0 }\n"
 POURED = "bed = { kind = 'pile', slope_deg = 15.0, packing = 'poured' }\n"
 GUSTS = "flow.gusts = { intensity = 0.4, events = 9 }\n"
 COHESION = "grain.cohesion = 1e-3\n"
-TURNS_NOT = [
-    (BY_DEM + D, "forces.law"),
-    ("method.kind = 'peeling'\n" + D + BED, "forces.law"),
-    (D + POURED, "forces.law"),
-    (D + BED + "threshold.update = 0.1\n", "threshold.update"),
-]
-"""Beginnings of files in which no law may turn the grain, and the field that is refused."""
 DEM_KNOWS_NOT = [
     (D + GUSTS, "flow.gusts"),
     (D + COHESION, "grain.cohesion"),
     (D + BED + COHESION, "grain.cohesion"),
-    *((D + TURNED % law, "forces.law") for law in TURNING),
 ]
 """Files that are refused by DEM alone, and the field."""
 BAD = [
@@ -139,11 +128,6 @@ BAD = [
     ),
     (GRAIN + "[bed]\nheight = 0.02\n", "bed.height", 'kind = "pile"'),
     (GRAIN + "[forces]\nlaw = 'bridge'\n", "forces.law", "'bridged', "),
-    *(
-        (text + TURNED % law, where, "turns")
-        for law in TURNING
-        for text, where in TURNS_NOT
-    ),
     (
         "[threshold]\ngravity = 3.7\n",
         "threshold.gravity",
@@ -230,14 +214,6 @@ def test_what_dem_does_not_know_needs_no_method(text: str, where: str) -> None:
     for more in ("", "method.kind = 'auto'\n"):
         (decision,) = plan.make(_parse(text + more)).decisions.values()
         assert decision.scene.method.kind in ("pivot", "peeling")
-
-
-def test_a_law_that_turns_the_grain_is_answered_on_a_long_bed() -> None:
-    """A dune of 200,000 grains: neither DEM nor pivots could answer it."""
-    text = "grain.diameter = 3e-4\nbed = { kind = 'dune', slope_deg = 5.0, height = 2.0 }\n"
-    for law in TURNING:
-        (decision,) = plan.make(_parse(text + TURNED % law)).decisions.values()
-        assert decision.scene.method.kind == "local"
 
 
 @pytest.mark.parametrize(
