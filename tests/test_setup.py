@@ -16,6 +16,8 @@ pytestmark = pytest.mark.long
 ROOT = Path(__file__).parents[1]
 PACKAGES = Path(np.__file__).parents[1]
 """Where the packages of `requirements.lock` are that these tests run with."""
+LOCKS = ("requirements.lock", "requirements-gis.lock")
+"""What every set-up installs."""
 NAME = """the user's "checkout" of $HOME & co"""
 
 
@@ -26,13 +28,15 @@ def checkout(tmp_path: Path) -> Path:
     ignored = shutil.ignore_patterns("__pycache__")
     for part in ("orchestrator", "templates", "tools"):
         shutil.copytree(ROOT / part, folder / part, ignore=ignored)
-    lock = Path(shutil.copy(ROOT / "requirements.lock", folder))
+    locks = [Path(shutil.copy(ROOT / name, folder)) for name in LOCKS]
     environment = folder / ".venv"
     venv.create(environment, with_pip=True)
     (own,) = environment.glob("lib/python3*/site-packages")
     (own / "installed.pth").write_text(f"{PACKAGES}\n")
-    digest = sha256(lock.read_bytes()).hexdigest()
-    (environment / "installed.sha256").write_text(f"{digest}  {lock.name}\n")
+    stamp = ""
+    for lock in locks:
+        stamp += f"{sha256(lock.read_bytes()).hexdigest()}  {lock.name}\n"
+    (environment / "installed.sha256").write_text(stamp)
     return folder
 
 
@@ -74,7 +78,8 @@ def test_set_up_says_what_it_installs_in_one_line(
     with zipfile.ZipFile(tmp_path / "sample-1.0-py3-none-any.whl", "w") as wheel:
         for name, text in contents.items():
             wheel.writestr(name, text)
-    (checkout / "requirements.lock").write_text("sample==1.0\n")
+    for name in LOCKS:
+        (checkout / name).write_text("sample==1.0\n")
     ended = subprocess.run(
         ["sh", checkout / "tools/setup.sh", "run"],
         env={**os.environ, "PIP_NO_INDEX": "1", "PIP_FIND_LINKS": str(tmp_path)},
@@ -87,4 +92,5 @@ def test_set_up_says_what_it_installs_in_one_line(
     assert ended.stdout.splitlines() == [
         "setup: making .venv",
         "setup: installing what requirements.lock pins",
+        "setup: installing what requirements-gis.lock pins",
     ]

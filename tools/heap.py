@@ -67,7 +67,7 @@ def heap() -> bytes:
         distance = np.hypot(axis - x, (axis - y)[:, None])
         z = np.maximum(z, height - distance * np.tan(np.radians(SLOPE_DEG)))
     noise = np.random.default_rng(1).normal(0.0, NOISE, z.shape)
-    return geotiff(EAST + axis, NORTH + axis, 100.0 + z + noise, {})
+    return geotiff(EAST + axis, NORTH + axis, 100.0 + z + noise, "")
 
 
 def write(directory: Path) -> Path:

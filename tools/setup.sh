@@ -2,11 +2,12 @@
 # Makes a machine with Debian 12 or 13 ready.  A second call finds all in place and asks no server for
 # anything.  On other systems the Containerfile makes an image of Debian 13 with the same steps.
 #
-#   sh tools/setup.sh run      Debian packages, and .venv with what requirements.lock pins
+#   sh tools/setup.sh run      Debian packages, and .venv with what requirements.lock pins and the
+#                              extra [gis]: what requirements-gis.lock pins
 #   sh tools/setup.sh cluster  the same, and the extra [cluster]: what requirements-cluster.lock pins
 #   sh tools/setup.sh test     the same, a Slurm to test it with, and what requirements-test.lock pins
 #   sh tools/setup.sh docs     the same, and the extra [docs]: what requirements-docs.lock pins
-#   sh tools/setup.sh lock     resolve pyproject.toml anew into the four lock files
+#   sh tools/setup.sh lock     resolve pyproject.toml anew into the five lock files
 set -eu
 unset CDPATH
 cd -- "$(dirname -- "$0")/.."
@@ -192,6 +193,7 @@ lock() {
     header="# Written by make lock with $("$environment/bin/python" -V) on $(uname -sm)."
     : >"$scratch/pinned"
     lock_part run requirements.lock
+    lock_part gis requirements-gis.lock
     lock_part cluster requirements-cluster.lock
     lock_part test requirements-test.lock
     lock_part docs requirements-docs.lock
@@ -206,14 +208,18 @@ lock_part() {
     cat "$scratch/$1.lock" >>"$scratch/pinned"
 }
 
+# What every set-up has.
+run="requirements.lock requirements-gis.lock"
+
+# shellcheck disable=SC2086  # a list of words
 case ${1-} in
-run) set_up requirements.lock ;;
-cluster) set_up requirements.lock requirements-cluster.lock ;;
+run) set_up $run ;;
+cluster) set_up $run requirements-cluster.lock ;;
 test)
     slurm="slurmctld slurmd slurm-client munge"
-    set_up requirements.lock requirements-cluster.lock requirements-test.lock
+    set_up $run requirements-cluster.lock requirements-test.lock
     ;;
-docs) set_up requirements.lock requirements-cluster.lock requirements-test.lock requirements-docs.lock ;;
+docs) set_up $run requirements-cluster.lock requirements-test.lock requirements-docs.lock ;;
 lock) lock ;;
 *) die "usage: sh tools/setup.sh run|cluster|test|docs|lock" ;;
 esac

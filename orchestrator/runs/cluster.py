@@ -8,14 +8,13 @@ import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from filelock import FileLock
 
 from orchestrator.errors import InputError, OrchestratorError
+from orchestrator.extras import imported
 from orchestrator.runs import engine, process, reuse
 from orchestrator.runs.case import Case, done_state, names_in
 from orchestrator.runs.engine import Pool
@@ -31,6 +30,8 @@ SYSTEMS = {
     "slurm": "SLURMCluster",
 }
 """Names of the queues, and dask-jobqueue's classes for them."""
+EXTRA = "cluster"
+"""The extra of the package with dask-jobqueue."""
 AHEAD = 2
 """Cases handed to a job for each core.
 
@@ -91,9 +92,9 @@ def pool(queue: Queue, cases: Path, *, workers: int, limit_s: float) -> Iterator
     OrchestratorError
         If the queue does not take the jobs.
     """
-    dask = _imported("dask")
-    jobqueue = _imported("dask_jobqueue")
-    distributed = _imported("distributed")
+    dask = imported("dask", EXTRA, "--cluster")
+    jobqueue = imported("dask_jobqueue", EXTRA, "--cluster")
+    distributed = imported("distributed", EXTRA, "--cluster")
     cases.mkdir(exist_ok=True)
     kind = getattr(jobqueue, SYSTEMS[queue.system])
     name = queue.settings.get("config_name", kind.job_cls.config_name)
@@ -118,19 +119,6 @@ def pool(queue: Queue, cases: Path, *, workers: int, limit_s: float) -> Iterator
         )
     for case in names_in(cases):
         _lock_of(case, cases).unlink(missing_ok=True)
-
-
-def _imported(name: str) -> ModuleType:
-    """A module of the package's extra; an InputError says what to install."""
-    try:
-        return import_module(name)
-    except ImportError as error:
-        extra = "a cluster needs the package's extra [cluster]"
-        raise InputError(
-            f"{extra}: {error.name} is not installed",
-            where="--cluster",
-            remedy="pip install 'dask-jobqueue>=0.9', with the Python that runs this",
-        ) from None
 
 
 def _settings(queue: Queue, given: Mapping[str, Any], logs: str) -> dict[str, Any]:

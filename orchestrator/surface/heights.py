@@ -5,7 +5,6 @@ from the ground around the form: a plane, level or with a gentle fall. A heap is
 rises above it.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
@@ -20,8 +19,6 @@ from orchestrator.errors import InputError
 from orchestrator.study.noise import MEDIAN
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
-Tags = Mapping[int, tuple[float, ...] | str]
-"""Tags of a GeoTIFF by their numbers."""
 SPREAD_OF_RASTER = 0.75
 SPREAD_OF_SHAPE = 0.5
 """Standard deviation of the smoothing over the length of a cell, of the flow's mesh."""
@@ -158,8 +155,8 @@ class Surface:
         Standard deviation of the smoothing, in cells of the flow's mesh.
     said
         What was done to the heights, in words.
-    tags
-        Tags of the GeoTIFF that say where on the Earth it is; empty without any.
+    system
+        Coordinate reference system as well-known text; empty without any.
     noise
         Standard deviation of the heights of the rim off the ground, m.
     digest
@@ -173,7 +170,7 @@ class Surface:
     ground: Plane = field(compare=False)
     spread: float = field(compare=False)
     said: tuple[str, ...] = field(compare=False)
-    tags: Tags = field(compare=False, repr=False)
+    system: str = field(compare=False, repr=False)
     noise: float = field(compare=False)
     digest: str
 
@@ -352,7 +349,7 @@ class Surface:
             self.ground,
             cells,
             self.said,
-            self.tags,
+            self.system,
             self.noise,
         )
 
@@ -386,7 +383,7 @@ class Surface:
         said = (*self.said, f"smoothed over {2 * deviation:.3g} m, to the cells")
         heights = thin + self.ground.at(x, y[:, None])
         return surface_of(
-            self.name, x, y, heights, self.ground, self.spread, said, self.tags
+            self.name, x, y, heights, self.ground, self.spread, said, self.system
         )
 
 
@@ -411,7 +408,7 @@ def surface_of(
     ground: Plane,
     spread: float,
     said: tuple[str, ...] = (),
-    tags: Tags | None = None,
+    system: str = "",
     noise: float = 0.0,
 ) -> Surface:
     """Make a surface of its heights, with its digest.
@@ -430,8 +427,8 @@ def surface_of(
         Standard deviation of the smoothing, in cells of the flow's mesh.
     said
         What was done to the heights, in words.
-    tags
-        Tags of the GeoTIFF that say where on the Earth it is.
+    system
+        Coordinate reference system as well-known text; empty without any.
     noise
         Standard deviation of the heights of the rim off the ground, m.
 
@@ -447,7 +444,7 @@ def surface_of(
     for part in (x - x[0], y - y[0], above):
         digest.update(on_grid(part, relief).astype("<f8").tobytes())
     return Surface(
-        name, x, y, z, ground, spread, said, tags or {}, noise, digest.hexdigest()
+        name, x, y, z, ground, spread, said, system, noise, digest.hexdigest()
     )
 
 
@@ -463,15 +460,15 @@ class Raster:
         Axes, m, rising, of shapes (nx,) and (ny,).
     z
         Heights, m, of shape (ny, nx).
-    tags
-        Tags of a GeoTIFF that say where on the Earth it is.
+    system
+        Coordinate reference system as well-known text; empty without any.
     """
 
     name: str
     x: FloatArray
     y: FloatArray
     z: FloatArray
-    tags: Tags = field(default_factory=dict)
+    system: str = ""
 
 
 def checked(raster: Raster, where: str) -> Surface:
@@ -532,7 +529,7 @@ def checked(raster: Raster, where: str) -> Surface:
         ground,
         SPREAD_OF_RASTER,
         said,
-        raster.tags,
+        raster.system,
         noise,
     )
     _check_slopes(surface, where)

@@ -306,7 +306,7 @@ def files(found: Sequence[Answer]) -> dict[str, bytes]:
         grid = answer.grid
         for name, values in answer.maps.items():
             path = f"maps/{number}-{_in_files(name, answer)}.tif"
-            made[path] = geotiff(grid.x, grid.y, values, answer.surface.tags)
+            made[path] = geotiff(grid.x, grid.y, values, answer.surface.system)
         made[f"maps/{number}.vtk"] = _vtk(answer)
     return made
 

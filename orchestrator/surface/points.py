@@ -121,16 +121,16 @@ class _Lines:
 
     def layout(self) -> _Layout:
         """How the lines are to be read, by the head and the first point."""
-        heads = []
+        heads: list[_Head] = []
+        has_names = False
         for place, line in enumerate(self.lines):
             is_comment = COMMENT.match(line) is not None
             cells = _cells(COMMENT.sub("", line))
-            if is_comment or not cells:
-                heads.append((place, cells, is_comment))
-            elif any(map(_is_number, cells)) and (_named(heads) or _begins(cells[0])):
+            has_numbers = not is_comment and any(map(_is_number, cells))
+            if has_numbers and (has_names or _begins(cells[0])):
                 return self._of(place, heads)
-            else:
-                heads.append((place, cells, is_comment))
+            heads.append((place, cells, is_comment))
+            has_names = has_names or _named(heads[-1:]) is not None
         for place, cells, is_comment in heads:
             named = _named([(place, cells, is_comment)])
             if cells and not (is_comment or named):

@@ -1,83 +1,92 @@
 """Files of heights on a raster, and maps as GeoTIFF.
 
-Heights are read from XYZ, ESRI ASCII grid, GeoTIFF and STL.
+rasterio reads GeoTIFF and ESRI ASCII grids, and writes the maps.
 """
 
-import io
-import itertools
 import re
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-from xml.etree import ElementTree
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from orchestrator.errors import InputError
-from orchestrator.study.heads import METRE as METRES
+from orchestrator.extras import imported
+from orchestrator.study.heads import METRE
 from orchestrator.study.source import decoded, read_bytes
 from orchestrator.study.units import number
-from orchestrator.surface import epsg
 from orchestrator.surface.heights import (
     FEWEST,
     MOST_NODES,
     Raster,
     Surface,
-    Tags,
     checked,
 )
 from orchestrator.surface.points import read_points
+from orchestrator.surface.triangles import read_triangles
 from orchestrator.types import FloatArray
-
-if TYPE_CHECKING:
-    from PIL.Image import Image
 
 LARGEST = 2**28
 """Most bytes of a file."""
-STL_HEAD, STL_TRIANGLE = 84, 50
-"""Bytes of the head of a binary STL file, and of each of its triangles."""
-SCALE, TIE_POINT, TRANSFORMATION = 33550, 33922, 34264
-KEYS, KEY_NUMBERS, KEY_TEXTS = 34735, 34736, 34737
-METADATA, NODATA = 42112, 42113
-"""Tags of a GeoTIFF (OGC 19-008r4), GDAL's for its metadata, and for cells without a
-height."""
-MODEL, PIXEL, LENGTH_UNIT, HEIGHT_UNIT = 1024, 1025, 3076, 4099
-PROJECTED, VERTICAL = 3072, 4096
-"""Keys of a GeoTIFF: kind of the axes, what a pixel is, units, and EPSG codes of the
-coordinate systems on the ground and of the heights."""
-DEGREES, POINT, METRE = 2, 2, 9001
-FEET = {9002: 0.3048, 9003: 1200 / 3937}
-"""Units of a GeoTIFF in feet, m."""
-FOOT = 0.305
-"""All feet to three digits, m."""
-GRID_KEYS = ("ncols", "nrows", "cellsize")
-CORNERS, CENTRES = ("xllcorner", "yllcorner"), ("xllcenter", "yllcenter")
-EMPTY = "nodata_value"
-"""Keys of the head of an ESRI grid."""
-ONE_OF = (("cellsize", "dx"), ("cellsize", "dy"), *zip(CENTRES, CORNERS, strict=True))
-"""Keys of a grid of which one alone may stand there."""
-NEAR_EMPTY = 1e-6
-"""Largest difference of an empty cell from the number of empty cells, over that."""
-DEEPEST, HIGHEST = 9000.0, 1e9
-"""Depth below which and height above which no ground lies, m, in whatever unit."""
-UNNAMED_EMPTY = "-9999"
-"""What stands in an empty cell of a grid whose head does not say it."""
-UNIT_OF_WKT = re.compile(r'UNIT\["([^"]+)",\s*(\d+\.?\d*(?:[eE][+-]?\d+)?)')
-UNIT_OF_ARCINFO = re.compile(r"^\s*z?units\s+(\w+)", re.IGNORECASE | re.MULTILINE)
-"""Units in a file .prj: their names, and in well-known text their size."""
-UNIT_OFF = 1e-4
-"""Largest difference of a unit from the metre, m: the German legal metre."""
-UNSAID = "no"
-"""Arc/Info's word for no unit of the heights."""
 LARGEST_PROJECTION = 2**20
 """Most bytes of a file .prj."""
-FORMATS = ".tif .tiff (GeoTIFF), .asc (ESRI), .xyz .csv .txt (x y z), .stl"
-BARE_TAGS: Tags = {
-    KEYS: (1, 1, 0, 1, PIXEL, 0, 1, 1),
+NEEDED: Mapping[str, frozenset[str]] = {
+    "ncols": frozenset(),
+    "nrows": frozenset(),
+    "xllcorner": frozenset({"xllcenter"}),
+    "yllcorner": frozenset({"yllcenter"}),
+    "cellsize": frozenset({"dx", "dy"}),
 }
-"""Keys of a map without a place on the Earth: its pixels are areas."""
+"""Keys that the head of an ESRI grid must have, and those that stand for each."""
+STEPS = ("cellsize", "dx", "dy")
+EMPTY = "nodata_value"
+"""The key for what stands in cells without a height."""
+GRID_KEYS = (*NEEDED, "xllcenter", "yllcenter", "dx", "dy", EMPTY)
+UNNAMED_EMPTY = "-9999"
+"""What stands in them by the format where the key is missing."""
+WORDS = ("null", "nan")
+"""Words that stand there in place of a number."""
+NEAR_EMPTY = 1e-6
+"""Largest difference of an empty cell from the number of empty cells, over that: it is
+written in decimal, with fewer digits in the head of a file or in its cells."""
+DEEPEST, HIGHEST = 9000.0, 1e9
+"""Depth below which and height above which no ground lies, m, in whatever unit."""
+UNIT_OF_ARCINFO = re.compile(r"^\s*z?units\s+(\w+)", re.IGNORECASE | re.MULTILINE)
+"""Units in a file .prj of Arc/Info, which is no well-known text."""
+UNSAID = "no"
+"""Its word for no unit of the heights."""
+UNIT_OFF = 1e-4
+"""Largest difference of a unit from the metre, m: the German legal metre."""
+FORMATS = ".tif .tiff (GeoTIFF), .asc (ESRI), .xyz .csv .txt (x y z), .stl"
+POINT_REMEDY = "leave such points out"
+DECLARED = {
+    ".tif": "declare it: gdal_edit -a_nodata {:.9g}",
+    ".asc": "declare it in the head: NODATA_value {:.9g}",
+}
+"""What declares a number to be that of empty cells, by the ending of the file."""
+
+
+def rasterio(where: str) -> Any:
+    """Import rasterio.
+
+    Parameters
+    ----------
+    where
+        The file and the field that needs it, for messages.
+
+    Returns
+    -------
+    module
+        rasterio.
+
+    Raises
+    ------
+    InputError
+        If it is not installed, with the extra of the package that has it.
+    """
+    return imported("rasterio", "gis", where)
 
 
 def read_surface(path: Path, where: str) -> Surface:
@@ -103,391 +112,273 @@ def read_surface(path: Path, where: str) -> Surface:
     if not path.is_file():
         remedy = "a path in a study file is relative to that file"
         raise InputError("there is no such file", where, remedy)
-    content = read_bytes(path, LARGEST, where)
-    ending = path.suffix.lower()
-    if ending in (".tif", ".tiff"):
-        raster = _of_geotiff(content, path.name, where)
+    ending = path.suffix.lower().replace(".tiff", ".tif")
+    if ending == ".tif":
+        raster = _of_geotiff(path, where)
     elif ending == ".asc":
-        _check_projection(path.with_suffix(".prj"), where)
-        raster = _of_grid(decoded(content, where), path.name, where)
+        raster = _of_grid(path, where)
     elif ending in (".xyz", ".csv", ".txt"):
-        raster = read_points(decoded(content, where), path.name, where)
+        text = decoded(read_bytes(path, LARGEST, where), where)
+        raster = read_points(text, path.name, where)
     elif ending == ".stl":
-        _check_stl(content, where)
-        raster = _of_triangles(path, where)
+        raster = read_triangles(path, LARGEST, where)
     else:
         what = f"the ending {ending!r} is of no surface"
         raise InputError(what, where, f"endings: {FORMATS}")
-    _check_heights(raster.z, where)
+    _check_heights(raster.z, DECLARED.get(ending, POINT_REMEDY), where)
     return checked(raster, where)
 
 
-def _check_projection(path: Path, where: str) -> None:
-    """Refuse a grid beside whose file a coordinate system in another unit stands."""
-    if not path.is_file():
-        return
-    where = f"{where}: {path.name}"
-    text = decoded(read_bytes(path, LARGEST_PROJECTION, where), where)
-    units = [(name, float(size)) for name, size in UNIT_OF_WKT.findall(text)]
-    is_projected = any(word in text for word in ("PROJCS", "PROJCRS", "LOCAL_CS"))
-    lengths = [unit for unit in units if not (is_projected and _is_angle(unit[0]))]
-    off = [(name, size) for name, size in lengths if abs(size - 1) > UNIT_OFF]
-    for name in UNIT_OF_ARCINFO.findall(text):
-        if name.lower() not in (UNSAID, *METRES):
-            off.append((name, 0.0))
-    for name, size in off:
-        what = f"its lengths are in {name}"
-        remedy = "project it to metres, with gdalwarp -t_srs EPSG:326NN, NN the zone"
-        if size and not _is_angle(name):
-            remedy = f"multiply them by {size:.7g}: they must be in m"
-        raise InputError(what, where, remedy)
-
-
-def _is_angle(unit: str) -> bool:
-    """Whether a unit of a coordinate system is of an angle."""
-    return unit.lower().startswith(("deg", "grad", "rad"))
-
-
-def _check_heights(z: FloatArray, where: str) -> None:
+def _check_heights(z: FloatArray, remedy: str, where: str) -> None:
     """Refuse heights that no ground has, and that stand for no height."""
     for value in (float(np.nanmin(z, initial=0.0)), float(np.nanmax(z, initial=0.0))):
         if not -DEEPEST <= value <= HIGHEST and np.isfinite(value):
             what = f"{value:.6g} in {int((z == value).sum())} cells"
             what = f"{what} looks like a cell without a height"
-            remedy = "leave such points out, or name the number as NODATA: gdal_edit"
-            raise InputError(what, where, f"{remedy} -a_nodata, or the head of an .asc")
+            raise InputError(what, where, remedy.format(value))
 
 
-def _of_grid(text: str, name: str, where: str) -> Raster:
-    """The raster of an ESRI ASCII grid, whose rows run from north to south."""
-    lines = text.splitlines()
-    header, empty = _head_of_grid(lines, where)
-    columns = header["ncols"]
-    rows = header["nrows"]
-    before = len(header) + bool(empty)
-    values = _numbers(lines[before:], before, empty, where)
-    is_whole = columns % 1 == 0 and columns * rows == len(values)
-    if not (is_whole and min(columns, rows) >= FEWEST):
-        what = f"{len(values)} heights, not {columns:.9g} x {rows:.9g}"
-        remedy = f"nrows lines of ncols numbers, {FEWEST} of each at least"
-        raise InputError(what, where, remedy)
-    widths = {len(line.split()) for line in lines[before:] if line.strip()}
-    if widths == {rows} and rows != columns:
-        what = f"its lines have {rows:.9g} numbers, and ncols is {columns:.9g}"
-        raise InputError(what, where, "are ncols and nrows exchanged?")
-    heights = np.array(values).reshape(int(rows), int(columns))[::-1]
-    heights = _without(heights, empty or UNNAMED_EMPTY)
-    x = _axis_of_grid("x", int(columns), header, where)
-    y = _axis_of_grid("y", int(rows), header, where)
-    return Raster(name, x, y, heights)
-
-
-def _without(heights: FloatArray, empty: str) -> FloatArray:
-    """Heights with NaN in the cells that have the number of empty cells.
-
-    It is written in decimal, with fewer digits in the head of a file or in its cells.
-    """
-    if not _is_number(empty):
-        return heights
-    is_empty = np.isclose(heights, number(empty), rtol=NEAR_EMPTY, atol=0.0)
-    return np.where(is_empty, np.nan, heights)
-
-
-def _head_of_grid(lines: list[str], where: str) -> tuple[dict[str, float], str]:
-    """The numbers at the head of a grid by their keys, a line for each.
-
-    Apart from them: what stands in an empty cell, which may be a word.
-    """
-    header: dict[str, float] = {}
-    empty = ""
-    for line in lines:
-        words = line.split()
-        if len(words) != 2 or not words[0][0].isalpha():
-            break
-        key = words[0].lower()
-        if key in header or (key == EMPTY and empty):
-            raise InputError(f"{key} stands twice", where, "remove one of the lines")
-        if key == EMPTY:
-            empty = words[1]
-            continue
-        if key not in {*GRID_KEYS, *itertools.chain.from_iterable(ONE_OF)}:
-            known = ", ".join((*GRID_KEYS, *CORNERS, *CENTRES, EMPTY))
-            what = f"{words[0]} is no key of a grid"
-            raise InputError(what, where, f"its head has {known}")
-        header[key] = _number(words[1], f"{where}: {words[0]}")
-    for key in GRID_KEYS:
-        if key not in header:
-            remedy = "its head has ncols, nrows, xllcorner, yllcorner, cellsize"
-            raise InputError(f"{key} is missing", where, remedy)
-    for one, other in ONE_OF:
-        if one in header and other in header:
-            what = f"its head has {one} and {other}"
-            raise InputError(what, where, "leave one of the two")
-    return header, empty
-
-
-def _axis_of_grid(
-    axis: str, count: int, header: dict[str, float], where: str
-) -> FloatArray:
-    """The centres of the cells of a grid along an axis, m."""
-    step = header["cellsize"]
-    if not 0 < step < np.inf:
-        raise InputError(f"cellsize {step:g}", where, "it is in m, above 0")
-    start = header.get(f"{axis}llcenter")
-    if start is None:
-        start = header.get(f"{axis}llcorner", 0.0) + step / 2
-    if not np.isfinite(start):
-        raise InputError(f"{axis}llcorner {start:g}", where, "it is in m")
-    return _steps(start, step, count)
-
-
-def _numbers(lines: list[str], before: int, empty: str, where: str) -> list[float]:
-    """The numbers of some lines; `before` lines of the file stand before them.
-
-    The word of empty cells is NaN.
-    """
-    values: list[float] = []
-    for count, line in enumerate(lines, before + 1):
-        words = line.split()
-        if empty and not _is_number(empty):
-            words = ["nan" if word == empty else word for word in words]
-        try:
-            values.extend(map(number, words))
-        except ValueError:
-            bad = next(word for word in words if not _is_number(word))
-            place = f"{where}: line {count}"
-            remedy = "numbers with a decimal point, spaces between them"
-            raise InputError(f"{bad!r} is no number", place, remedy) from None
-    return values
-
-
-def _is_number(word: str) -> bool:
-    """Whether a word is a number."""
-    try:
-        number(word)
-    except ValueError:
-        return False
-    return True
-
-
-def _number(word: str, where: str) -> float:
-    """The number that a word is; an `InputError` for any other word."""
-    if not _is_number(word):
-        raise InputError(f"{word!r} is no number", where, "with a decimal point")
-    return number(word)
-
-
-def _of_triangles(path: Path, where: str) -> Raster:
-    """The raster of an STL file: its vertices, seen from above, interpolated."""
-    from scipy.interpolate import LinearNDInterpolator
-
-    points = _seen_from_above(path, where)
-    _, counts = np.unique(points[:, :2], axis=0, return_counts=True)
-    if counts.max() > 1:
-        twice = points[np.repeat(counts > 1, counts)][0]
-        what = f"x = {twice[0]:.9g} m, y = {twice[1]:.9g} m has two heights"
-        raise InputError(what, where, "a wall or an overhang is no bed")
-    start = points.min(axis=0)
-    extent = np.ptp(points, axis=0)
-    step = float(np.sqrt(extent[0] * extent[1] / len(points)))
-    east = np.linspace(0.0, extent[0], round(extent[0] / step) + 1)
-    north = np.linspace(0.0, extent[1], round(extent[1] / step) + 1)
-    of_places = LinearNDInterpolator(points[:, :2] - start[:2], points[:, 2])
-    heights = of_places(*np.meshgrid(east, north))
-    return Raster(path.name, start[0] + east, start[1] + north, heights)
-
-
-def _check_stl(content: bytes, where: str) -> None:
-    """Refuse a file that is no whole STL: its reader would write pages of its own."""
-    triangles = int.from_bytes(content[80:84], "little")
-    is_binary = len(content) == STL_HEAD + STL_TRIANGLE * triangles
-    is_text = content.lstrip()[:5] == b"solid" and b"endsolid" in content
-    if not (is_binary or is_text):
-        remedy = "is it an STL file of a surface, seen from above?"
-        raise InputError("it is no whole STL file", where, remedy)
-
-
-def _seen_from_above(path: Path, where: str) -> FloatArray:
-    """The vertices of the triangles of an STL file that are seen from above, (n, 3)."""
-    import meshio
-
-    remedy = "is it an STL file of a surface, seen from above?"
-    try:
-        with warnings.catch_warnings():
-            # the count of triangles that it reads in a text overflows
-            warnings.simplefilter("ignore")
-            mesh = meshio.stl.read(path)
-        triangles = mesh.cells_dict["triangle"]
-    except Exception as error:  # a reader of another library raises what it likes
-        what = str(error) or "its lines are not whole triangles"
-        raise InputError(f"not readable: {what}", where, remedy) from None
-    if not np.isfinite(mesh.points).all():
-        raise InputError("a vertex is not a number", where, remedy)
-    corners = mesh.points.astype(float)[triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    _, counts = np.unique(edges, axis=0, return_counts=True)
-    up = np.abs(normal[:, 2])
-    if (counts > 1).all():
-        # the sides and the bottom of a closed body are no bed; the normals of a body
-        # with a volume below 0 are inwards
-        volume = (corners[:, 0] * normal).sum()
-        up = np.sign(volume) * normal[:, 2]
-    is_upper = up > 1e-6 * np.linalg.norm(normal, axis=1)
-    points = np.unique(corners[is_upper].reshape(-1, 3), axis=0)
-    if len(points) < FEWEST**2:
-        raise InputError(f"{len(points)} vertices are no surface", where, remedy)
-    return points
-
-
-def _of_geotiff(content: bytes, name: str, where: str) -> Raster:
+def _of_geotiff(path: Path, where: str) -> Raster:
     """The raster of a GeoTIFF of one band."""
-    from PIL import Image, UnidentifiedImageError
-
-    try:
-        with warnings.catch_warnings():
-            # Pillow warns of large images; the size is checked here
-            warnings.simplefilter("ignore")
-            image = Image.open(io.BytesIO(content), formats=["TIFF"])
-            if image.width * image.height > MOST_NODES:
-                what = f"{image.width} x {image.height} cells, over {MOST_NODES}"
-                remedy = "resample it to larger cells, with gdalwarp -tr"
-                raise InputError(what, where, remedy)
-            image.load()
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        what = f"no readable GeoTIFF: {error}"
-        if isinstance(error, UnidentifiedImageError):
-            what = "no readable GeoTIFF: it is cut off, or another kind of file"
-        remedy = "heights are one band: gdal_translate -b 1 -ot Float32"
-        raise InputError(what, where, remedy) from None
-    if len(image.getbands()) != 1 or image.mode in ("P", "1", "L"):
-        what = f"its pixels are {image.mode}, a picture, not heights"
-        raise InputError(what, where, "export the elevation model, not its picture")
-    heights = np.array(image, float)[::-1]
-    tags: Any = getattr(image, "tag_v2", {})
-    kept = {key: tags[key] for key in (KEYS, KEY_NUMBERS, KEY_TEXTS) if key in tags}
-    heights = _without(heights, str(tags.get(NODATA, "")).strip("\0 "))
-    _check_units(_keys(kept), where)
-    heights = _in_metres(heights, _metadata(tags, where), where)
-    along_x, along_y = _geotiff_axes(image, kept, where)
-    return Raster(name, along_x, along_y, heights, kept)
+    with _opened(path, "GTiff", where) as dataset:
+        _check_band(dataset, where)
+        _check_system(dataset.crs, where)
+        unit = dataset.units[0] or ""
+        if unit.lower() not in ("", *METRE):
+            what = f"its heights are in {unit}"
+            raise InputError(what, where, "they must be in m: gdal_calc")
+        return _raster(dataset, path.name, dataset.crs, dataset.nodata, where)
 
 
-def _keys(tags: Mapping[int, Any]) -> dict[int, int]:
-    """The keys of a GeoTIFF whose value is a short integer."""
-    table = np.array(tags.get(KEYS, ()), int)
-    entries = table[4 : 4 * (len(table) // 4)].reshape(-1, 4)
-    found = {}
-    for key, place, _, value in entries.tolist():
-        if place == 0:
-            found[key] = value
-    return found
+def _opened(path: Path | str, driver: str, where: str, **options: str) -> Any:
+    """A file as rasterio opens it; an `InputError` for one that is no such raster."""
+    library = rasterio(where)
+    with warnings.catch_warnings():
+        # without a place on the Earth it has no transform, which is refused
+        warnings.simplefilter("ignore", library.errors.NotGeoreferencedWarning)
+        try:
+            return library.open(path, driver=driver, **options)
+        except library.errors.RasterioError:
+            what = f"no readable {driver}: it is cut off, or another kind of file"
+            remedy = "write it anew, with gdal_translate"
+            raise InputError(what, where, remedy) from None
 
 
-def _check_units(keys: Mapping[int, int], where: str) -> None:
-    """Refuse a GeoTIFF whose axes or heights are not in metres."""
-    if keys.get(MODEL) == DEGREES:
-        what = "its axes are degrees of longitude and latitude"
-        remedy = "project it to metres, with gdalwarp -t_srs EPSG:326NN, NN the zone"
+def _check_band(dataset: Any, where: str) -> None:
+    """Refuse pictures, and more cells than a surface has."""
+    pixels = ", ".join(dict.fromkeys(dataset.dtypes))
+    is_picture = pixels in ("uint8", "int8") or pixels.startswith("complex")
+    if dataset.count != 1 or is_picture:
+        what = f"its pixels are {dataset.count} x {pixels}, a picture, not heights"
+        remedy = "export the elevation model: one band of 16-bit, 32-bit or 64-bit"
+        raise InputError(what, where, f"{remedy} numbers")
+    if dataset.width * dataset.height > MOST_NODES:
+        what = f"{dataset.width} x {dataset.height} cells, over {MOST_NODES}"
+        remedy = "resample it to larger cells, with gdalwarp -tr"
         raise InputError(what, where, remedy)
-    for unit_key, system, kind, axes in (
-        (LENGTH_UNIT, PROJECTED, epsg.PROJECTED, "axes"),
-        (HEIGHT_UNIT, VERTICAL, epsg.VERTICAL, "heights"),
-    ):
-        unit = keys.get(unit_key)
-        what = f"its {axes} are in feet"
-        if unit is None:
-            # the unit is that of the coordinate system
-            metres = epsg.unit_of(kind, keys.get(system))
-            of_unit = "feet" if round(metres, 3) == FOOT else f"units of {metres:g} m"
-            what = f"it is in EPSG:{keys.get(system)}, whose {axes} are in {of_unit}"
-        elif unit == METRE or unit in FEET:
-            metres = FEET.get(unit, 1.0)
-        else:
-            what = f"its {axes} are in the unit EPSG:{unit}, not metres"
-            raise InputError(what, where, "project it to metres, with gdalwarp -t_srs")
-        if metres != 1:
+    scale, offset = dataset.scales[0], dataset.offsets[0]
+    if not (scale and np.isfinite([scale, offset]).all()):
+        what = f"its scale is {scale:g}, and its offset {offset:g}"
+        raise InputError(what, where, "GDAL's scale of a band is a number other than 0")
+
+
+def _raster(
+    dataset: Any, name: str, system: Any, empty: float | None, where: str
+) -> Raster:
+    """The raster of a band, its rows from south to north."""
+    x, y = _axes(dataset, where)
+    library = rasterio(where)
+    try:
+        stored = dataset.read(1, masked=True)
+    except library.errors.RasterioError as error:
+        what = f"its heights are not readable: {error}"
+        raise InputError(what, where, "is the file cut off?") from None
+    is_empty = np.ma.getmaskarray(stored)
+    values = np.ma.getdata(stored).astype(float)
+    if empty is not None:
+        is_empty = is_empty | np.isclose(values, empty, rtol=NEAR_EMPTY, atol=0.0)
+    heights = values * dataset.scales[0] + dataset.offsets[0]
+    heights[is_empty] = np.nan
+    return Raster(name, x, y, heights[::-1], system.to_wkt() if system else "")
+
+
+def _axes(dataset: Any, where: str) -> tuple[FloatArray, FloatArray]:
+    """The axes of a raster, to the middles of its cells, m."""
+    step_x, turn_x, west, turn_y, down, north = dataset.transform[:6]
+    if dataset.transform.is_identity:
+        what = "it says nothing of the size of its pixels"
+        raise InputError(what, where, "export it with a world file, or as .asc")
+    if turn_x or turn_y:
+        remedy = "turn its axes to x and y, with gdalwarp"
+        raise InputError("its axes are turned", where, remedy)
+    if not (step_x > 0 > down and np.isfinite([step_x, down, west, north]).all()):
+        what = f"its cells are {step_x:g} x {-down:g} m at x = {west:g} m"
+        raise InputError(what, where, "rows run from north to south: gdalwarp")
+    x = west + step_x * (np.arange(dataset.width) + 0.5)
+    south = north + down * dataset.height
+    return x, south - down * (np.arange(dataset.height) + 0.5)
+
+
+def _check_system(system: Any, where: str) -> None:
+    """Refuse a coordinate reference system that is not in metres."""
+    if system is None:
+        return
+    described = system.to_dict(projjson=True)
+    code = system.to_epsg()
+    name = f"EPSG:{code}" if code else described["name"]
+    for quantity, unit, metres in _units(described):
+        if metres is None:
+            what = f"its {quantity} are degrees of longitude and latitude"
+            remedy = (
+                "project it to metres, with gdalwarp -t_srs EPSG:326NN, NN the zone"
+            )
+            raise InputError(what, where, remedy)
+        if abs(metres - 1) > UNIT_OFF:
+            what = f"it is in {name}, whose {quantity} are in {unit}"
             remedy = f"multiply them by {metres:.7g}: they must be in m"
             raise InputError(what, where, remedy)
 
 
-def _metadata(tags: Mapping[int, Any], where: str) -> dict[str, str]:
-    """What GDAL says of the heights of a GeoTIFF: scale, offset and unit."""
-    text = str(tags.get(METADATA, "")).strip("\0 \n")
-    if not text:
-        return {}
+def _units(described: Mapping[str, Any]) -> Iterator[tuple[str, str, float | None]]:
+    """What the axes of a system measure, their units, and these in m; None of angles.
+
+    The system is described by PROJJSON.
+    """
+    parts = described.get("components") or [described.get("source_crs", described)]
+    for part in parts:
+        quantity = "heights" if part["type"] == "VerticalCRS" else "axes"
+        for axis in part["coordinate_system"]["axis"]:
+            unit = axis["unit"]
+            if isinstance(unit, str):
+                yield quantity, unit, 1.0 if unit == "metre" else None
+            else:
+                is_angle = unit["type"] == "AngularUnit"
+                metres = None if is_angle else unit["conversion_factor"]
+                yield quantity, unit["name"], metres
+
+
+def _of_grid(path: Path, where: str) -> Raster:
+    """The raster of an ESRI ASCII grid."""
+    system = _system_beside(path.with_suffix(".prj"), where)
+    text = decoded(read_bytes(path, LARGEST, where), where)
+    empty = _check_grid(text, where)
+    # a mark of the encoding is no part of the text
+    memory = rasterio(where).MemoryFile(text.encode(), ext=".asc")
+    # numbers as they are written: 32-bit ones have seven digits
+    precise = {"DATATYPE": "Float64"}
+    with memory, _opened(memory.name, "AAIGrid", where, **precise) as dataset:
+        return _raster(dataset, path.name, system, empty, where)
+
+
+def _check_grid(text: str, where: str) -> float | None:
+    """Refuse a grid that its reader would take for another one.
+
+    It takes a word for 0, a decimal comma for a point, an unknown key for none, and a
+    file that is cut off for a whole one. Returned is the number of empty cells; None
+    for a word, which the reader knows.
+    """
+    lines = text.splitlines()
+    head = _head_of_grid(lines, where)
+    before = len(head)
+    empty = head.pop(EMPTY, UNNAMED_EMPTY)
+    sizes = {key: _number(word, f"{where}: {key}") for key, word in head.items()}
+    for key, value in sizes.items():
+        is_step = key in STEPS
+        if not np.isfinite(value) or (is_step and value <= 0):
+            remedy = "it is in m, above 0" if is_step else "it is in m"
+            raise InputError(f"{key} {value:g}", where, remedy)
+    is_word = empty.lower() in WORDS
+    word = empty if is_word else "nan"
+    widths = _widths(lines[before:], before, word, where)
+    columns, rows = sizes["ncols"], sizes["nrows"]
+    if columns % 1 or columns * rows != sum(widths) or min(columns, rows) < FEWEST:
+        what = f"{sum(widths)} heights, not {columns:.9g} x {rows:.9g}"
+        remedy = f"nrows lines of ncols numbers, {FEWEST} of each at least"
+        raise InputError(what, where, remedy)
+    if {*widths} == {rows} and rows != columns:
+        what = f"its lines have {rows:.9g} numbers, and ncols is {columns:.9g}"
+        raise InputError(what, where, "are ncols and nrows exchanged?")
+    return None if is_word else _number(empty, f"{where}: {EMPTY}")
+
+
+def _head_of_grid(lines: list[str], where: str) -> dict[str, str]:
+    """The words at the head of a grid by their keys, a line for each."""
+    head: dict[str, str] = {}
+    for line in lines:
+        words = line.split()
+        if len(words) != 2 or not words[0][0].isalpha() or words[0] in WORDS:
+            break
+        key = words[0].lower()
+        if key in head:
+            raise InputError(f"{key} stands twice", where, "remove one of the lines")
+        if key not in GRID_KEYS:
+            what = f"{words[0]} is no key of a grid"
+            raise InputError(what, where, f"its head has {', '.join(GRID_KEYS)}")
+        head[key] = words[1]
+    for one, others in NEEDED.items():
+        if one in head and others & head.keys():
+            what = f"its head has {one} and {' and '.join(others & head.keys())}"
+            raise InputError(what, where, "leave one of the two")
+        if one not in head and not (others and others <= head.keys()):
+            remedy = "its head has ncols, nrows, xllcorner, yllcorner, cellsize"
+            raise InputError(f"{one} is missing", where, remedy)
+    return head
+
+
+def _widths(lines: list[str], before: int, word: str, where: str) -> list[int]:
+    """How many heights each line has; `before` lines stand before them in the file.
+
+    The word is that of empty cells.
+    """
+    widths = []
+    for place, line in enumerate(lines, before + 1):
+        words = line.split()
+        for each in words:
+            if each != word:
+                _number(each, f"{where}: line {place}")
+        if words:
+            widths.append(len(words))
+    return widths
+
+
+def _number(word: str, where: str) -> float:
+    """The number that a word is; an `InputError` for any other word."""
     try:
-        items = ElementTree.fromstring(text).iter("Item")
-    except ElementTree.ParseError as error:
-        what = f"GDAL's metadata are not readable: {error}"
-        raise InputError(what, where, "write it anew, with gdal_translate") from None
-    return {item.get("role", ""): (item.text or "").strip() for item in items}
+        return number(word)
+    except ValueError:
+        remedy = "numbers with a decimal point, spaces between them"
+        raise InputError(f"{word!r} is no number", where, remedy) from None
 
 
-def _in_metres(
-    heights: FloatArray, metadata: Mapping[str, str], where: str
-) -> FloatArray:
-    """Heights by the scale and the offset with which they are stored."""
-    unit = metadata.get("unittype", "")
-    if unit.lower() not in ("", *METRES):
-        what = f"its heights are in {unit}"
-        raise InputError(what, where, "they must be in m: gdal_calc")
-    found = {}
-    for role, usual in (("scale", "1"), ("offset", "0")):
-        text = metadata.get(role, usual)
-        value = number(text) if _is_number(text) else np.nan
-        if not np.isfinite(value) or (role == "scale" and not value):
-            what = f"its {role} is {text!r}"
-            raise InputError(what, where, f"GDAL's {role} of a band is a number")
-        found[role] = value
-    return np.asarray(heights * found["scale"] + found["offset"])
+def _system_beside(path: Path, where: str) -> Any:
+    """The coordinate reference system in the file .prj beside a grid.
+
+    It is None without the file, and where the file is of the old kind of Arc/Info. One
+    in another unit than metres is refused.
+    """
+    if not path.is_file():
+        return None
+    library = rasterio(where)
+    where = f"{where}: {path.name}"
+    text = decoded(read_bytes(path, LARGEST_PROJECTION, where), where)
+    units = UNIT_OF_ARCINFO.findall(text)
+    for unit in units:
+        if unit.lower() not in (UNSAID, *METRE):
+            what = f"its lengths are in {unit}"
+            raise InputError(what, where, "project it to metres, with gdalwarp -t_srs")
+    if units:
+        return None
+    try:
+        with library.Env():  # what PROJ says goes nowhere else
+            system = library.crs.CRS.from_wkt(text, morph_from_esri_dialect=True)
+    except library.errors.CRSError:
+        what = "it is no coordinate system in well-known text"
+        raise InputError(what, where, "remove it, if all lengths are in m") from None
+    _check_system(system, where)
+    return system
 
 
-def _geotiff_axes(
-    image: "Image", tags: Mapping[int, Any], where: str
-) -> tuple[FloatArray, FloatArray]:
-    """The axes of a GeoTIFF, to the middles of its pixels."""
-    x0, y0, step_x, step_y = _geotiff_corner(getattr(image, "tag_v2", {}), where)
-    if min(step_x, step_y) <= 0:
-        what = f"its pixels are {step_x:g} x {step_y:g} m"
-        raise InputError(what, where, "rows run from north to south: gdalwarp")
-    half = 0.0 if _keys(tags).get(PIXEL) == POINT else 0.5
-    # the first row is the northernmost
-    south = y0 - step_y * (image.height - 1 + half)
-    along_x = _steps(x0 + step_x * half, step_x, image.width)
-    return along_x, _steps(south, step_y, image.height)
-
-
-def _geotiff_corner(
-    tags: Mapping[int, Any], where: str
-) -> tuple[float, float, float, float]:
-    """Place of the first pixel's corner or middle, and steps along x and y, m."""
-    if TRANSFORMATION in tags:
-        step_x, turn_x, _, x0, turn_y, down, _, y0 = tags[TRANSFORMATION][:8]
-        if turn_x or turn_y:
-            remedy = "turn its axes to x and y, with gdalwarp"
-            raise InputError("its axes are turned", where, remedy)
-        return x0, y0, step_x, -down
-    if SCALE in tags and TIE_POINT in tags:
-        step_x, step_y = tags[SCALE][:2]
-        column, row, _, x0, y0, _ = tags[TIE_POINT][:6]
-        return x0 - column * step_x, y0 + row * step_y, step_x, step_y
-    what = "it says nothing of the size of its pixels"
-    remedy = "export it with a scale and a tie point, or as .asc"
-    raise InputError(what, where, remedy)
-
-
-def _steps(start: float, step: float, count: int) -> FloatArray:
-    """An axis of equal steps."""
-    return np.asarray(start + step * np.arange(count), float)
-
-
-def geotiff(
-    x: FloatArray,
-    y: FloatArray,
-    values: ArrayLike,
-    tags: Tags,
-) -> bytes:
+def geotiff(x: FloatArray, y: FloatArray, values: ArrayLike, system: str) -> bytes:
     """Write a map as a GeoTIFF of 32-bit numbers, for a GIS.
 
     Parameters
@@ -496,35 +387,30 @@ def geotiff(
         Axes to the middles of its cells, m, rising, of shapes (nx,) and (ny,).
     values
         The map, of shape (ny, nx), NaN where it has no value.
-    tags
-        Tags of the GeoTIFF that the bed was read from; empty without any.
+    system
+        Coordinate reference system as well-known text; empty without any.
 
     Returns
     -------
     bytes
         The file.
     """
-    from PIL import Image
-    from PIL.TiffImagePlugin import ImageFileDirectory_v2
-
+    library = rasterio("maps")
+    rows = np.asarray(values, np.float32)[::-1]
     step_x = float(np.ptp(x)) / (len(x) - 1)
     step_y = float(np.ptp(y)) / (len(y) - 1)
-    kept = {**BARE_TAGS, **tags}
-    half = 0.0 if _keys(kept).get(PIXEL) == POINT else 0.5
-    corner = (float(x[0]) - half * step_x, float(y[-1]) + half * step_y)
-    directory = ImageFileDirectory_v2()
-    types = {KEYS: 3, KEY_NUMBERS: 12, KEY_TEXTS: 2, NODATA: 2}
-    types |= {SCALE: 12, TIE_POINT: 12}
-    kept |= {
-        SCALE: (step_x, step_y, 0.0),
-        TIE_POINT: (0.0, 0.0, 0.0, *corner, 0.0),
-        NODATA: "nan",
-    }
-    for key, value in kept.items():
-        directory.tagtype[key] = types[key]
-        directory[key] = value
-    rows = np.asarray(values, np.float32)[::-1]
-    stream = io.BytesIO()
-    image = Image.fromarray(np.ascontiguousarray(rows))
-    image.save(stream, "TIFF", tiffinfo=directory, compression="tiff_lzw")
-    return stream.getvalue()
+    west, north = float(x[0]) - step_x / 2, float(y[-1]) + step_y / 2
+    with library.MemoryFile() as memory:
+        with memory.open(
+            driver="GTiff",
+            width=len(x),
+            height=len(y),
+            count=1,
+            dtype="float32",
+            nodata=np.nan,
+            compress="lzw",
+            crs=system or None,
+            transform=library.Affine(step_x, 0.0, west, 0.0, -step_y, north),
+        ) as dataset:
+            dataset.write(rows, 1)
+        return bytes(memory.read())

@@ -45,7 +45,7 @@ from orchestrator.surface.parts import (
     SurfaceGrain,
     SurfaceScene,
 )
-from orchestrator.surface.raster import read_surface
+from orchestrator.surface.raster import rasterio, read_surface
 from orchestrator.surface.rose import Rose, read_rose
 
 KIND = "surface"
@@ -144,6 +144,7 @@ def load(source: str | Path) -> SurfaceStudy | None:
     bed = tables.get("bed")
     if not isinstance(bed, dict) or bed.get("kind") != KIND:
         return None
+    rasterio(f"{where}: bed.kind")  # maps are written at the end of hours of runs
     try:
         file = _File.model_validate(tables)
     except ValidationError as error:

@@ -57,7 +57,7 @@ def study_of(
         distance = np.hypot(x - east, (y - north)[:, None])
         z = np.maximum(z, height - distance * tan(radians(SLOPE)))
     z += 100 - fall * x + np.random.default_rng(3).normal(0, noise, z.shape)
-    (folder / "heaps.tif").write_bytes(geotiff(EAST + x, NORTH + y, z, {}))
+    (folder / "heaps.tif").write_bytes(geotiff(EAST + x, NORTH + y, z, ""))
     path = folder / "heaps.toml"
     path.write_text(FILE.format([*directions]) + more)
     found = surface_study.load(path)
@@ -232,7 +232,7 @@ def test_a_low_heap_alone_is_flat_ground_to_ap42(tmp_path: Path) -> None:
     low = 2.2 - 2.2 / 12 * np.hypot(x - 60, (y - 30)[:, None])
     study_of(tmp_path, more=COAL)
     heights = np.maximum(np.maximum(high, low), 0.0)
-    (tmp_path / "heaps.tif").write_bytes(geotiff(EAST + x, NORTH + y, heights, {}))
+    (tmp_path / "heaps.tif").write_bytes(geotiff(EAST + x, NORTH + y, heights, ""))
     study = surface_study.load(tmp_path / "heaps.toml")
     assert study is not None
     experiment = erosion.experiment(study, tmp_path)

@@ -5,13 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rasterio
 
 from orchestrator.errors import InputError
-from orchestrator.surface import raster
 from orchestrator.surface.heights import (
     Raster,
     Surface,
-    Tags,
     barchan,
     checked,
     cone,
@@ -22,7 +21,10 @@ from orchestrator.types import FloatArray
 
 EAST, NORTH = 512_000.0, 5_640_000.0
 WHERE = "pile.toml: bed.surface"
-WHOLE = "ncols 9\nnrows 9\ncellsize {}\nxllcorner {}\n" + 9 * f"{9 * '0 '}\n"
+CORNER = "xllcorner 0\nyllcorner 0\n"
+WHOLE = (
+    "ncols 9\nnrows 9\ncellsize {}\nxllcorner {}\nyllcorner 0\n" + 9 * f"{9 * '0 '}\n"
+)
 """An ESRI grid of level ground."""
 
 
@@ -36,14 +38,14 @@ def hill(rows: int = 60, columns: int = 80, step: float = 0.5) -> Raster:
 
 
 def with_heights(of: Raster, z: FloatArray) -> Raster:
-    return Raster(of.name, of.x, of.y, z, of.tags)
+    return Raster(of.name, of.x, of.y, z, of.system)
 
 
 def written(folder: Path, of: Raster, ending: str) -> Path:
     """The raster in a file of each kind."""
     path = folder / f"hill{ending}"
     if ending == ".tif":
-        path.write_bytes(geotiff(of.x, of.y, of.z, {}))
+        path.write_bytes(geotiff(of.x, of.y, of.z, ""))
     elif ending == ".asc":
         step = of.x[1] - of.x[0]
         head = f"ncols {len(of.x)}\nnrows {len(of.y)}\n"
@@ -155,33 +157,31 @@ def test_an_stl_file_gives_its_surface(tmp_path: Path) -> None:
 
 
 def test_a_map_as_geotiff_comes_back_to_the_bit(tmp_path: Path) -> None:
-    keys = (1, 1, 0, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, 32632)
-    tags: Tags = {raster.KEYS: keys, raster.KEY_TEXTS: "ETRS89 / UTM 32N|"}
+    system = rasterio.crs.CRS.from_epsg(32632)
     of = hill()
     values = of.z.astype(np.float32)
     values[3:6, 4] = np.nan
     path = tmp_path / "map.tif"
-    path.write_bytes(geotiff(of.x, of.y, values, tags))
-    again = raster._of_geotiff(path.read_bytes(), path.name, WHERE)
-    assert np.array_equal(again.z.astype(np.float32), values, equal_nan=True)
+    path.write_bytes(geotiff(of.x, of.y, values, system.to_wkt()))
+    with rasterio.open(path) as dataset:
+        assert np.array_equal(dataset.read(1)[::-1], values, equal_nan=True)
+        assert np.isnan(dataset.nodata)
+        assert dataset.crs == system
+        # the middle of the first cell is the north-western node
+        assert dataset.xy(0, 0) == pytest.approx((of.x[0], of.y[-1]), abs=1e-6)
+    values[3:6, 4] = 100.0
+    path.write_bytes(geotiff(of.x, of.y, values, system.to_wkt()))
+    again = read_surface(path, WHERE)
     assert again.x == pytest.approx(of.x, abs=1e-6)
     assert again.y == pytest.approx(of.y, abs=1e-6)
-    assert tuple(again.tags[raster.KEYS]) == keys
     # what is read from a map keeps its place on the Earth
-    assert again.tags[raster.KEY_TEXTS] == tags[raster.KEY_TEXTS]
+    assert rasterio.crs.CRS.from_wkt(again.system) == system
 
 
-def test_a_pixel_that_is_a_point_is_not_moved_by_half(tmp_path: Path) -> None:
-    of = hill()
-    tags = {raster.KEYS: (1, 1, 0, 1, raster.PIXEL, 0, 1, raster.POINT)}
+def test_maps_without_a_place_on_the_earth_have_no_system(tmp_path: Path) -> None:
     path = tmp_path / "map.tif"
-    path.write_bytes(geotiff(of.x, of.y, of.z, tags))
-    assert read_surface(path, WHERE).x == pytest.approx(of.x, abs=1e-6)
-    from PIL import Image
-
-    with Image.open(path) as image:
-        tie = image.tag_v2[raster.TIE_POINT]  # type: ignore[attr-defined]
-    assert tie[3:5] == (of.x[0], of.y[-1])
+    path.write_bytes(geotiff(hill().x, hill().y, hill().z, ""))
+    assert read_surface(path, WHERE).system == ""
 
 
 def test_a_hole_is_refused_with_its_place() -> None:
@@ -381,14 +381,26 @@ def test_a_form_of_few_cells_is_refused() -> None:
         ("a.xyz", "0 0 0\n", "1 points are no surface"),
         ("a.xyz", "z x q\n1 2 3\n", "line 1: the columns are z, x, q"),
         ("a.xyz", "1 2 3\ninf 2 3\n", "line 2: x or y is not a number"),
-        ("a.asc", "ncols 9.5\nnrows 9\ncellsize 1\n1 2 3\n", "3 heights, not 9.5 x 9"),
+        (
+            "a.asc",
+            CORNER + "ncols 9.5\nnrows 9\ncellsize 1\n1 2 3\n",
+            "3 heights, not 9.5 x 9",
+        ),
         ("a.asc", WHOLE.format("inf", 0), "cellsize inf"),
         ("a.asc", WHOLE.format(1, "nan"), "xllcorner nan"),
-        ("a.asc", "ncols 9\nnrows 9\n1 2\n", "cellsize is missing"),
+        ("a.asc", CORNER + "ncols 9\nnrows 9\n1 2\n", "cellsize is missing"),
         ("a.asc", "ncols 9\nnrows 9\nncols 8\n1 2\n", "ncols stands twice"),
-        ("a.asc", "ncols 9\nnrows 9\ncellsize 1\n1 2 x\n", "line 4: 'x' is no number"),
-        ("a.asc", "ncols 9\nnrows 9\ncellsize 1\n1 2 3\n", "3 heights, not 9 x 9"),
-        ("a.tif", "no picture", "GeoTIFF: it is cut off, or another kind of file"),
+        (
+            "a.asc",
+            CORNER + "ncols 9\nnrows 9\ncellsize 1\n1 2 x\n",
+            "line 6: 'x' is no number",
+        ),
+        (
+            "a.asc",
+            CORNER + "ncols 9\nnrows 9\ncellsize 1\n1 2 3\n",
+            "3 heights, not 9 x 9",
+        ),
+        ("a.tif", "no picture", "GTiff: it is cut off, or another kind of file"),
         ("a.stl", "no triangles", "it is no whole STL file"),
         ("a.las", "points", "'.las' is of no surface"),
     ],
@@ -461,24 +473,6 @@ def test_points_off_the_grid_are_refused_with_their_line(tmp_path: Path) -> None
     lines[7] = f"{float(x) + 0.21} {y} {z}"
     path.write_text("\n".join(lines))
     with pytest.raises(InputError, match="is on no grid"):
-        read_surface(path, WHERE)
-
-
-@pytest.mark.parametrize(
-    ("key", "unit", "message"),
-    [
-        (raster.LENGTH_UNIT, 9002, "its axes are in feet"),
-        (raster.HEIGHT_UNIT, 9003, "its heights are in feet"),
-        (raster.MODEL, raster.DEGREES, "degrees of longitude and latitude"),
-    ],
-)
-def test_other_units_are_refused(
-    tmp_path: Path, key: int, unit: int, message: str
-) -> None:
-    tags = {raster.KEYS: (1, 1, 0, 1, key, 0, 1, unit)}
-    path = tmp_path / "hill.tif"
-    path.write_bytes(geotiff(hill().x, hill().y, hill().z, tags))
-    with pytest.raises(InputError, match=message):
         read_surface(path, WHERE)
 
 

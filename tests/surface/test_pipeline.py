@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from PIL import Image
+import rasterio
 
 from orchestrator import pipeline
 from orchestrator.cli import main
 from orchestrator.errors import OrchestratorError
 from orchestrator.physics.constants import KARMAN
 from orchestrator.stockpile import erosion
-from orchestrator.surface import onset, raster
+from orchestrator.surface import onset
 from orchestrator.surface import study as surface_study
 from orchestrator.surface.heights import cone
 
@@ -116,8 +116,8 @@ def test_motion_starts_where_the_answer_says(
 def test_the_hours_of_the_map_are_those_of_the_rose(folder: Path) -> None:
     hours = folder / "maps" / "1-hours_a_year.tif"
     winds = folder / "maps" / "1-wind_m_s-270.tif"
-    with Image.open(hours) as image, Image.open(winds) as other:
-        values, wind = np.array(image, float), np.array(other, float)
+    with rasterio.open(hours) as one, rasterio.open(winds) as other:
+        values, wind = one.read(1).astype(float), other.read(1).astype(float)
     is_form = np.isfinite(wind)
     by_hand = 8760 * np.select([wind <= 4, wind <= 9, wind <= 16], [1.0, 0.6, 0.2], 0.0)
     assert values[is_form] == pytest.approx(by_hand[is_form], rel=1e-6)
@@ -133,11 +133,10 @@ def test_maps_lie_where_the_surface_lies(folder: Path) -> None:
     assert np.nanmax(body["ustar_over_ustar0-270"]) > 1.5
     heap = cone(10.0, 26.0)
     by_x = heap.steps[0]
-    with Image.open(folder / "maps" / "1-ustar_over_ustar0-270.tif") as image:
-        tags: Any = image.tag_v2  # type: ignore[attr-defined]
-        step = tags[raster.SCALE][0]
-        east, north = tags[raster.TIE_POINT][3:5]
-        values = np.array(image, float)[::-1]
+    with rasterio.open(folder / "maps" / "1-ustar_over_ustar0-270.tif") as dataset:
+        step, _ = dataset.res
+        east, north = dataset.transform * (0, 0)
+        values = dataset.read(1)[::-1]
     # cells are nodes of the surface, and the form lies about its middle
     assert step / by_x == pytest.approx(round(step / by_x))
     columns = np.nonzero(np.isfinite(values))[1]

@@ -4,25 +4,37 @@ The heap is higher in its south-east: a mirrored, turned or shifted map is anoth
 """
 
 import io
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import rasterio
 from numpy.typing import NDArray
 from PIL import Image
 from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
 from orchestrator.errors import InputError
-from orchestrator.surface import raster
 from orchestrator.surface.heights import Surface
-from orchestrator.surface.raster import geotiff, read_surface
+from orchestrator.surface.raster import read_surface
 from orchestrator.types import FloatArray
 
 EAST, NORTH = 512_300.0, 5_640_800.0
 WHERE = "heap.toml: bed.surface"
 COLUMNS, ROWS = 44, 36
+SCALE, TIE_POINT, KEYS, METADATA, NODATA = 33550, 33922, 34735, 42112, 42113
+"""Tags of a GeoTIFF (OGC 19-008r4), GDAL's for its metadata and for empty cells."""
+MODEL, PIXEL, SYSTEM, PROJECTED, LENGTH_UNIT, VERTICAL = (
+    1024,
+    1025,
+    2048,
+    3072,
+    3076,
+    4096,
+)
+"""Keys of a GeoTIFF: kind of the axes, what a pixel is, codes of systems, a unit."""
 
 
 def heights() -> FloatArray:
@@ -180,25 +192,33 @@ def test_cells_of_a_foot_in_millimetres_are_on_a_grid(tmp_path: Path) -> None:
     check_is_the_heap(found, 0.3048)
 
 
-def tif(values: NDArray[Any], **items: str | float) -> bytes:
-    """A GeoTIFF with items of GDAL's metadata."""
+def tif(
+    values: NDArray[Any],
+    keys: dict[int, int] | None = None,
+    half: float = 0.5,
+    **items: str | float,
+) -> bytes:
+    """A GeoTIFF with keys and with items of GDAL's metadata, written tag by tag."""
     directory = ImageFileDirectory_v2()
-    doubles = {
-        raster.SCALE: (1.0, 1.0, 0.0),
-        raster.TIE_POINT: (0.0, 0.0, 0.0, EAST - 0.5, NORTH + ROWS - 0.5, 0.0),
+    corner = (EAST - half, NORTH + ROWS - 1 + half)
+    types = {SCALE: 12, TIE_POINT: 12, KEYS: 3, METADATA: 2, NODATA: 2}
+    tags: dict[int, Any] = {
+        SCALE: (1.0, 1.0, 0.0),
+        TIE_POINT: (0.0, 0.0, 0.0, *corner, 0.0),
     }
-    for key, value in doubles.items():
-        directory.tagtype[key] = 12
-        directory[key] = value
+    if keys:
+        entries = [part for key in sorted(keys) for part in (key, 0, 1, keys[key])]
+        tags[KEYS] = (1, 1, 0, len(keys), *entries)
     if items:
         listed = [
             f'<Item name="{role.upper()}" sample="0" role="{role}">{value}</Item>'
             for role, value in items.items()
         ]
-        directory.tagtype[raster.METADATA] = 2
-        directory[raster.METADATA] = f"<GDALMetadata>{''.join(listed)}</GDALMetadata>\n"
-        directory.tagtype[raster.NODATA] = 2
-        directory[raster.NODATA] = "-32768"
+        tags[METADATA] = f"<GDALMetadata>{''.join(listed)}</GDALMetadata>\n"
+        tags[NODATA] = "-32768"
+    for tag, value in tags.items():
+        directory.tagtype[tag] = types[tag]
+        directory[tag] = value
     stream = io.BytesIO()
     image = Image.fromarray(np.ascontiguousarray(values[::-1]))
     image.save(stream, "TIFF", tiffinfo=directory)
@@ -230,14 +250,14 @@ def test_packed_heights_use_all_numbers_of_their_type(tmp_path: Path) -> None:
     [
         ({"unittype": "ft"}, "its heights are in ft"),
         ({"unittype": "US survey foot"}, "its heights are in US survey foot"),
-        ({"scale": "0"}, "its scale is '0'"),
-        ({"offset": "high"}, "its offset is 'high'"),
+        ({"scale": "0"}, "its scale is 0"),
+        ({"offset": "nan"}, "its offset nan"),
     ],
 )
 def test_metadata_in_which_no_metre_stands_is_refused(
     tmp_path: Path, items: dict[str, str], message: str
 ) -> None:
-    content = tif(heights().astype(np.float32), **items)
+    content = tif(heights().astype(np.float32), None, 0.5, **items)
     assert message in refused(tmp_path, content, "heap.tif")
 
 
@@ -249,24 +269,17 @@ def test_metres_of_gdals_metadata_are_metres(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
-        ({raster.PROJECTED: 2277}, "EPSG:2277, whose axes are in feet.*0.3048006"),
-        ({raster.PROJECTED: 6494}, r"EPSG:6494, whose axes are in feet.*by 0\.3048:"),
-        ({raster.PROJECTED: 22300}, "EPSG:22300, whose axes are in units of 1000 m"),
-        ({raster.VERTICAL: 6360}, "EPSG:6360, whose heights are in feet"),
-        (
-            {raster.PROJECTED: 32632, raster.LENGTH_UNIT: 9036},
-            "unit EPSG:9036, not metres",
-        ),
-        ({raster.LENGTH_UNIT: 32767}, "unit EPSG:32767, not metres"),
+        ({PROJECTED: 2277}, "EPSG:2277, whose axes are in US survey foot.*0.3048006"),
+        ({PROJECTED: 6494}, r"EPSG:6494, whose axes are in foot.*by 0\.3048:"),
+        ({PROJECTED: 22300}, "EPSG:22300, whose axes are in kilometre.* by 1000:"),
+        ({PROJECTED: 32632, VERTICAL: 6360}, "its heights are in US survey foot"),
+        ({PROJECTED: 32632, LENGTH_UNIT: 9036}, "whose axes are in kilometre"),
     ],
 )
-def test_a_coordinate_system_in_feet_is_refused(
+def test_a_coordinate_system_in_another_unit_is_refused(
     tmp_path: Path, keys: dict[int, int], message: str
 ) -> None:
-    entries = [part for key, value in keys.items() for part in (key, 0, 1, value)]
-    table = (1, 1, 0, len(keys), *entries)
-    of = read(tmp_path, points("{x} {y} {z}"), "heap.xyz")
-    content = geotiff(of.x, of.y, of.z, {raster.KEYS: table})
+    content = tif(heights().astype(np.float32), {MODEL: 1, **keys})
     with pytest.raises(InputError, match=message):
         read(tmp_path, content, "heap.tif")
 
@@ -275,10 +288,67 @@ def test_a_coordinate_system_in_feet_is_refused(
 def test_a_coordinate_system_in_metres_needs_no_key_of_its_unit(
     tmp_path: Path, code: int
 ) -> None:
-    of = read(tmp_path, points("{x} {y} {z}"), "heap.xyz")
-    table = (1, 1, 0, 2, raster.PROJECTED, 0, 1, code, raster.VERTICAL, 0, 1, 7837)
-    content = geotiff(of.x, of.y, of.z, {raster.KEYS: table})
-    check_is_the_heap(read(tmp_path, content, "heap.tif"))
+    keys = {MODEL: 1, PROJECTED: code, VERTICAL: 7837}
+    content = tif(heights().astype(np.float32), keys)
+    found = read(tmp_path, content, "heap.tif")
+    check_is_the_heap(found)
+    assert rasterio.crs.CRS.from_wkt(found.system).to_epsg() == code
+
+
+@pytest.mark.parametrize(
+    "compress", ["none", "lzw", "deflate", "zstd", "lzma", "packbits"]
+)
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+@pytest.mark.parametrize("predictor", [1, 3])
+def test_each_compression_is_read_in_tiles(
+    tmp_path: Path, compress: str, dtype: str, predictor: int
+) -> None:
+    path = tmp_path / "heap.tif"
+    profile = {
+        "driver": "GTiff",
+        "count": 1,
+        "dtype": dtype,
+        "width": COLUMNS,
+        "height": ROWS,
+        "transform": rasterio.Affine(1, 0, EAST - 0.5, 0, -1, NORTH + ROWS - 0.5),
+        "tiled": True,
+        "blockxsize": 16,
+        "blockysize": 16,
+        "compress": compress,
+    }
+    if compress in ("lzw", "deflate", "zstd"):
+        profile["predictor"] = predictor
+    with rasterio.open(path, "w", **profile) as dataset:
+        dataset.write(heights()[::-1].astype(dtype), 1)
+    found = read_surface(path, WHERE)
+    check_is_the_heap(found)
+    if dtype == "float64":
+        assert (found.z == heights()).all()
+
+
+@pytest.mark.parametrize("empty", [-3.4028234663852886e38, -9999.0, 1e30, np.nan])
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_declared_empty_cells_of_a_geotiff_have_no_height(
+    tmp_path: Path, empty: float, dtype: str
+) -> None:
+    path = tmp_path / "heap.tif"
+    values = heights().astype(dtype)
+    values[-1, :3] = empty
+    with rasterio.open(
+        path,
+        "w",
+        driver="GTiff",
+        count=1,
+        dtype=dtype,
+        width=COLUMNS,
+        height=ROWS,
+        transform=rasterio.Affine(1, 0, EAST - 0.5, 0, -1, NORTH + ROWS - 0.5),
+        nodata=empty,
+    ) as dataset:
+        dataset.write(values[::-1], 1)
+    found = read_surface(path, WHERE)
+    check_is_the_heap(found)
+    assert "continued as level ground over 3 cells" in found.said[-1]
 
 
 def grid(head: str, empty: str = "", change: Callable[[str], str] = str) -> str:
@@ -314,8 +384,8 @@ def test_empty_cells_of_a_grid_are_those_of_its_mark(
     ("head", "message"),
     [
         ("cellsize 1\ndy 2\n", "cellsize and dy .*leave one of the two"),
-        ("cellsize 1\nxllcorner 3\n", "xllcenter and xllcorner .*leave one"),
-        ("dx 1\ndy 2\n", "cellsize is missing"),
+        ("cellsize 1\nxllcorner 3\n", "xllcorner and xllcenter .*leave one"),
+        ("dx 1\n", "cellsize is missing"),
         ("cellsize 1\nxllcentre 3\n", "xllcentre is no key of a grid"),
     ],
 )
@@ -325,6 +395,32 @@ def test_a_head_that_contradicts_itself_is_refused(
     with pytest.raises(InputError, match=message):
         read(tmp_path, grid(head), "heap.asc")
     refused(tmp_path, grid(head), "heap.asc")
+
+
+@pytest.mark.parametrize("missing", ["ncols", "nrows", "xllcenter", "yllcenter"])
+def test_a_head_that_is_not_whole_is_refused(tmp_path: Path, missing: str) -> None:
+    lines = grid("cellsize 1\n").splitlines()
+    text = "\n".join(line for line in lines if not line.startswith(missing))
+    said = refused(tmp_path, text, "heap.asc")
+    assert f"{missing.replace('center', 'corner')} is missing" in said
+
+
+def test_cells_of_a_grid_may_have_a_step_along_each_axis(tmp_path: Path) -> None:
+    found = read(tmp_path, grid("dx 1\ndy 2\n"), "heap.asc")
+    assert found.steps == pytest.approx((1.0, 2.0))
+    assert (found.x[0], found.y[0]) == (EAST, NORTH)
+    assert found.z == pytest.approx(heights())
+
+
+def test_a_grid_without_a_number_of_empty_cells_has_the_formats(tmp_path: Path) -> None:
+    found = read(tmp_path, grid("cellsize 1\n", "-9999"), "heap.asc")
+    check_is_the_heap(found)
+    assert "continued as level ground over 3 cells" in found.said[-1]
+
+
+def test_a_mark_of_the_encoding_is_no_part_of_a_grid(tmp_path: Path) -> None:
+    text = "\ufeff" + grid("cellsize 1\n")
+    check_is_the_heap(read(tmp_path, text, "heap.asc"))
 
 
 @pytest.mark.parametrize("word", ["1_0", "\u0661", "0,5"])
@@ -353,18 +449,19 @@ def test_exchanged_counts_of_a_grid_are_refused(tmp_path: Path) -> None:
     check_is_the_heap(read(tmp_path, wrapped, "heap.asc"))
 
 
-UTM = 'PROJCS["UTM",GEOGCS["WGS",UNIT["Degree",0.0174532925]],UNIT["{}",{}]]'
+def projection(code: int, version: str = "WKT1_ESRI") -> str:
+    """The text of a file .prj."""
+    return str(rasterio.crs.CRS.from_epsg(code).to_wkt(version=version))
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (
-            UTM.format("Foot_US", 0.3048006096012192),
-            "heap.prj: .*in Foot_US.*0.3048006",
-        ),
-        ('GEOGCS["WGS",UNIT["Degree",0.0174532925]]', "heap.prj: .*are in Degree"),
-        ('BOUNDCRS[PROJCRS["A",LENGTHUNIT["foot",0.3048]]]', "heap.prj: .*in foot"),
+        (projection(2277), "heap.prj: .*in US survey foot.*0.3048006"),
+        (projection(2277, "WKT2_2019"), "heap.prj: it is in EPSG:2277.*survey foot"),
+        (projection(4326), "heap.prj: .*are degrees"),
+        (projection(4326, "WKT2_2019"), "heap.prj: .*are degrees"),
+        (projection(32632)[:90], "heap.prj: it is no coordinate system"),
         ("Projection STATEPLANE\nUnits FEET\n", "heap.prj: .*in FEET"),
         ("Projection UTM\nZunits CENTIMETERS\nUnits METERS\n", "in CENTIMETERS"),
     ],
@@ -380,8 +477,9 @@ def test_a_projection_beside_a_grid_is_not_overlooked(
 @pytest.mark.parametrize(
     "text",
     [
-        UTM.format("Meter", 1.0),
-        UTM.format("metre", "1"),
+        projection(32632),
+        projection(32632, "WKT2_2019"),
+        projection(29373),  # the German legal metre is 1.00001 m
         "Projection UTM\nZunits NO\nUnits METERS\n",
         'LOCAL_CS["none"]',
     ],
@@ -404,10 +502,17 @@ def test_cells_that_look_empty_are_refused(tmp_path: Path) -> None:
         "heap.xyz": ("\n".join(lines), "-9999 in 1 cells"),
         "heap.asc": (grid("cellsize 1\n", "-32768"), "-32768 in 3 cells"),
     }  # fmt: skip
+    remedies = {
+        "heap.tif": "gdal_edit -a_nodata -32768",
+        "float.tif": "gdal_edit -a_nodata -3.40282347e+38",
+        "heap.xyz": "leave such points out",
+        "heap.asc": "NODATA_value -32768",
+    }
     for name, (content, message) in files.items():
         said = refused(tmp_path, content, name)
         assert message in said
         assert "looks like a cell without a height" in said
+        assert remedies[name] in said
 
 
 @pytest.mark.parametrize(("pixel", "half"), [(1, 0.5), (2, 0.0)])
@@ -415,12 +520,39 @@ def test_the_top_of_a_geotiff_is_where_it_stands(
     tmp_path: Path, pixel: int, half: float
 ) -> None:
     # by hand: the tie point is the north-western corner of an area, or its middle
-    of = read(tmp_path, points("{x} {y} {z}"), "heap.xyz")
-    table = (1, 1, 0, 1, raster.PIXEL, 0, 1, pixel)
-    content = geotiff(of.x, of.y, of.z, {raster.KEYS: table})
+    keys = {MODEL: 1, PIXEL: pixel, PROJECTED: 32632}
+    content = tif(heights().astype(np.float32), keys, half)
     found = read(tmp_path, content, "heap.tif")
+    check_is_the_heap(found)
     row, column = np.unravel_index(int(found.z.argmax()), found.z.shape)
     assert (found.x[column], found.y[row]) == (EAST + 27, NORTH + 14)
-    with Image.open(io.BytesIO(content)) as image:
-        tie = image.tag_v2[raster.TIE_POINT]  # type: ignore[attr-defined]
-    assert tie[3:5] == (EAST - half, NORTH + ROWS - 1 + half)
+
+
+def test_axes_in_degrees_are_refused(tmp_path: Path) -> None:
+    content = tif(heights().astype(np.float32), {MODEL: 2, SYSTEM: 4326})
+    assert "degrees of longitude" in refused(tmp_path, content, "heap.tif")
+
+
+def test_a_geotiff_that_is_cut_off_is_refused_in_one_line(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    content = tif(heights().astype(np.float32))
+    for size in (60, len(content) // 2):
+        refused(tmp_path, content[:size], "heap.tif")
+    # no reader of another library says anything of its own
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("name", ["heap.tif", "heap.asc"])
+def test_without_the_extra_one_line_says_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.setitem(sys.modules, "rasterio", None)
+    content = (
+        tif(heights().astype(np.float32))
+        if name == "heap.tif"
+        else grid("cellsize 1\n")
+    )
+    said = refused(tmp_path, content, name)
+    assert "the extra [gis]: rasterio is not installed" in said
+    assert "pip install 'orchestrator[gis]'" in said

@@ -1,5 +1,6 @@
 """Tests of study files on beds in three dimensions."""
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -45,7 +46,7 @@ def test_a_file_is_a_scene_for_each_direction(tmp_path: Path) -> None:
 
 def test_a_raster_and_a_rose_are_read_beside_the_file(tmp_path: Path) -> None:
     heap = cone(10.0, 30.0)
-    (tmp_path / "heap.tif").write_bytes(geotiff(heap.x, heap.y, heap.z, {}))
+    (tmp_path / "heap.tif").write_bytes(geotiff(heap.x, heap.y, heap.z, ""))
     (tmp_path / "year.csv").write_text("from_deg,speed_m_s,share\n0,5,1\n")
     text = FILE.replace('shape = "cone"\nheight = 10\nslope_deg = 30', "{}")
     text += '[erosion]\nwind = "year.csv"\n'
@@ -191,7 +192,7 @@ def test_a_confirmed_unit_is_not_asked_about(tmp_path: Path) -> None:
 def test_a_hole_in_a_raster_names_file_and_field(tmp_path: Path) -> None:
     heap = cone(10.0, 30.0)
     heap.z[80, 80] = np.nan
-    (tmp_path / "heap.tif").write_bytes(geotiff(heap.x, heap.y, heap.z, {}))
+    (tmp_path / "heap.tif").write_bytes(geotiff(heap.x, heap.y, heap.z, ""))
     shape = 'shape = "cone"\nheight = 10\nslope_deg = 30'
     with pytest.raises(InputError, match=r"bed.surface: .*heap.tif: a hole at x = "):
         load(tmp_path, FILE.replace(shape, 'surface = "heap.tif"'))
@@ -240,3 +241,11 @@ def test_a_wind_that_is_likelier_in_another_unit_is_asked_about(tmp_path: Path) 
     assert asked == (
         "the wind of year.csv is 32.4 m/s in the mean: did you mean km/h, 9 m/s?"
     )
+
+
+def test_without_rasterio_a_study_is_refused_before_it_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "rasterio", None)
+    with pytest.raises(InputError, match=r"bed\.kind: it needs the extra \[gis\]"):
+        load(tmp_path, FILE)
