@@ -12,8 +12,9 @@ import numpy as np
 
 from orchestrator.bed.line import BedLine, triangle
 from orchestrator.flow import theory
-from orchestrator.flow.case import WALL_STRESS, FlowCase
+from orchestrator.flow.case import FlowCase
 from orchestrator.flow.foam import SolvedFlow
+from orchestrator.flow.run import WALL_STRESS
 from orchestrator.flow.stress import Measure, WallStress, bubble
 from orchestrator.runs import case, engine
 from orchestrator.study.method import FlowMethod

@@ -9,7 +9,7 @@ import pandas as pd
 from orchestrator.bed.deck import POURED_DRAG
 from orchestrator.benchmark.mechanics import mechanics, three_grains
 from orchestrator.benchmark.pack import Problem, expectation
-from orchestrator.flow.case import SPEED_HEIGHT
+from orchestrator.flow.run import SPEED_HEIGHT
 from orchestrator.grains import cells
 from orchestrator.grains.loads import forces
 from orchestrator.grains.pile import MARGIN, Pile

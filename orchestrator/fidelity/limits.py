@@ -14,8 +14,8 @@ import numpy as np
 from orchestrator.bed.line import BedLine, of_bed
 from orchestrator.errors import InputError
 from orchestrator.fidelity.decision import is_along, written
-from orchestrator.flow.case import SPEED_HEIGHT
 from orchestrator.flow.model import FlowModel
+from orchestrator.flow.run import SPEED_HEIGHT
 from orchestrator.flow.theory import seen_by_the_flow
 from orchestrator.grains.loads import Geometry
 from orchestrator.physics.constants import KARMAN

@@ -1,10 +1,7 @@
 """The flow over one bed line as an OpenFOAM case, and what its last iteration holds."""
 
-import re
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from importlib.metadata import version as installed
 from math import cos, log, radians
 from pathlib import Path
 from typing import Any, ClassVar
@@ -13,12 +10,13 @@ import numpy as np
 
 from orchestrator import digits
 from orchestrator.bed.line import BedLine, triangle
-from orchestrator.errors import Exploded, InputError, SolverError
+from orchestrator.errors import InputError, SolverError
 from orchestrator.flow.foam import (
     BED_FLOW,
     COLUMN_FLOW,
     INTERPOLATED_DIGITS,
     SolvedFlow,
+    patch_types,
     start_from,
     write_poly_mesh,
 )
@@ -30,25 +28,21 @@ from orchestrator.flow.mesh import (
     growth_far,
     made_by_gmsh,
 )
-from orchestrator.flow.stress import WallStress, diagnostics
-from orchestrator.physics.constants import KARMAN
-from orchestrator.physics.velocity import (
-    depth_mean_speed,
-    log_law_speed,
-    log_law_ustar,
+from orchestrator.flow.run import Approach, OpenFoamCase, set_values
+from orchestrator.flow.stress import (
+    MEAN_SPEED_ERROR,
+    Diagnostic,
+    WallStress,
+    near_one,
+    reattachment,
 )
-from orchestrator.runs.case import Case
+from orchestrator.physics.velocity import depth_mean_speed
 from orchestrator.runs.files import canonical_json, digest_text
-from orchestrator.solvers import openfoam
 from orchestrator.study.method import FlowMethod
 from orchestrator.study.parts import Flow
 from orchestrator.study.profile import Profile
 from orchestrator.types import FloatArray
 
-WALL_STRESS = "wall_stress.csv"
-DIAGNOSTICS = "diagnostics.csv"
-SPEED_HEIGHT = 10.0
-"""Height above the flat bed at which U_e is given, h."""
 RESIDUAL = 2e-4
 """Residual of p at which the mean stress on a pile is within 0.1 % of where it ends."""
 CELLS_ALONG = 150
@@ -68,28 +62,15 @@ LEAST_LID = 5.0
 """Lowest lid of a boundary layer, h: under lower ones iterations do not end."""
 Z_E_ERROR = 0.02
 """Largest relative difference of z_e from half of the height of the first cells."""
-C_MU = 0.09
-"""Coefficient of k-epsilon: omega = epsilon/(C_mu k)."""
 CELL_ITERATIONS_PER_S = 1e6
 START_S = 0.2
 """Time that mesh and start take, s."""
-PATCHES = {
-    "bed": "wall",
-    "sides": "empty",
-    "before": "cyclic; neighbourPatch after",
-    "after": "cyclic; neighbourPatch before",
-    "inlet": "mappedPatch; sampleMode nearestCell; sampleRegion region0; "
-    "samplePatch none; offsetMode uniform; offset ({} 0 0)",
-}
-"""Types of the patches: what enters is what the column before the inlet holds."""
-FIELDS = ("U", "epsilon", "k", "nut", "omega", "p", "phi", "wallShearStress")
-"""Fields of the last iteration; epsilon or omega, as the turbulence model has it."""
 TOPS = {"boundary layer": "layer", "open water": "open", "closed channel": "closed"}
 """Words of the template for the top of the flow."""
 
 
 @dataclass(frozen=True)
-class FlowCase(Case):
+class FlowCase(OpenFoamCase):
     """Steady turbulent flow over a bed line, in a boundary layer or in a channel.
 
     The flow's u*/u*_0 depends on the shape, on z0/h, on the mesh, and hardly on U_e and
@@ -126,14 +107,8 @@ class FlowCase(Case):
     template: ClassVar[str] = "openfoam/pile"
     recipe: ClassVar[int] = 9
     results: ClassVar[tuple[str, ...]] = (BED_FLOW, COLUMN_FLOW)
-    derived: ClassVar[tuple[str, ...]] = (WALL_STRESS, DIAGNOSTICS)
-    bulky: ClassVar[tuple[str, ...]] = (
-        *(f"[1-9]*/{name}" for name in FIELDS),
-        "[1-9]*/uniform/time",
-        "[1-9]*/uniform/cumulativeContErr",
-        "[1-9]*/uniform/functionObjects/functionObjectProperties",
-    )
     needs_bulky: ClassVar[bool] = True
+    mesher: ClassVar[str] = "gmsh"
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -179,10 +154,11 @@ class FlowCase(Case):
         return self.above.top == "closed channel"
 
     @property
-    def ustar0_m_s(self) -> float:
-        """Friction velocity u*_0 of the approaching flow, m/s."""
-        height = SPEED_HEIGHT * self.height_m
-        return float(log_law_ustar(self.settings.speed, height, self.roughness_m))
+    def approach(self) -> Approach:
+        """The approaching flow, whose speed at 10 h need not be within the depth."""
+        return Approach(
+            self.settings.speed, self.height_m, self.roughness_m, self.viscosity_m2_s
+        )
 
     @property
     def bed_line(self) -> BedLine:
@@ -278,44 +254,15 @@ class FlowCase(Case):
         over_last = (self.lid_m - near) / last
         up += log(1 + over_last * (self.growth_far - 1)) / log(self.growth_far)
         cells = self.grid.cells * up
-        return START_S + self._iterations * cells / CELL_ITERATIONS_PER_S
+        return START_S + self.iterations * cells / CELL_ITERATIONS_PER_S
 
     @property
-    def _iterations(self) -> float:
+    def iterations(self) -> float:
         """Expected number of iterations."""
         from_coarser_flow = 80.0 + 0.04 * self.slope_deg**2
         if self.needs:
             return from_coarser_flow
         return from_coarser_flow * (self.settings.cells_per_face / USUAL_CELLS)
-
-    def share(self, directory: Path) -> float:
-        """Iterations over those that are expected, at most nearly all.
-
-        Parameters
-        ----------
-        directory
-            The case.
-
-        Returns
-        -------
-        float
-            The share of the work that is done.
-        """
-        path = directory / "log.simpleFoam"
-        if not path.is_file():
-            return 0.0
-        text = path.read_text(encoding="utf-8", errors="replace")
-        return min(text.count("\nTime = ") / self._iterations, 0.95)
-
-    def versions(self) -> dict[str, str]:
-        """The programs that mesh and solve.
-
-        Returns
-        -------
-        dict of str to str
-            The version of each.
-        """
-        return {"gmsh": installed("gmsh"), "openfoam": openfoam.version()}
 
     def write(self, directory: Path, cases: Path) -> None:
         """Write numbers into the template's files, the mesh, and a flow to start from.
@@ -346,14 +293,15 @@ class FlowCase(Case):
         if self.profile:
             (directory / "profile.csv").write_text(self.profile.text, encoding="utf-8")
         (directory / "pile.msh").unlink()  # the mesh of the template
-        types = {**PATCHES, "inlet": PATCHES["inlet"].format(-self.height_m)}
+        types = {**patch_types(-self.height_m), "sides": "empty"}
         if self.is_closed:
             types["lid"] = "wall"
         middles = write_poly_mesh(made_by_gmsh(directory), directory, types)
         if coarser:
             self._start_from_flow(directory / "0", middles, coarser)
         else:
-            self._start_from_log_layer(directory / "0", middles)
+            heights = np.abs(middles[..., 2].ravel())
+            self.approach.start(directory / "0", heights)
 
     def _solver_values(self) -> dict[str, object]:
         """Values of the template's ``parameters``."""
@@ -362,14 +310,11 @@ class FlowCase(Case):
         # ended.
         residual = RESIDUAL * min(1.0, CELLS_ALONG / self.grid.cells)
         return {
+            **self.approach.parameters,
             "top": TOPS[self.above.top],
-            "speedHeight": SPEED_HEIGHT * self.height_m,
             "lidHeight": self.lid_m,
             "columnOffset": -self.height_m,
             "firstCentre": self._first_centre,
-            "roughnessLength": self.roughness_m,
-            "freeStream": self.settings.speed,
-            "viscosity": self.viscosity_m2_s,
             "turbulence": self.settings.turbulence_model,
             "convection": self.settings.convection_scheme,
             "correctors": self.settings.non_orthogonal_correctors,
@@ -401,69 +346,41 @@ class FlowCase(Case):
             values = coarser.at(name, x, heights, line)
             start_from(fields / name, values, INTERPOLATED_DIGITS)
 
-    def _start_from_log_layer(self, fields: Path, middles: FloatArray) -> None:
-        """Let the fields start from the log layer: a third of the iterations."""
-        height = np.abs(middles[..., 2].ravel())
-        ustar = self.ustar0_m_s
-        speed = log_law_speed(ustar, height, self.roughness_m)
-        velocity = np.column_stack([speed, 0 * speed, 0 * speed])
-        frequency = ustar / (KARMAN * (height + self.roughness_m))
-        start_from(fields / "U", velocity)
-        start_from(fields / "epsilon", ustar**2 * frequency)
-        start_from(fields / "omega", frequency / np.sqrt(C_MU))
-
     @property
     def _first_centre(self) -> float:
         """Height of the centre of the first cells over flat bed, m."""
         return self.first_cell_m / 2 / cos(radians(self.slope_deg))
 
-    def collect(self, directory: Path) -> None:
-        """Check the run and write `wall_stress.csv` and `diagnostics.csv`.
-
-        Parameters
-        ----------
-        directory
-            The case, after `Allrun`.
-
-        Raises
-        ------
-        SolverError
-            If the run failed, or its flow cannot be right.
-        """
-        openfoam.check_log(directory)
+    def stress(self, directory: Path) -> tuple[WallStress, float]:
+        """Read the stress on the bed, as every flow's."""
         solved = SolvedFlow(directory)
         solved.check()
         stress = solved.stress(self.roughness_m)
-        self._check_stress(stress, directory)
-        stress.to_csv(directory / WALL_STRESS)
-        mean_speed = None
-        if self.above.depth:
-            mean_speed = self.mean_speed_over_log_law(solved)
-        approach = solved.ustar0 / self.ustar0_m_s
-        table = diagnostics(
-            stress,
-            approach,
-            self.ustar0_m_s / self.viscosity_m2_s,
-            self.slope_deg,
-            self.height_m,
-            self.roughness_m,
-            mean_speed=mean_speed,
-        )
-        table.to_csv(directory / DIAGNOSTICS, float_format="%.6g", lineterminator="\n")
-        if table.loc["approach_ustar_over_log_law", "sound"] != "yes":
-            ratio = f"{approach:.3f} of the log law's"
-            what = f"on flat bed u* is {ratio}: the wall function fails"
-            remedy = "raise the first cell's height or the speed"
-            remedy = f"{DIAGNOSTICS} says more; {remedy}"
-            raise SolverError(what, where=str(directory), remedy=remedy)
+        self._check_first_cells(stress, directory)
+        return stress, solved.ustar0
 
-    def mean_speed_over_log_law(self, solved: SolvedFlow) -> float:
+    def own_diagnostics(
+        self, stress: WallStress, ustar0: float, directory: Path
+    ) -> dict[str, Diagnostic]:
+        """Collect where the flow reattaches, and the mean speed of a channel."""
+        found = {
+            "reattachment_over_h": reattachment(stress, self.slope_deg, self.height_m)
+        }
+        if self.above.depth:
+            speed = SolvedFlow(directory).column_speed()
+            ratio = self.mean_speed_over_log_law(speed, ustar0)
+            found["mean_speed_over_log_law"] = near_one(ratio, MEAN_SPEED_ERROR)
+        return found
+
+    def mean_speed_over_log_law(self, speed: float, ustar0: float) -> float:
         """The mean speed of a channel over that of the log law.
 
         Parameters
         ----------
-        solved
-            The solved flow, whose column before the inlet is looked at.
+        speed
+            Mean speed in the column before the inlet, m/s.
+        ustar0
+            Friction velocity there, m/s.
 
         Returns
         -------
@@ -471,16 +388,12 @@ class FlowCase(Case):
             The ratio.
         """
         law = depth_mean_speed(
-            solved.ustar0, self.lid_m, self.roughness_m, closed=self.is_closed
+            ustar0, self.lid_m, self.roughness_m, closed=self.is_closed
         )
-        return float(solved.column_speed() / law)
+        return float(speed / law)
 
-    def _check_stress(self, stress: WallStress, directory: Path) -> None:
-        """Refuse a stress that is no number, and first cells of another height."""
-        where = str(directory)
-        values = [stress.tau_wall, stress.ustar_over_ustar0_eq10]
-        if not np.isfinite(values).all():
-            raise Exploded("the stress on the bed is not a number", where=where)
+    def _check_first_cells(self, stress: WallStress, directory: Path) -> None:
+        """Refuse first cells of another height."""
         line = self.bed_line
         segment = np.searchsorted(line.x, stress.x_m) - 1
         segment = np.clip(segment, 0, len(line.slopes_deg) - 1)
@@ -492,28 +405,4 @@ class FlowCase(Case):
             what = f"z_e is {span} of that of the first cells"
             lower = "lower method.flow.expansion_ratio"
             remedy = f"{lower}, or raise method.flow.first_cell_height"
-            raise SolverError(what, where=where, remedy=remedy)
-
-
-def set_values(path: Path, values: Mapping[str, object]) -> None:
-    """Replace the values in a template's list; its comments stay.
-
-    Parameters
-    ----------
-    path
-        The file.
-    values
-        Value by name; numbers get nine digits.
-
-    Raises
-    ------
-    ValueError
-        If the file has not one entry of a name.
-    """
-    text = path.read_text(encoding="utf-8")
-    for name, value in values.items():
-        new = digits.text(value) if isinstance(value, float) else value
-        text, count = re.subn(rf"(?m)^({name}[ =]+)[^;]+;", rf"\g<1>{new};", text)
-        if count != 1:
-            raise ValueError(f"{path.name} has {count} entries named {name}")
-    path.write_text(text, encoding="utf-8")
+            raise SolverError(what, where=str(directory), remedy=remedy)

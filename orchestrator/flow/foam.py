@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from orchestrator.bed.deck import read_texts
 from orchestrator.bed.line import BedLine
-from orchestrator.digits import DIGITS, FORMAT, on_grid
+from orchestrator.digits import DIGITS, FORMAT, on_grid, rounded
 from orchestrator.errors import SolverError
 from orchestrator.flow.stress import WallStress
 from orchestrator.physics.velocity import log_law_ustar
@@ -186,6 +186,29 @@ def write_faces(
     _write(folder / "owner", "labelList", listed(owner, "%d"))
     _write(folder / "neighbour", "labelList", listed(neighbour, "%d"))
     _write(folder / "boundary", "polyBoundaryMesh", patch_list)
+
+
+def patch_types(offset: float) -> dict[str, str]:
+    """Types of the patches of a flow whose approach develops before the inlet.
+
+    Parameters
+    ----------
+    offset
+        From the inlet to the middle of the cells before it, whose flow enters there, m.
+
+    Returns
+    -------
+    dict of str to str
+        The type with its entries of each that is no plain patch.
+    """
+    sampled = f"offsetMode uniform; offset ({rounded(offset)} 0 0)"
+    return {
+        "bed": "wall",
+        "before": "cyclic; neighbourPatch after",
+        "after": "cyclic; neighbourPatch before",
+        "inlet": "mappedPatch; sampleMode nearestCell; sampleRegion region0; "
+        f"samplePatch none; {sampled}",
+    }
 
 
 def _columns(middles: FloatArray, count: int) -> IntArray:

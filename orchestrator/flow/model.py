@@ -6,7 +6,8 @@ from pathlib import Path
 
 from orchestrator.bed.line import BedLine, of_bed
 from orchestrator.flow import theory
-from orchestrator.flow.case import SPEED_HEIGHT, WALL_STRESS, FlowCase
+from orchestrator.flow.case import FlowCase
+from orchestrator.flow.run import SPEED_HEIGHT, WALL_STRESS
 from orchestrator.flow.stress import WallStress
 from orchestrator.physics.velocity import log_law_speed
 from orchestrator.runs.files import state_of

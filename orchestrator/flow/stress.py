@@ -1,10 +1,11 @@
 """The stress that the flow puts on the whole bed, and whether it can be right."""
 
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import Field, dataclass, fields
 from functools import cached_property
 from math import inf
 from pathlib import Path
-from typing import Literal
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 import pandas as pd
@@ -39,8 +40,83 @@ Measure = Literal["wall", "eq10"]
 """Stress on the wall, or that of Eq. 10 from the speed in the first cell."""
 
 
+AXES = ("x", "y", "z")
+APPROACH = "approach_ustar_over_log_law"
+
+
+class Stress:
+    """Stress on each face of a bed, over that of the approaching flow.
+
+    A subclass is a dataclass. Each of its fields is an array with a number, or with the
+    three components of a vector, for each face.
+    """
+
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+    shown: ClassVar[tuple[str, ...]]
+    """Properties that `to_csv` writes beside the fields."""
+    z_e_m: FloatArray
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether all of its numbers are."""
+        return all(np.isfinite(values).all() for values in self._columns().values())
+
+    def to_csv(self, path: Path) -> None:
+        """Write a table of nine digits, which `from_csv` reads.
+
+        Parameters
+        ----------
+        path
+            The file.
+        """
+        columns = {}
+        for name, values in self._columns().items():
+            if values.ndim == 1:
+                columns[name] = values
+                continue
+            for axis, component in zip(AXES, values.T, strict=True):
+                columns[f"{name}_{axis}"] = component
+        for name in self.shown:
+            columns[name] = getattr(self, name)
+        table = pd.DataFrame(columns)
+        table.to_csv(path, index=False, lineterminator="\n", float_format=FORMAT)
+
+    @classmethod
+    def from_csv(cls, path: Path) -> Self:
+        """Read a table of `to_csv`.
+
+        Parameters
+        ----------
+        path
+            The file.
+
+        Returns
+        -------
+        Stress
+            The stress, with the nine digits of the file.
+
+        Raises
+        ------
+        SolverError
+            If the file is not whole.
+        """
+        texts = read_texts(path)
+        columns = {}
+        for one in fields(cls):
+            if one.name in texts:
+                columns[one.name] = texts[one.name].astype(float)
+                continue
+            parts = [texts[f"{one.name}_{axis}"].astype(float) for axis in AXES]
+            columns[one.name] = np.column_stack(parts)
+        return cls(**columns)
+
+    def _columns(self) -> dict[str, FloatArray]:
+        """The fields by their names."""
+        return {one.name: getattr(self, one.name) for one in fields(self)}
+
+
 @dataclass(frozen=True, eq=False)
-class WallStress:
+class WallStress(Stress):
     """Stress on each face of the bed, in the order of the flow.
 
     Stresses are kinematic and in units of u*_0^2, friction velocities in units of u*_0,
@@ -65,6 +141,7 @@ class WallStress:
         u*_0.
     """
 
+    shown: ClassVar[tuple[str, ...]] = ("ustar_over_ustar0_wall",)
     s_m: FloatArray
     x_m: FloatArray
     z_m: FloatArray
@@ -169,47 +246,30 @@ class WallStress:
         limited = np.sign(slope) * np.minimum(np.abs(slope), most)
         return np.asarray(np.nan_to_num(limited))
 
-    def to_csv(self, path: Path) -> None:
-        """Write a table of nine digits, which `from_csv` reads.
 
-        Parameters
-        ----------
-        path
-            The file.
-        """
-        columns = {one.name: getattr(self, one.name) for one in fields(self)}
-        columns["ustar_over_ustar0_wall"] = self.ustar_over_ustar0_wall
-        table = pd.DataFrame(columns)
-        table.to_csv(path, index=False, lineterminator="\n", float_format=FORMAT)
+class Diagnostic(NamedTuple):
+    """A number of a solved flow beside the range in which sound flows have it.
 
-    @classmethod
-    def from_csv(cls, path: Path) -> "WallStress":
-        """Read a table of `to_csv`.
+    Attributes
+    ----------
+    value
+        The number.
+    sound_from, sound_to
+        The ends of the range.
+    """
 
-        Parameters
-        ----------
-        path
-            The file.
-
-        Returns
-        -------
-        WallStress
-            The stress, with the nine digits of the file.
-        """
-        texts = read_texts(path)
-        columns = {one.name: texts[one.name].astype(float) for one in fields(cls)}
-        return cls(**columns)
+    value: float
+    sound_from: float = 0.0
+    sound_to: float = inf
 
 
 def diagnostics(
-    stress: WallStress,
+    stress: Stress,
     approach: float,
     reynolds: float,
-    slope_deg: float,
-    height: float,
     roughness: float,
-    *,
-    mean_speed: float | None = None,
+    iterations: int,
+    more: Mapping[str, Diagnostic],
 ) -> pd.DataFrame:
     """A few numbers of a solved flow beside the ranges in which sound flows have them.
 
@@ -221,15 +281,12 @@ def diagnostics(
         Friction velocity before the inlet over that of the log law.
     reynolds
         u*_0 over the viscosity of the solve, 1/m.
-    slope_deg
-        Steepest slope of the windward faces, degrees.
-    height
-        Height h of the forms, m.
     roughness
         Roughness length z0, m.
-    mean_speed
-        Mean speed of a channel before the inlet over that of the log law; None for a
-        boundary layer.
+    iterations
+        Iterations until the flow had converged.
+    more
+        Those of this kind of bed.
 
     Returns
     -------
@@ -238,28 +295,60 @@ def diagnostics(
         which is "yes" or "no".
     """
     centre = float(np.median(stress.z_e_m))
-    reversed_flow = bubble(stress, height)
-    reattaches = 0.0 if reversed_flow is None else reversed_flow[1]
-    shortest = SHORTEST_BUBBLE if slope_deg >= SEPARATES_FROM_DEG else 0.0
     rows = {
         # y+: the eddy viscosity is kappa y+ times the molecular one.
-        "y_plus": (reynolds * centre, 1 / KARMAN, inf),
-        "z_e_over_z0": (centre / roughness, LEAST_Z_E_OVER_Z0, inf),
-        "approach_ustar_over_log_law": _near_one(approach, APPROACH_ERROR),
-        "reattachment_over_h": (reattaches, shortest, inf),
+        "y_plus": Diagnostic(reynolds * centre, 1 / KARMAN),
+        "z_e_over_z0": Diagnostic(centre / roughness, LEAST_Z_E_OVER_Z0),
+        APPROACH: near_one(approach, APPROACH_ERROR),
+        **more,
+        "iterations": Diagnostic(iterations),
     }
-    if mean_speed is not None:
-        rows["mean_speed_over_log_law"] = _near_one(mean_speed, MEAN_SPEED_ERROR)
-    columns = ["value", "sound_from", "sound_to"]
+    columns = list(Diagnostic._fields)
     table = pd.DataFrame.from_dict(rows, orient="index", columns=columns)
     is_sound = table["value"].between(table["sound_from"], table["sound_to"])
     table["sound"] = np.where(is_sound, "yes", "no")
     return table.rename_axis("quantity")
 
 
-def _near_one(ratio: float, error: float) -> tuple[float, float, float]:
-    """A ratio and the range in which a sound flow has it."""
-    return ratio, 1 - error, 1 + error
+def near_one(ratio: float, error: float) -> Diagnostic:
+    """Put a ratio beside the range in which a sound flow has it.
+
+    Parameters
+    ----------
+    ratio
+        The ratio.
+    error
+        Its largest difference from 1.
+
+    Returns
+    -------
+    Diagnostic
+        Both.
+    """
+    return Diagnostic(ratio, 1 - error, 1 + error)
+
+
+def reattachment(stress: WallStress, slope_deg: float, height: float) -> Diagnostic:
+    """Find where the flow reattaches behind the top, and how soon it may.
+
+    Parameters
+    ----------
+    stress
+        The stress on the bed.
+    slope_deg
+        Steepest slope of the windward faces, degrees.
+    height
+        Height h of the forms, m.
+
+    Returns
+    -------
+    Diagnostic
+        The place, h downstream of the top; 0 where no flow is reversed.
+    """
+    reversed_flow = bubble(stress, height)
+    reattaches = 0.0 if reversed_flow is None else reversed_flow[1]
+    shortest = SHORTEST_BUBBLE if slope_deg >= SEPARATES_FROM_DEG else 0.0
+    return Diagnostic(reattaches, shortest)
 
 
 def bubble(stress: WallStress, height: float) -> tuple[float, float] | None:

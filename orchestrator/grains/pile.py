@@ -24,7 +24,8 @@ from orchestrator.bed.deck import GrainTable
 from orchestrator.bed.line import BedLine
 from orchestrator.bed.packing import Packing
 from orchestrator.errors import InputError
-from orchestrator.flow.case import WALL_STRESS, FlowCase
+from orchestrator.flow.case import FlowCase
+from orchestrator.flow.run import WALL_STRESS
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains import motion
 from orchestrator.grains.cells import GrainCase

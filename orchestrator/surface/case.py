@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from importlib.metadata import version as installed
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -10,20 +9,16 @@ import numpy as np
 
 from orchestrator.bed.deck import read_texts
 from orchestrator.digits import rounded
-from orchestrator.errors import Exploded, SolverError, Stalled
-from orchestrator.flow.case import DIAGNOSTICS, FIELDS, SPEED_HEIGHT, set_values
-from orchestrator.flow.foam import BED_FLOW, SolvedFlow, start_from
-from orchestrator.physics.constants import KARMAN
-from orchestrator.physics.velocity import log_law_speed, log_law_ustar
-from orchestrator.runs.case import Case
-from orchestrator.solvers import openfoam
+from orchestrator.errors import SolverError, Stalled
+from orchestrator.flow.foam import BED_FLOW, SolvedFlow
+from orchestrator.flow.run import Approach, OpenFoamCase, set_values
+from orchestrator.flow.stress import Diagnostic
 from orchestrator.surface import mesh
 from orchestrator.surface.heights import Surface
 from orchestrator.surface.mesh import COARSE, Columns, Level, Sizes
-from orchestrator.surface.stress import SurfaceStress, diagnostics
+from orchestrator.surface.stress import SurfaceStress, own_diagnostics
 from orchestrator.types import FloatArray
 
-SURFACE_STRESS = "surface_stress.csv"
 RESIDUAL = 1e-4
 """Residual of p at which the mean stress on a hill is within 0.1 % of where it ends."""
 ITERATIONS = 120
@@ -109,7 +104,7 @@ def _cells(form: Sizes, height: float, cell: float, level: Level) -> int:
 
 
 @dataclass(frozen=True)
-class SurfaceFlowCase(Case):
+class SurfaceFlowCase(OpenFoamCase):
     """Steady turbulent flow of a boundary layer over a surface from one direction.
 
     The flow's u*/u*_0 depends on the shape, on the direction, on z0/h and on the mesh,
@@ -150,13 +145,7 @@ class SurfaceFlowCase(Case):
     kind: ClassVar[str] = "surface"
     template: ClassVar[str] = "openfoam/surface"
     recipe: ClassVar[int] = 1
-    results: ClassVar[tuple[str, ...]] = (BED_FLOW,)
-    derived: ClassVar[tuple[str, ...]] = (SURFACE_STRESS, DIAGNOSTICS)
-    bulky: ClassVar[tuple[str, ...]] = (
-        *(f"[1-9]*/{name}" for name in FIELDS),
-        *(f"[1-9]*/uniform/{name}" for name in ("time", "cumulativeContErr")),
-        "[1-9]*/uniform/functionObjects/functionObjectProperties",
-    )
+    mesher: ClassVar[str] = "numpy"
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -185,10 +174,16 @@ class SurfaceFlowCase(Case):
         return rounded(self.first_cell_m or mesh.FIRST_CELL * self.height_m)
 
     @property
-    def ustar0_m_s(self) -> float:
-        """Friction velocity u*_0 of the approaching flow by the log law, m/s."""
-        height = SPEED_HEIGHT * self.height_m
-        return float(log_law_ustar(self.speed_m_s, height, self.roughness_m))
+    def approach(self) -> Approach:
+        """The approaching flow."""
+        return Approach(
+            self.speed_m_s, self.height_m, self.roughness_m, self.viscosity_m2_s
+        )
+
+    @property
+    def iterations(self) -> float:
+        """Expected number of iterations, whatever the surface."""
+        return ITERATIONS
 
     @property
     def axes(self) -> FloatArray:
@@ -232,29 +227,13 @@ class SurfaceFlowCase(Case):
         """Time of one core, s; cells by what a mesh of the level has at most."""
         return self.level.most_cells * ITERATIONS / SPEED
 
-    def share(self, directory: Path) -> float:
-        """Iterations over those that are expected, at most nearly all."""
-        path = directory / "log.simpleFoam"
-        if not path.is_file():
-            return 0.0
-        text = path.read_text(encoding="utf-8", errors="replace")
-        return min(text.count("\nTime = ") / ITERATIONS, 0.95)
-
-    def versions(self) -> dict[str, str]:
-        """The programs that mesh and solve."""
-        return {"numpy": installed("numpy"), "openfoam": openfoam.version()}
-
     def write(self, directory: Path, cases: Path) -> None:
         """Write parameters, the mesh and a flow to start from."""
-        height = self.height_m
         values = {
-            "freeStream": float(self.speed_m_s),
-            "speedHeight": SPEED_HEIGHT * height,
+            **self.approach.parameters,
             "lidHeight": self.mesh.lid,
             "slabOffset": -self.mesh.slab,
             "firstCentre": self.first_cell / 2,
-            "roughnessLength": float(self.roughness_m),
-            "viscosity": float(self.viscosity_m2_s),
             "turbulence": self.turbulence_model,
             "convection": self.convection_scheme,
             "residual": f"{RESIDUAL:.3g}",
@@ -263,37 +242,22 @@ class SurfaceFlowCase(Case):
         set_values(directory / "parameters", values)
         (directory / "surface.msh").unlink()  # the mesh of the template
         self.mesh.write(directory)
-        over = self.mesh.over_bed.ravel()
-        ustar = self.ustar0_m_s
-        speed = log_law_speed(ustar, over, self.roughness_m)
-        start_from(directory / "0/U", np.column_stack([speed, 0 * speed, 0 * speed]))
-        frequency = ustar / (KARMAN * (over + self.roughness_m))
-        start_from(directory / "0/epsilon", ustar**2 * frequency)
-        start_from(directory / "0/omega", frequency / np.sqrt(0.09))
+        self.approach.start(directory / "0", self.mesh.over_bed.ravel())
 
     def collect(self, directory: Path) -> None:
         """Check the run and write its tables, or say why it failed."""
         try:
-            iterations = openfoam.check_log(directory)
+            super().collect(directory)
         except Stalled as error:
             remedy = "raise bed.smoothing_cells, which smooths the surface"
             what = f"{error.what}: the flow cycles"
             raise Stalled(what, error.where, remedy) from None
-        stress, ustar0 = self.stress(directory)
-        approach = ustar0 / self.ustar0_m_s
-        reynolds = self.ustar0_m_s / self.viscosity_m2_s
-        stress.to_csv(directory / SURFACE_STRESS)
-        table = diagnostics(
-            stress, self.mesh, approach, reynolds, self.roughness_m, iterations
-        )
-        table.to_csv(directory / DIAGNOSTICS, float_format="%.6g", lineterminator="\n")
-        if table.loc["approach_ustar_over_log_law", "sound"] != "yes":
-            what = f"on flat ground u* is {approach:.3f} of the log law's"
-            what = f"{what}: the wall function fails"
-            remedy = (
-                f"{DIAGNOSTICS} says more; raise the first cell's height or the speed"
-            )
-            raise SolverError(what, where=str(directory), remedy=remedy)
+
+    def own_diagnostics(
+        self, stress: SurfaceStress, ustar0: float, directory: Path
+    ) -> dict[str, Diagnostic]:
+        """Collect the heights of the first cells, the reversed flow and the mesh."""
+        return own_diagnostics(stress, self.mesh)
 
     def velocity(self, directory: Path) -> FloatArray:
         """Read the velocity in the cells, in the axes of the wind.
@@ -317,27 +281,7 @@ class SurfaceFlowCase(Case):
         return values.reshape(*self.mesh.shape, 3)
 
     def stress(self, directory: Path) -> tuple[SurfaceStress, float]:
-        """Read the stress on the bed.
-
-        Parameters
-        ----------
-        directory
-            Directory of the case.
-
-        Returns
-        -------
-        stress
-            The stress over that of the approaching flow.
-        ustar0
-            Friction velocity of the approaching flow, m/s.
-
-        Raises
-        ------
-        SolverError
-            If it is missing, or not of this mesh.
-        Exploded
-            If it is not a number.
-        """
+        """Read the stress on the bed, as every flow's."""
         columns = read_texts(directory / BED_FLOW)
         ustar0 = float(columns["ustar0_m_s"][0])
         parts = [columns[f"tau_{axis}"].astype(float) for axis in ("x", "y", "z")]
@@ -346,8 +290,6 @@ class SurfaceFlowCase(Case):
         if len(tau) != along * across:
             what = f"{BED_FLOW} has {len(tau)} faces, not those of this mesh"
             raise SolverError(what, str(directory), "run the case again")
-        if not np.isfinite(tau).all():
-            raise Exploded("the stress on the bed is not a number", str(directory))
         centre = np.array(self.surface.centre)
         return SurfaceStress.of_faces(self.mesh, tau, self.axes, centre), ustar0
 

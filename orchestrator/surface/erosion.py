@@ -11,13 +11,14 @@ import pandas as pd
 from orchestrator import plan
 from orchestrator.digits import number
 from orchestrator.experiment import Experiment, Results, Runs, page_texts
+from orchestrator.flow.run import WALL_STRESS
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.report.card import Card, Number, Worth
 from orchestrator.report.page import Section
 from orchestrator.report.style import Figure
 from orchestrator.stockpile import erosion
 from orchestrator.surface import answer, cards, onset, pipeline
-from orchestrator.surface.case import SURFACE_STRESS, SurfaceFlowCase
+from orchestrator.surface.case import SurfaceFlowCase
 from orchestrator.surface.heights import Heap
 from orchestrator.surface.mesh import wind_axes
 from orchestrator.surface.parts import SurfaceScene
@@ -295,7 +296,7 @@ def _winds(
     found = []
     for scene in scenes:
         ground = pipeline.ground_of(scene, least)
-        stress = SurfaceStress.from_csv(cases / flows[scene].name / SURFACE_STRESS)
+        stress = SurfaceStress.from_csv(cases / flows[scene].name / WALL_STRESS)
         direction = answer.Direction.of(
             ground, stress, scene.flow.from_deg, scene.heights
         )

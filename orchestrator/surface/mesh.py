@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from orchestrator import digits
-from orchestrator.flow.foam import write_faces
+from orchestrator.flow.foam import patch_types, write_faces
 from orchestrator.flow.mesh import ratio_of
 from orchestrator.types import FloatArray, IntArray
 
@@ -343,14 +343,6 @@ class Columns:
         patches = self.patches
         faces = [inner, *(quads.reshape(-1, 4) for quads, _ in patches.values())]
         owners = [owner, *(cells.ravel() for _, cells in patches.values())]
-        offset = digits.text(-self.slab)
-        types = {
-            "bed": "wall",
-            "before": "cyclic; neighbourPatch after",
-            "after": "cyclic; neighbourPatch before",
-            "inlet": "mappedPatch; sampleMode nearestCell; sampleRegion region0; "
-            f"samplePatch none; offsetMode uniform; offset ({offset} 0 0)",
-        }
         write_faces(
             directory,
             self.corners.reshape(-1, 3),
@@ -358,7 +350,7 @@ class Columns:
             np.concatenate(owners),
             neighbour,
             {name: cells.size for name, (_, cells) in patches.items()},
-            types,
+            patch_types(-self.slab),
         )
 
     @cached_property

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure as Canvas
 
 from orchestrator import plan
 from orchestrator.experiment import Experiment, Results, Runs, page_texts
-from orchestrator.flow.case import SPEED_HEIGHT
+from orchestrator.flow.run import SPEED_HEIGHT, WALL_STRESS
 from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.report.page import Section
@@ -41,7 +41,7 @@ from orchestrator.surface.answer import (
     Ground,
     Stream,
 )
-from orchestrator.surface.case import SURFACE_STRESS, SurfaceFlowCase
+from orchestrator.surface.case import SurfaceFlowCase
 from orchestrator.surface.mesh import LEVELS
 from orchestrator.surface.parts import SurfaceScene
 from orchestrator.surface.raster import geotiff
@@ -240,7 +240,7 @@ def _answer(
     ground = ground_of(first, threshold)
     directions = []
     for scene in scenes:
-        stress = SurfaceStress.from_csv(cases / flows[scene].name / SURFACE_STRESS)
+        stress = SurfaceStress.from_csv(cases / flows[scene].name / WALL_STRESS)
         directions.append(
             Direction.of(ground, stress, scene.flow.from_deg, first.heights)
         )

@@ -1,27 +1,17 @@
-"""The stress that the flow puts on a surface, and whether it can be right."""
+"""The stress that the flow puts on a surface, on the faces of its mesh."""
 
 from dataclasses import dataclass
-from math import inf
-from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
-import pandas as pd
 
-from orchestrator.bed.deck import read_texts
-from orchestrator.digits import FORMAT
-from orchestrator.flow.stress import APPROACH_ERROR
-from orchestrator.physics.constants import KARMAN
+from orchestrator.flow.stress import Diagnostic, Stress
 from orchestrator.surface.mesh import Columns
 from orchestrator.types import FloatArray
 
-AXES = ("x", "y", "z")
-SCALARS = ("x_m", "y_m", "z_m", "along_m", "across_m", "area_m2", "z_e_m")
-VECTORS = ("normal", "tau")
-ALONG_WIND = ("tau_along", "tau_across")
-
 
 @dataclass(frozen=True, eq=False)
-class SurfaceStress:
+class SurfaceStress(Stress):
     """Stress on each face of a bed, ordered along the wind, then across it.
 
     Stresses are kinematic and in units of u*_0^2, the stress of the undisturbed flow.
@@ -49,6 +39,7 @@ class SurfaceStress:
         Its components along and across the wind, shape (F,).
     """
 
+    shown: ClassVar[tuple[str, ...]] = ("ustar_over_ustar0",)
     x_m: FloatArray
     y_m: FloatArray
     z_m: FloatArray
@@ -109,49 +100,6 @@ class SurfaceStress:
         """Friction velocity of the stress over that of the approaching flow, (F,)."""
         return np.asarray(np.sqrt(np.linalg.norm(self.tau, axis=1)))
 
-    def to_csv(self, path: Path) -> None:
-        """Write a table that `from_csv` reads.
-
-        Parameters
-        ----------
-        path
-            The file.
-        """
-        columns = {name: getattr(self, name) for name in SCALARS}
-        for name in VECTORS:
-            for number, axis in enumerate(AXES):
-                columns[f"{name}_{axis}"] = getattr(self, name)[:, number]
-        columns |= {name: getattr(self, name) for name in ALONG_WIND}
-        columns["ustar_over_ustar0"] = self.ustar_over_ustar0
-        table = pd.DataFrame(columns)
-        table.to_csv(path, index=False, lineterminator="\n", float_format=FORMAT)
-
-    @classmethod
-    def from_csv(cls, path: Path) -> "SurfaceStress":
-        """Read a table of `to_csv`.
-
-        Parameters
-        ----------
-        path
-            The file.
-
-        Returns
-        -------
-        SurfaceStress
-            The stresses.
-
-        Raises
-        ------
-        SolverError
-            If the file is not whole.
-        """
-        columns = read_texts(path)
-        given = {name: columns[name].astype(float) for name in (*SCALARS, *ALONG_WIND)}
-        for name in VECTORS:
-            parts = [columns[f"{name}_{axis}"].astype(float) for axis in AXES]
-            given[name] = np.column_stack(parts)
-        return cls(**given)
-
 
 def _turned(vectors: FloatArray, axes: FloatArray) -> FloatArray:
     """Vectors in the axes of the wind as the axes of the file have them, (n, 3)."""
@@ -192,15 +140,8 @@ def faces_of(mesh: Columns) -> tuple[FloatArray, FloatArray, FloatArray]:
     return middles, normals, areas
 
 
-def diagnostics(
-    stress: SurfaceStress,
-    mesh: Columns,
-    approach: float,
-    reynolds: float,
-    roughness: float,
-    iterations: int,
-) -> pd.DataFrame:
-    """Collect a few numbers of a solved flow and the ranges in which they are sound.
+def own_diagnostics(stress: SurfaceStress, mesh: Columns) -> dict[str, Diagnostic]:
+    """Collect the diagnostics of a flow over a surface that not every flow has.
 
     Parameters
     ----------
@@ -208,41 +149,18 @@ def diagnostics(
         The stress on the bed.
     mesh
         The mesh.
-    approach
-        Friction velocity in the slab before the inlet over that of the log law.
-    reynolds
-        Friction velocity of the approaching flow over the viscosity, 1/m.
-    roughness
-        Roughness length of the bed, m.
-    iterations
-        Iterations until the flow had converged.
 
     Returns
     -------
-    DataFrame
-        By quantity its value, the ends of its range and whether it is within.
+    dict of str to Diagnostic
+        Each by its name.
     """
-    centre = mesh.first_cell / 2
-    over = stress.z_e_m / centre
-    weights = stress.area_m2
-    is_reversed = stress.tau_along < 0
-    rows = {
-        # y+: the eddy viscosity is kappa y+ times the molecular one
-        "y_plus": (reynolds * centre, 1 / KARMAN, inf),
-        "z_e_over_z0": (centre / roughness, 0.5, inf),
-        "least_z_e_over_nominal": (float(over.min()), 0.7, inf),
-        "most_z_e_over_nominal": (float(over.max()), 0.0, 1.5),
-        "approach_ustar_over_log_law": (
-            approach,
-            1 - APPROACH_ERROR,
-            1 + APPROACH_ERROR,
-        ),
-        "reversed_area_m2": (float(weights[is_reversed].sum()), 0.0, inf),
-        "cells": (mesh.cells, 0.0, inf),
-        "shortest_cell_m": (float(np.diff(mesh.x).min()), 0.0, inf),
-        "iterations": (iterations, 0.0, inf),
+    over = stress.z_e_m / (mesh.first_cell / 2)
+    reversed_area = stress.area_m2[stress.tau_along < 0].sum()
+    return {
+        "least_z_e_over_nominal": Diagnostic(float(over.min()), sound_from=0.7),
+        "most_z_e_over_nominal": Diagnostic(float(over.max()), sound_to=1.5),
+        "reversed_area_m2": Diagnostic(float(reversed_area)),
+        "cells": Diagnostic(mesh.cells),
+        "shortest_cell_m": Diagnostic(float(np.diff(mesh.x).min())),
     }
-    columns = ["value", "sound_from", "sound_to"]
-    table = pd.DataFrame.from_dict(rows, orient="index", columns=columns)
-    sound = table["value"].between(table["sound_from"], table["sound_to"])
-    return table.assign(sound=np.where(sound, "yes", "no")).rename_axis("quantity")

@@ -23,8 +23,9 @@ import pandas as pd
 from orchestrator import plan
 from orchestrator.errors import Stalled
 from orchestrator.experiment import Experiment, Results, Runs, page_texts
-from orchestrator.flow.case import WALL_STRESS, FlowCase
+from orchestrator.flow.case import FlowCase
 from orchestrator.flow.foam import BED_FLOW
+from orchestrator.flow.run import WALL_STRESS
 from orchestrator.flow.stress import WallStress
 from orchestrator.physics.velocity import log_law_speed
 from orchestrator.report.page import Section

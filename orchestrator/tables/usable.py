@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from orchestrator.flow.case import SPEED_HEIGHT
+from orchestrator.flow.run import SPEED_HEIGHT
 from orchestrator.grains.threshold import within
 from orchestrator.physics import verdict
 from orchestrator.physics.beside import GOES_ON, ROW_HOLD, beside

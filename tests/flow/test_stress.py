@@ -9,7 +9,12 @@ import pytest
 from orchestrator.bed.line import triangle
 from orchestrator.errors import InputError
 from orchestrator.flow import theory
-from orchestrator.flow.stress import WallStress, bubble, diagnostics
+from orchestrator.flow.stress import (
+    WallStress,
+    bubble,
+    diagnostics,
+    reattachment,
+)
 from orchestrator.types import FloatArray
 
 HEIGHT = 0.02
@@ -106,7 +111,8 @@ def test_each_flaw_is_named(sound: WallStress) -> None:
         (["approach_ustar_over_log_law"], sound, 0.9, 5e4, 3e-5),
         (["approach_ustar_over_log_law"], sound, np.nan, 5e4, 3e-5),
     ):
-        table = diagnostics(stress, approach, reynolds, 15.0, HEIGHT, z0)
+        more = {"reattachment_over_h": reattachment(stress, 15.0, HEIGHT)}
+        table = diagnostics(stress, approach, reynolds, z0, 100, more)
         assert table.index[table["sound"] == "no"].tolist() == flaw
 
 

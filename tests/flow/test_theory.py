@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator.bed.line import BedLine, triangle
 from orchestrator.flow import theory
-from orchestrator.flow.case import WALL_STRESS
+from orchestrator.flow.run import WALL_STRESS
 from orchestrator.flow.stress import WallStress
 from orchestrator.types import FloatArray
 from tests.flow.conftest import PILE, Solve

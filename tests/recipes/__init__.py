@@ -16,7 +16,8 @@ import pandas as pd
 
 from orchestrator.bed.poured import BED, PouredBed
 from orchestrator.flow import theory
-from orchestrator.flow.case import WALL_STRESS, FlowCase
+from orchestrator.flow.case import FlowCase
+from orchestrator.flow.run import WALL_STRESS
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains import pile
 from orchestrator.grains.cells import batches

@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import SolverError, Stalled
-from orchestrator.flow.case import DIAGNOSTICS
 from orchestrator.flow.foam import BED_FLOW, SolvedFlow
+from orchestrator.flow.run import DIAGNOSTICS, WALL_STRESS
 from orchestrator.runs import case
 from orchestrator.runs.case import templates
 from orchestrator.surface.case import (
-    SURFACE_STRESS,
     SurfaceFlowCase,
     cell_length,
 )
@@ -75,7 +74,7 @@ def solved(one: SurfaceFlowCase, shared: Shared) -> Path:
 
 
 def stress_of(one: SurfaceFlowCase, shared: Shared) -> SurfaceStress:
-    return SurfaceStress.from_csv(solved(one, shared) / SURFACE_STRESS)
+    return SurfaceStress.from_csv(solved(one, shared) / WALL_STRESS)
 
 
 def on_grid(one: SurfaceFlowCase, values: FloatArray) -> FloatArray:
@@ -132,8 +131,8 @@ def test_a_quarter_of_a_turn_changes_no_digit(shared: Shared) -> None:
     second = solved(other, shared)
     same = (first / BED_FLOW).read_bytes() == (second / BED_FLOW).read_bytes()
     assert same
-    stress = SurfaceStress.from_csv(first / SURFACE_STRESS)
-    turned_one = SurfaceStress.from_csv(second / SURFACE_STRESS)
+    stress = SurfaceStress.from_csv(first / WALL_STRESS)
+    turned_one = SurfaceStress.from_csv(second / WALL_STRESS)
     np.testing.assert_allclose(turned_one.tau[:, 0], -stress.tau[:, 1], atol=1e-9)
     np.testing.assert_allclose(turned_one.tau[:, 1], stress.tau[:, 0], atol=1e-9)
     np.testing.assert_allclose(turned_one.y_m, stress.x_m, atol=1e-6)
@@ -184,11 +183,11 @@ def test_the_same_again_gives_the_same_bytes(shared: Shared, tmp_path: Path) -> 
     one = flow(hill())
     copy = Path(shutil.copytree(solved(one, shared), tmp_path / "copy"))
     assert allrun(copy).returncode == 0
-    assert (copy / SURFACE_STRESS).is_file()
+    assert (copy / WALL_STRESS).is_file()
     edit(copy / "parameters", "freeStream       10.0;", "freeStream       12.0;")
     edit(copy / "parameters", "0.004;", "0.006;")
     assert allrun(copy).returncode == 1
-    assert not (copy / SURFACE_STRESS).exists()
+    assert not (copy / WALL_STRESS).exists()
 
 
 def test_a_flow_that_cycles_is_said_with_the_remedy(

@@ -10,10 +10,10 @@ import pytest
 
 from orchestrator.errors import InputError
 from orchestrator.experiment import Experiment, Results, Runs
+from orchestrator.flow.run import WALL_STRESS
 from orchestrator.report.card import Card
 from orchestrator.surface import cards, erosion, pipeline
 from orchestrator.surface import study as surface_study
-from orchestrator.surface.case import SURFACE_STRESS
 from orchestrator.surface.raster import geotiff
 from orchestrator.surface.stress import SurfaceStress, faces_of
 from orchestrator.surface.study import SurfaceStudy
@@ -84,7 +84,7 @@ def answered(
         directory = folder / flow.name
         directory.mkdir(parents=True, exist_ok=True)
         stress = SurfaceStress.of_faces(flow.mesh, tau, flow.axes, centre)
-        stress.to_csv(directory / SURFACE_STRESS)
+        stress.to_csv(directory / WALL_STRESS)
     names = {name: {"id": name} for name in experiment.planned.cases}
     return experiment.results(Runs(experiment.planned, folder, names))
 
