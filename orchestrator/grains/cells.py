@@ -104,7 +104,7 @@ class SingleGrainCase(GrainCase):
 
     scenes: tuple[Scene, ...]
     kind: ClassVar[str] = "cells"
-    recipe: ClassVar[int] = 12
+    recipe: ClassVar[int] = 13
 
     @property
     def parameters(self) -> dict[str, Any]:

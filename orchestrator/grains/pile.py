@@ -486,13 +486,6 @@ class PileCase(GrainCase):
         asked["method"]["grains"]["final_fraction"] = self.scene.last_fraction
         if self.scene.threshold.update:
             asked["threshold"]["goal"] = goal_part(self.scene, self.flow)
-        # rules for which grains there are that came after other beds were run
-        if self.geometry.turned:
-            asked["turned"] = True
-        if self.geometry.sides is not self.geometry:
-            asked["sides"] = "without obstacles"
-        if self.geometry.is_part:
-            asked["part"] = True
         return asked
 
     @property

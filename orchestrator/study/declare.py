@@ -72,16 +72,13 @@ class Info:
 WORDS = tuple(one.name for one in dataclasses.fields(Info))
 
 
-def field(default: Any = ..., *, since: bool = False, **settings: Any) -> Any:
+def field(default: Any = ..., **settings: Any) -> Any:
     """Declare a field.
 
     Parameters
     ----------
     default
         The default; none for a field that is required.
-    since
-        Whether the field came after the first studies: scenes that have its default
-        keep their id.
     **settings
         Words of `Info`, and rules of `pydantic.Field` such as ``ge``.
 
@@ -91,11 +88,28 @@ def field(default: Any = ..., *, since: bool = False, **settings: Any) -> Any:
         The declaration, for pydantic.
     """
     words = {name: settings.pop(name) for name in WORDS if name in settings}
-    if since:
-        settings["exclude_if"] = lambda value: value == default
     declared: FieldInfo = Field(default, **settings)
     declared.metadata.append(Info(**words))
     return declared
+
+
+def info_of(declared: FieldInfo) -> Info:
+    """Find the words of a field.
+
+    Parameters
+    ----------
+    declared
+        Its declaration.
+
+    Returns
+    -------
+    Info
+        Its words; none of a field that is declared without `field`.
+    """
+    for each in declared.metadata:
+        if isinstance(each, Info):
+            return each
+    return Info()
 
 
 class Part(BaseModel):

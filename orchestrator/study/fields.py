@@ -12,7 +12,7 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from orchestrator.study.closed_form import regime_of
-from orchestrator.study.declare import Info, Part
+from orchestrator.study.declare import Info, Part, info_of
 from orchestrator.study.method import FlowMethod, GrainMethod, Method
 from orchestrator.study.parts import (
     Flow,
@@ -231,8 +231,7 @@ def quantity(table: str, name: str, declared: FieldInfo) -> Quantity:
     Quantity
         The field.
     """
-    given = [each for each in declared.metadata if isinstance(each, Info)]
-    info = given[0] if given else Info()
+    info = info_of(declared)
     meaning, *words = (declared.description or "").split("\n- ")
     choices = {}
     for word in words:

@@ -93,14 +93,12 @@ class FlowMethod(Part):
         1, label="non-orthogonal correctors", ge=0, le=5
     )
     """repeated solves of the pressure in each iteration"""
-    lid: float = _solved(100.0, unit="h", since=True, ge=3, le=1000)
+    lid: float = _solved(100.0, unit="h", ge=3, le=1000)
     """height of a boundary layer's lid above the flat bed, in undisturbed flow"""
-    upstream: float = _solved(
-        80.0, unit="h", label="flat bed upstream", since=True, ge=3, le=1000
-    )
+    upstream: float = _solved(80.0, unit="h", label="flat bed upstream", ge=3, le=1000)
     """flat bed from the inlet to the forms"""
     downstream: float = _solved(
-        100.0, unit="h", label="flat bed downstream", since=True, ge=3, le=1000
+        100.0, unit="h", label="flat bed downstream", ge=3, le=1000
     )
     """flat bed from the forms to the outlet"""
 

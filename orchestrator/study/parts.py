@@ -105,8 +105,8 @@ _kind = pydantic.Discriminator(
 Sizes = Annotated[Annotated[LogNormal, pydantic.Tag("")] | Sieve, _kind]
 """In a study file ``[[5e-4, 0.4], [1e-3, 0.6]]``, or ``{ sigma_g = 1.3 }``."""
 _pile = partial(field, scope="piles")
-_dune = partial(field, scope="dunes", since=True)
-_poured = partial(field, scope="poured beds", since=True)
+_dune = partial(field, scope="dunes")
+_poured = partial(field, scope="poured beds")
 
 
 class Fluid(Part):
@@ -121,7 +121,7 @@ class Fluid(Part):
     that gives a number has a fluid by its numbers, unless it writes "paper" as well.
     """
 
-    kind: Literal["paper"] | None = field(None, column="fluid", since=True)
+    kind: Literal["paper"] | None = field(None, column="fluid")
     """"paper" for the paper's gas; the other kinds stand for their numbers"""
     # from the vapour that ripples a comet to mercury, 13,500, and melts of metals
     density: float = field(
@@ -182,9 +182,7 @@ class Grain(Sphere):
         35.0, symbol="φ", unit="°", column="phi_deg", ge=1, le=89
     )
     """angle of Coulomb's friction between grains"""
-    cohesion: float = field(
-        0.0, unit="N/m", column="cohesion_n_m", since=True, ge=0, le=1e3
-    )
+    cohesion: float = field(0.0, unit="N/m", column="cohesion_n_m", ge=0, le=1e3)
     """pull of a contact over the diameter, of two sizes over their harmonic mean; by
     pivots and peeling alone"""
     sizes: Sizes | None = _poured(None)
@@ -233,7 +231,7 @@ class Forces(Drag):
     """height at which the flow meets a grain
     - alike: every exposed grain stands z₀ above the bed, as in the paper
     - protrusion: each stands at its own height over the local bed"""
-    sheltering: Literal["none", "balanced"] = _pile("none", since=True)
+    sheltering: Literal["none", "balanced"] = _pile("none")
     """how the exposed grains of a pile share the stress of the flow
     - none: each feels the flow as if it stood alone, as in the paper
     - balanced: drags on a patch add up to its stress, by peeling or updates anew as
@@ -247,9 +245,7 @@ class Gusts(Part):
     """standard deviation of the stress over its mean"""
     events: Annotated[int, Field(ge=2, le=10**9)]
     """how many independent events there are while the bed is watched"""
-    duration: Annotated[
-        float, Field(ge=0.05, le=1e4, exclude_if=lambda value: value == 1.0)
-    ] = 1.0
+    duration: Annotated[float, Field(ge=0.05, le=1e4)] = 1.0
     """how long each lasts, √(d/g′); by default as an eddy of 3 d takes to pass in
     water"""
 
@@ -261,25 +257,23 @@ class Gusts(Part):
 class Flow(Part):
     """What flows above the bed: its top, its depth and its gusts."""
 
-    gusts: Gusts | None = field(None, since=True)
+    gusts: Gusts | None = field(None)
     """peaks of the turbulent stress, { intensity = 0.4, events = 100, duration = 1 }:
     independent, log-normal events, by default none; by pivots and peeling the largest
     acts, by DEM of piles all in each load step, each for a duration in √(d/g′), by
     default 1, of an eddy of 3 d in water"""
     top: Literal["open water", "closed channel", "boundary layer"] = field(
-        "boundary layer", column="flow_top", label="top of the flow", since=True
+        "boundary layer", column="flow_top", label="top of the flow"
     )
     """what the flow has above
     - open water: a level surface without stress
     - closed channel: a wall as rough as the bed
     - boundary layer: the log layer goes on above"""
-    depth: Length | None = field(
-        None, symbol="D", unit="m", column="depth_m", since=True
-    )
+    depth: Length | None = field(None, symbol="D", unit="m", column="depth_m")
     """depth of open water or of a closed channel over the flat bed, at least three
     heights of forms and obstacles, over a level bed three of the largest grains"""
     towards: Literal["+x", "-x"] = field(
-        WITH_X, label="the flow goes towards", scope="profiles", since=True
+        WITH_X, label="the flow goes towards", scope="profiles"
     )
     """where the flow goes along x of the profile's file
     - +x: towards larger x
@@ -329,7 +323,7 @@ class Bed(Part):
     """roughness length of the bed, or a part of the diameter of its grains, "d/30" """
     # a smaller grain falls through the pores of a bed, a larger one lies on many grains
     relative_size: float = field(
-        1.0, symbol="D/d", scope="single grains", since=True, ge=0.1, le=10
+        1.0, symbol="D/d", scope="single grains", ge=0.1, le=10
     )
     """diameter of a single grain over that of its two neighbours"""
 
@@ -357,41 +351,35 @@ class PileBed(Bed):
     """height of the forms; that of a profile follows. A flat bed has none: with
     obstacles lengths in h are heights of the tallest, without any they are of 20
     diameters, whatever is given"""
-    shape: ShapeName = _pile(
-        "triangle", column="bed_shape", since=True, choices=SHAPE_MEANINGS
-    )
+    shape: ShapeName = _pile("triangle", column="bed_shape", choices=SHAPE_MEANINGS)
     """shape of a form, which `kind` may name too; `slope_deg` is that of its windward
     side, of a curve where it is steepest"""
     windward: Literal["straight", "curved"] = _dune("straight", label="windward side")
     """windward side of a dune
     - straight: one slope
     - curved: half a wave of a cosine"""
-    lee_slope_deg: float | None = _pile(None, unit="°", since=True, gt=0, le=60)
+    lee_slope_deg: float | None = _pile(None, unit="°", gt=0, le=60)
     """slope of a straight lee side or a step down; by default the windward side's, 30
     of a dune and a step down"""
     brink_radius: float = _dune(0.0, unit="m", ge=0, le=1e3)
     """radius with which a dune's brink is rounded; 0 leaves it sharp"""
-    length: Length | None = field(
-        None, unit="m", scope="beds with level parts", since=True
-    )
+    length: Length | None = field(None, unit="m", scope="beds with level parts")
     """length of level bed with grains: a trapezoid's top, a flat bed, before or behind
     a step; by default 4 h, of a flat bed 80 diameters"""
-    forms: int = _pile(1, since=True, ge=1, le=100)
+    forms: int = _pile(1, ge=1, le=100)
     """number of forms in a train"""
-    spacing: Length | None = _pile(None, unit="m", since=True)
+    spacing: Length | None = _pile(None, unit="m")
     """from one form of a train to the next; by default they touch"""
-    profile: File | None = _pile(None, since=True)
+    profile: File | None = _pile(None)
     """file with the bed line, in place of a shape: columns x_m and z_m; its path is
     relative to the study file"""
-    smoothing: float = field(0.0, unit="m", scope="profiles", since=True, ge=0, le=1e3)
+    smoothing: float = field(0.0, unit="m", scope="profiles", ge=0, le=1e3)
     """length over which a noisy profile is smoothed"""
-    obstacles: Annotated[tuple[Obstacle, ...], List] = _pile(
-        (), since=True, read="obstacles"
-    )
+    obstacles: Annotated[tuple[Obstacle, ...], List] = _pile((), read="obstacles")
     """fences, blocks and half-cylinders, which carry no grains: tables with `kind`,
     `x`, `height` and, of a block, `length`"""
     counted: Literal["windward", "all"] | Range | None = _pile(
-        None, label="counted grains", since=True, read="counts"
+        None, label="counted grains", read="counts"
     )
     """exposed grains that are counted, or their range of x, with a profile that of its
     file, which on a bed of more than 5000 grains is packed alone; by default those of
@@ -563,7 +551,7 @@ class Threshold(Part):
         le=0.5,
     )
     """displacement along the bed from which a grain counts as moved"""
-    criterion: Literal["auto", "leaves", "goes on"] = field("auto", since=True)
+    criterion: Literal["auto", "leaves", "goes on"] = field("auto")
     """what a grain must do
     - auto: leaves in the paper's gas (`fluid.kind`); in every other fluid goes on, or
       leaves where a field of the scene rules hops out: a mixture, gusts, shared stress,
@@ -579,7 +567,6 @@ class Threshold(Part):
         unit="of N",
         label="update of the bed",
         scope="DEM and peeling of piles",
-        since=True,
     )
     """part of the counted grains after which the flow is solved over the bed line of
     the remaining ones, up to the last fraction; 0 keeps the first flow, as in the

@@ -69,7 +69,7 @@ class Scene(Question):
         return digest_text(canonical_json(self.described()))[:12]
 
     def described(self, **chosen: Any) -> dict[str, Any]:
-        """List the fields; one that has no effect on the scene has its default.
+        """List the fields that have an effect on the scene.
 
         Parameters
         ----------
@@ -81,7 +81,7 @@ class Scene(Question):
         dict
             The fields as JSON.
         """
-        return effective(self, self).model_dump(mode="json", **chosen)
+        return effective(self, self.model_dump(mode="json", **chosen), self)
 
     @cached_property
     def question(self) -> Question:

@@ -1,13 +1,12 @@
-"""On which scenes a field has an effect, and scenes without those that have none."""
+"""On which scenes a field has an effect, and those of a scene that have one."""
 
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol
 
-from orchestrator.study.declare import Info, Part
+from orchestrator.study.declare import Part, info_of
 from orchestrator.study.method import Method
 from orchestrator.study.parts import Forces, GrainBed, PileBed
 
-Each = TypeVar("Each", bound=Part)
 CLOSED = ("pivot", "local")
 """Methods without contacts: nothing that moves changes the bed."""
 RANDOM = ("disordered", "poured")
@@ -70,34 +69,29 @@ APPLIES: Mapping[str, Callable[[Asked], bool]] = {
 """The scenes on which a field has an effect, by the `scope` of its `Info`."""
 
 
-def effective(part: Each, scene: Asked) -> Each:
-    """Give a part of a scene the defaults of the fields that have no effect on it.
+def effective(part: Part, dumped: Mapping[str, Any], scene: Asked) -> dict[str, Any]:
+    """List the fields of a part of a scene that have an effect on it.
 
     Parameters
     ----------
     part
         The scene or a part of it.
+    dumped
+        Its fields as JSON, all or some.
     scene
         The scene.
 
     Returns
     -------
-    Part
-        The part; a copy if a field has another value.
+    dict
+        Those of them that have an effect, as JSON.
     """
-    changed: dict[str, Any] = {}
-    for name, declared in type(part).model_fields.items():
-        value = getattr(part, name)
-        if isinstance(value, Part):
-            inner = effective(value, scene)
-            if inner is not value:
-                changed[name] = inner
-        for info in declared.metadata:
-            is_field = isinstance(info, Info)
-            if (
-                is_field
-                and value != declared.default
-                and not APPLIES[info.scope](scene)
-            ):
-                changed[name] = declared.default
-    return part.model_copy(update=changed) if changed else part
+    kept = {}
+    for name, value in dumped.items():
+        if not APPLIES[info_of(type(part).model_fields[name]).scope](scene):
+            continue
+        inner = getattr(part, name)
+        kept[name] = (
+            effective(inner, value, scene) if isinstance(inner, Part) else value
+        )
+    return kept
