@@ -56,7 +56,7 @@ def take_over(options: Namespace) -> int | None:
     module = import_module(COMMANDS[options.command])
     name = study.name if options.command == "study" else options.command
     out = options.out or Path("results") / name
-    experiment: Experiment = module.experiment(study, out)
+    experiment: Experiment = module.experiment(study)
     return experiment.command(options, out)
 
 

@@ -1,28 +1,24 @@
 """What wind takes from heaps in three dimensions, beside AP-42, section 13.2.5."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from orchestrator import plan
 from orchestrator.digits import number
-from orchestrator.experiment import Experiment, Results, Runs, page_texts
-from orchestrator.flow.run import WALL_STRESS
+from orchestrator.experiment import Experiment, Results, page_texts
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.report.card import Card, Number, Worth
 from orchestrator.report.page import Section
 from orchestrator.report.style import Figure
 from orchestrator.stockpile import erosion
-from orchestrator.surface import answer, cards, onset, pipeline
-from orchestrator.surface.case import SurfaceFlowCase
+from orchestrator.surface import cards, onset
+from orchestrator.surface.answer import HEAP, RATIO, Answer, Direction
 from orchestrator.surface.heights import Heap
 from orchestrator.surface.mesh import wind_axes
-from orchestrator.surface.parts import SurfaceScene
-from orchestrator.surface.stress import SurfaceStress
+from orchestrator.surface.pipeline import experiment_on
 from orchestrator.surface.study import SurfaceStudy
 
 ROW = 1.5
@@ -50,31 +46,29 @@ class Wind:
     heaps: Sequence[erosion.Surface]
 
     @classmethod
-    def of(cls, scene: SurfaceScene, form: pd.DataFrame, threshold: float) -> "Wind":
-        """Divide the faces of the heaps of a scene.
+    def of(cls, answer: Answer, direction: Direction) -> "Wind":
+        """Divide the faces of the heaps of a surface.
 
         Parameters
         ----------
-        scene
-            The surface under the wind of one direction.
-        form
-            The faces of all heaps, as `answer.Direction.form` lists them.
-        threshold
-            u*_t, m/s.
+        answer
+            The surface.
+        direction
+            The wind of one direction.
 
         Returns
         -------
         Wind
             The heaps; shares are areas, m2.
         """
-        surface_ = scene.heights
+        form = direction.form
         heaps = []
-        for one, heap in enumerate(surface_.heaps, 1):
-            faces = form[form[answer.HEAP] == one]
-            heaps.append(surface_of(scene, faces, threshold, heap))
-        highest = surface_.heaps[0]
-        whole = surface_of(scene, form, threshold, highest)
-        return cls(scene.flow.from_deg, whole, heaps)
+        for one, heap in enumerate(answer.surface.heaps, 1):
+            faces = form[form[HEAP] == one]
+            heaps.append(surface_of(answer, direction.from_deg, faces, heap))
+        highest = answer.surface.heaps[0]
+        whole = surface_of(answer, direction.from_deg, form, highest)
+        return cls(direction.from_deg, whole, heaps)
 
     def loss_kg(self, winds: Sequence[float]) -> float:
         """Add up what winds, one after another, can take from all heaps.
@@ -115,6 +109,26 @@ class Heaps:
     winds: Sequence[Wind]
     speeds: Sequence[float]
     rose: pd.DataFrame | None = None
+
+    @classmethod
+    def of(cls, answer: Answer, speeds: Sequence[float]) -> "Heaps":
+        """Put the heaps of a surface under winds.
+
+        Parameters
+        ----------
+        answer
+            The surface.
+        speeds
+            Winds at 10 m, one after another, m/s.
+
+        Returns
+        -------
+        Heaps
+            The heaps.
+        """
+        winds = [Wind.of(answer, direction) for direction in answer.directions]
+        winds.sort(key=lambda wind: -wind.loss_kg(speeds))
+        return cls(answer.name, answer.surface.heaps, winds, speeds, answer.rose)
 
     @property
     def worst(self) -> Wind:
@@ -183,19 +197,18 @@ class Heaps:
 
 
 def surface_of(
-    scene: SurfaceScene, faces: pd.DataFrame, threshold: float, heap: Heap
+    answer: Answer, from_deg: float, faces: pd.DataFrame, heap: Heap
 ) -> erosion.Surface:
     """Make the surface of a pile of its faces.
 
     Parameters
     ----------
-    scene
-        The pile under the wind of one direction.
+    answer
+        The surface that the pile is on.
+    from_deg
+        Where the wind comes from, degrees.
     faces
-        Its faces, as `answer.Ground.faces` lists them, with the slope along the
-        wind in ``uphill``.
-    threshold
-        u*_t, m/s.
+        The faces of the pile, as `answer.Ground.faces` lists them.
     heap
         The heap whose middle the figure is drawn over.
 
@@ -207,16 +220,19 @@ def surface_of(
     faces = faces.sort_values("along_m")
     is_level = faces["slope_deg"] < erosion.LEVEL_DEG
     side = np.where(faces["uphill"] > 0, "windward", "lee")
-    along, across = _from_middle(scene, heap)
+    off = np.array([heap.x, heap.y]) - np.array(answer.surface.centre)
+    along, across = wind_axes(from_deg) @ off
     columns = {
         "x_m": faces["along_m"] - along,
         "z_m": faces["z_m"],
         "part": np.where(is_level, "top", side),
         "share": faces["area_m2"],
-        "ratio": faces[answer.RATIO],
+        "ratio": faces[RATIO],
     }
-    name = f"wind from {scene.flow.from_deg:g}°"
-    over_wind = float(log_law_ustar(1.0, onset.WIND_HEIGHT, scene.solve_roughness))
+    name = f"wind from {from_deg:g}°"
+    ground = answer.ground
+    over_wind = float(log_law_ustar(1.0, onset.WIND_HEIGHT, ground.roughness))
+    threshold = ground.level_ustar
     listed = pd.DataFrame(columns)
     off_middle = (faces["across_m"] - across).abs()
     # the middles of a row of faces lie within a part of a cell
@@ -224,22 +240,13 @@ def surface_of(
     return erosion.Surface(name, listed, over_wind, threshold, listed[is_middle])
 
 
-def _from_middle(scene: SurfaceScene, heap: Heap) -> tuple[float, float]:
-    """The middle of a heap along and across the wind, from that of the form, m."""
-    off = np.array([heap.x, heap.y]) - np.array(scene.heights.centre)
-    along, across = wind_axes(scene.flow.from_deg) @ off
-    return float(along), float(across)
-
-
-def experiment(study: SurfaceStudy, out: Path) -> Experiment:
+def experiment(study: SurfaceStudy) -> Experiment:
     """Make the experiment on the erosion potential of heaps in three dimensions.
 
     Parameters
     ----------
     study
         The study.
-    out
-        The directory of the results.
 
     Returns
     -------
@@ -252,57 +259,14 @@ def experiment(study: SurfaceStudy, out: Path) -> Experiment:
         If the threshold is no number that a wind can reach, nor a material of AP-42, if
         the rose blows from where no flow is, or if the fluid is a liquid.
     """
-    del out
     erosion.check_winds((scene.fluid for scene in study.scenes), study.file)
     least, source = erosion.given_threshold(study.erosion.threshold, study.file)
-    flows = {scene: pipeline.flow_of(scene) for scene in study.scenes}
-    members = pipeline.alike(study.scenes)
-    roses = pipeline.roses_of(study, members)
 
-    def results(runs: Runs) -> Results:
-        found = []
-        for bare, scenes in members.items():
-            done = [scene for scene in scenes if flows[scene].name in runs.done]
-            if done:
-                rose = roses.get(bare) if len(done) == len(scenes) else None
-                winds = _winds(done, flows, least, runs.cases, study)
-                speeds = study.erosion.fastest_mile
-                heaps = bare.heights.heaps
-                found.append(Heaps(bare.name, heaps, winds, speeds, rose))
-        if not found:
-            return {}, ()
+    def results(answers: Sequence[Answer]) -> Results:
+        found = [Heaps.of(each, study.erosion.fastest_mile) for each in answers]
         return {"erosion": rows(found)}, sections(found, source)
 
-    planned = plan.Plan({}, {}, (), {}, plan.listed(flows.values()))
-    return Experiment(
-        "erosion",
-        study.title,
-        planned,
-        results,
-        study.time_limit_s,
-        source=study.source,
-        shares_cases=True,
-    )
-
-
-def _winds(
-    scenes: Sequence[SurfaceScene],
-    flows: Mapping[SurfaceScene, SurfaceFlowCase],
-    least: float | None,
-    cases: Path,
-    study: SurfaceStudy,
-) -> list[Wind]:
-    """The heaps of scenes that differ in the direction of the wind, the worst first."""
-    found = []
-    for scene in scenes:
-        ground = pipeline.ground_of(scene, least)
-        stress = SurfaceStress.from_csv(cases / flows[scene].name / WALL_STRESS)
-        direction = answer.Direction.of(
-            ground, stress, scene.flow.from_deg, scene.heights
-        )
-        found.append(Wind.of(scene, direction.form, ground.level_ustar))
-    speeds = study.erosion.fastest_mile
-    return sorted(found, key=lambda wind: -wind.loss_kg(speeds))
+    return experiment_on(study, "erosion", least, results)
 
 
 def rows(found: Sequence[Heaps]) -> pd.DataFrame:

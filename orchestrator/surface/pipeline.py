@@ -4,7 +4,7 @@ OpenFOAM gives the stress on a bed in three dimensions for each direction of the
 the closed form the threshold of a grain on each of its faces.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -59,15 +59,13 @@ MOST_SHARE = 0.95
 """Share of the surface up to which it is drawn against the wind."""
 
 
-def experiment(study: SurfaceStudy, out: Path) -> Experiment:
+def experiment(study: SurfaceStudy) -> Experiment:
     """Make the experiment of a study on surfaces.
 
     Parameters
     ----------
     study
         The study.
-    out
-        The directory of the results.
 
     Returns
     -------
@@ -81,6 +79,46 @@ def experiment(study: SurfaceStudy, out: Path) -> Experiment:
         is.
     """
     threshold, source = given_threshold(study.erosion.threshold, study.file)
+
+    def results(found: Sequence[Answer]) -> Results:
+        return tables(found), sections(found, source)
+
+    return experiment_on(study, "surface", threshold, results, files)
+
+
+def experiment_on(
+    study: SurfaceStudy,
+    name: str,
+    threshold: float | None,
+    results: Callable[[Sequence[Answer]], Results],
+    files: Callable[[Sequence[Answer]], Mapping[str, bytes]] = lambda found: {},
+) -> Experiment:
+    """Make an experiment on the flows of a study.
+
+    Parameters
+    ----------
+    study
+        The study.
+    name
+        The name of the experiment.
+    threshold
+        Friction velocity of every face, m/s; None: the closed form.
+    results
+        Gives the tables and the page of the surfaces of which a flow is done; there is
+        at least one.
+    files
+        Gives the files beside the page; by default none.
+
+    Returns
+    -------
+    Experiment
+        Its runs, and what is made of them.
+
+    Raises
+    ------
+    InputError
+        If the rose blows from where no flow is.
+    """
     flows = {scene: flow_of(scene) for scene in study.scenes}
     members = alike(study.scenes)
     roses = roses_of(study, members)
@@ -95,18 +133,15 @@ def experiment(study: SurfaceStudy, out: Path) -> Experiment:
             found.append(_answer(done, flows, threshold, runs.cases, rose))
         return found
 
-    def results(runs: Runs) -> Results:
+    def made(runs: Runs) -> Results:
         found = answers(runs)
-        if not found:
-            return {}, ()
-        return tables(found), sections(found, source)
+        return results(found) if found else ({}, ())
 
-    planned = plan.Plan({}, {}, (), {}, plan.listed(flows.values()))
     return Experiment(
-        "surface",
+        name,
         study.title,
-        planned,
-        results,
+        plan.Plan({}, {}, (), {}, plan.listed(flows.values())),
+        made,
         study.time_limit_s,
         source=study.source,
         files=lambda runs: files(answers(runs)),

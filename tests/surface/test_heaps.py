@@ -100,7 +100,7 @@ def lateral(cones: Sequence[tuple[float, float, float]]) -> float:
 @pytest.mark.parametrize("fall", [0.0, 0.015, 0.05])
 def test_areas_and_shares_are_of_the_heaps_alone(tmp_path: Path, fall: float) -> None:
     study = study_of(tmp_path, fall=fall)
-    made, _ = answered(study, pipeline.experiment(study, tmp_path), tmp_path / "cases")
+    made, _ = answered(study, pipeline.experiment(study), tmp_path / "cases")
     faces = made["faces-1-270"]
     on_heaps = faces[faces["heap"] > 0]
     # a face counts whose middle is on a heap: of the 200 at the edge half do. The lowest
@@ -120,9 +120,7 @@ def test_areas_and_shares_are_of_the_heaps_alone(tmp_path: Path, fall: float) ->
 
 def test_grains_feel_the_fall_that_the_flow_does_not(tmp_path: Path) -> None:
     level, falls = (
-        answered(
-            study, pipeline.experiment(study, tmp_path), tmp_path / f"{fall}" / "cases"
-        )[0]
+        answered(study, pipeline.experiment(study), tmp_path / f"{fall}" / "cases")[0]
         for fall in (0.0, 0.05)
         for study in [study_of(tmp_path / f"{fall}", fall=fall)]
     )
@@ -145,7 +143,7 @@ def test_directions_that_the_interval_does_not_tell_apart_are_a_tie(
     study = study_of(tmp_path, directions=[0.0, 90.0, 180.0])
     # stresses 3 % and 30 % below those of the worst direction
     strengths = {0.0: 0.97, 90.0: 1.0, 180.0: 0.7}
-    experiment = pipeline.experiment(study, tmp_path)
+    experiment = pipeline.experiment(study)
     _, sections = answered(study, experiment, tmp_path / "cases", strengths.__getitem__)
     card = sections[0].card
     assert card is not None
@@ -173,7 +171,7 @@ def test_a_tie_of_all_directions_has_no_worst() -> None:
 
 def test_the_page_has_places_to_a_part_of_a_cell(tmp_path: Path) -> None:
     study = study_of(tmp_path, directions=[0.0, 90.0])
-    experiment = pipeline.experiment(study, tmp_path)
+    experiment = pipeline.experiment(study)
     made, sections = answered(study, experiment, tmp_path / "cases")
     (shown,) = sections[0].tables
     for place, exact in zip(
@@ -197,7 +195,7 @@ def eroded(
 ) -> tuple[pd.DataFrame, Card, str]:
     """The table, the card and the sentences of the erosion of cones."""
     study = study_of(folder, cones, directions=directions, more=COAL + more)
-    experiment = erosion.experiment(study, folder)
+    experiment = erosion.experiment(study)
     made, sections = answered(study, experiment, folder / "cases", strength)
     card = sections[0].card
     assert card is not None
@@ -235,7 +233,7 @@ def test_a_low_heap_alone_is_flat_ground_to_ap42(tmp_path: Path) -> None:
     (tmp_path / "heaps.tif").write_bytes(geotiff(EAST + x, NORTH + y, heights, ""))
     study = surface_study.load(tmp_path / "heaps.toml")
     assert study is not None
-    experiment = erosion.experiment(study, tmp_path)
+    experiment = erosion.experiment(study)
     made, sections = answered(study, experiment, tmp_path / "cases")
     told = sections[0].text.split("\n\n")
     assert "flat ground" not in told[0]
@@ -325,4 +323,4 @@ def test_a_current_takes_no_dust(tmp_path: Path) -> None:
     study = surface_study.load(path)
     assert study is not None
     with pytest.raises(InputError, match=r"fluid.density: a fluid of .* is no wind"):
-        erosion.experiment(study, tmp_path)
+        erosion.experiment(study)
