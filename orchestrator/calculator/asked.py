@@ -26,6 +26,7 @@ def thresholds_and_questions(
     names: Mapping[str, str],
     form: str,
     criterion: str = BY_FLUID,
+    bed_slope: float | None = None,
 ) -> tuple["Table", list[str]]:
     """Find the thresholds of some points, and ask about numbers that seem to be wrong.
 
@@ -47,6 +48,8 @@ def thresholds_and_questions(
         How a parameter is given a value: a format of its name and the value.
     criterion
         What a grain must do, one of `CRITERIA`, or `BY_FLUID`.
+    bed_slope
+        Slope at which a channel falls; None without one.
 
     Returns
     -------
@@ -73,7 +76,7 @@ def thresholds_and_questions(
         if fluid == PAPER and criterion == BY_FLUID:
             criterion = LEAVES  # also where the points have numbers of their own
         asked = questions(_by_field(points), fields, form)
-        return thresholds(points, law, criterion), asked
+        return thresholds(points, law, criterion, bed_slope), asked
     except InputError as error:
         renamed = InputError(
             _renamed(error.what, fields),

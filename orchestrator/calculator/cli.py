@@ -144,13 +144,10 @@ def run(options: argparse.Namespace) -> int:
         OPTIONS,
         "{} {:.4g}",
         options.criterion,
+        options.bed_slope,
     )
     if questions:
         print(f"orchestrator: {'; '.join(questions)}", file=sys.stderr)
-    if options.bed_slope is not None:
-        from orchestrator.calculator import river  # it loads numpy
-
-        river.add_depth(table, options.bed_slope, "depth" in axes)
     if options.csv:
         print_csv(table)
         return 0

@@ -1,11 +1,19 @@
-"""The uniform flow of a channel at the threshold: slope in, depth and velocity out."""
+"""The depth of a channel whose uniform flow starts motion, and what is against it.
+
+A slope goes in, depth and mean velocity come out.
+"""
+
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from orchestrator.calculator.table import Table, judge, why_no_depth
+from orchestrator.calculator import LARGEST_DEPTH
 from orchestrator.errors import InputError
 from orchestrator.physics.constants import GAS_BELOW
-from orchestrator.physics.velocity import measurable_speeds
+from orchestrator.physics.reported import in_units
+from orchestrator.types import FloatArray
 
 MOST = 0.05
 """Steepest slope of a channel: on steeper ones grains weigh in along the bed."""
@@ -13,46 +21,38 @@ COLUMN = "bed_slope"
 """Column of the slope at which the channel falls."""
 
 
-def add_depth(table: Table, bed_slope: float, has_depth: bool) -> None:
-    """Add the depth and the mean velocity of the uniform flow at each threshold.
+def uniform_flow(table: Mapping[str, Any], bed_slope: float) -> dict[str, FloatArray]:
+    """Find the depth and the mean velocity of the uniform flow at each threshold.
 
     The stress of a wide channel of depth h that falls by S is rho g h S, so that
     h = u*^2 / (g S). The slope itself changes the threshold by less than S/tan(phi),
-    8 % at most, which is left out. A threshold whose flow would not cover the grain, is
-    deeper than any, or may be laminar is marked as not valid, as where a depth is
-    given.
+    8 % at most, which is left out.
 
     Parameters
     ----------
     table
-        The table of `table.thresholds`; it gets the column `COLUMN` and new depths and
-        mean velocities.
+        The columns of thresholds.
     bed_slope
         The slope, of either sign: a river falls.
-    has_depth
-        Whether a depth was given.
+
+    Returns
+    -------
+    dict of str to ndarray
+        The columns of slope, depth and mean velocity.
 
     Raises
     ------
     InputError
-        In a gas, with a depth, for a slope that is 0 or too steep, or where no answer
-        has a depth.
+        In a gas, or for a slope that is 0 or too steep.
 
     Examples
     --------
-    >>> from orchestrator.calculator.table import thresholds
-    >>> water = {"fluid_density": [1000.0], "viscosity": [1e-6], "density": [2650.0]}
-    >>> table = thresholds({"diameter": [0.03], **water})
-    >>> add_depth(table, -0.005, has_depth=False)
-    >>> is_answer = table["answer"].astype(bool)
-    >>> ratio = 9810 * table["depth_m"] * 0.005 / table["stress_pa"]
-    >>> print(ratio[is_answer].round(6))
-    [1.]
+    >>> table = {"ustar_m_s": np.array([0.15]), "g_m_s2": 9.81, "z0_m": 1e-3}
+    >>> table |= {"rho_f_kg_m3": np.array([1000.0]), "nu_m2_s": 1e-6}
+    >>> print(uniform_flow(table, -0.005)["depth_m"].round(3))
+    [0.459]
     """
     slope = abs(bed_slope)
-    if has_depth:
-        remedy = "leave --depth out: it follows from the slope"
-        raise InputError("both a depth and a bed slope", "--bed-slope", remedy)
     if (table["rho_f_kg_m3"] < GAS_BELOW).any():
         remedy = "add --fluid water"
         raise InputError("a gas has no depth", "--bed-slope", remedy)
@@ -64,22 +64,32 @@ def add_depth(table: Table, bed_slope: float, has_depth: bool) -> None:
     # the slope may be as small as numbers are
     with np.errstate(over="ignore"):
         depth = ustar**2 / (table["g_m_s2"] * slope)
-        speeds = measurable_speeds(
-            ustar,
-            roughness=table["z0_m"],
-            fluid_density=table["rho_f_kg_m3"],
-            viscosity=table["nu_m2_s"],
-            depth=depth,
-            closed=False,
-        )
-    table[COLUMN] = np.full(len(ustar), slope)
-    table["depth_m"] = depth
-    table["mean_velocity_m_s"] = speeds["mean_velocity_m_s"]
-    judge(table, _of_depths(table))
+        found = in_units(ustar, {**table, "depth_m": depth})
+    return {
+        COLUMN: np.full(np.shape(ustar), slope),
+        "depth_m": depth,
+        "mean_velocity_m_s": found["mean_velocity_m_s"],
+    }
 
 
-def _of_depths(table: Table) -> list[str]:
-    """What is against each depth; refuse a table in which no answer has one."""
+def against_depths(table: Mapping[str, NDArray[Any]]) -> list[str]:
+    """Say what is against the depth of each uniform flow.
+
+    Parameters
+    ----------
+    table
+        The columns of thresholds with those of `uniform_flow`.
+
+    Returns
+    -------
+    list of str
+        The reasons; empty where there is none, or no threshold.
+
+    Raises
+    ------
+    InputError
+        If no answer has a depth.
+    """
     reasons = [""] * len(table["depth_m"])
     for row, depth in enumerate(table["depth_m"].tolist()):
         # a law without a threshold has its own reason
@@ -92,3 +102,31 @@ def _of_depths(table: Table) -> list[str]:
         remedy = f"take a {'steeper' if is_deep else 'gentler'} slope"
         raise InputError(what, "--bed-slope", remedy)
     return reasons
+
+
+def why_no_depth(depth: float, diameter: float) -> str:
+    """Say why a depth is none of a flow over a bed of grains.
+
+    Parameters
+    ----------
+    depth
+        The depth, m.
+    diameter
+        Diameter of the grains, m.
+
+    Returns
+    -------
+    str
+        The reason; empty for a depth that covers the grains and is no more than
+        `calculator.LARGEST_DEPTH`.
+
+    Examples
+    --------
+    >>> why_no_depth(4e-4, 5e-4)
+    'a depth of 0.0004 m does not cover a grain of 0.0005 m'
+    """
+    if not depth > diameter:
+        return f"a depth of {depth:g} m does not cover a grain of {diameter:g} m"
+    if depth > LARGEST_DEPTH:
+        return f"a depth of {depth:g} m is deeper than {LARGEST_DEPTH:g} m"
+    return ""

@@ -5,7 +5,7 @@ import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,17 +14,19 @@ from orchestrator.calculator import (
     BY_FLUID,
     CRITERIA,
     GOES_ON,
-    LARGEST_DEPTH,
     LEAVES,
     OF_FLUID,
     PARAMETERS,
     QUANTITIES,
+    river,
 )
 from orchestrator.errors import InputError
-from orchestrator.physics import saltation, verdict
+from orchestrator.physics import verdict
 from orchestrator.physics.beside import beside, measured_level_ustar
 from orchestrator.physics.constants import GAS_BELOW, GRAIN_COLUMNS
 from orchestrator.physics.laws import DEFAULT, LAWS, Exposure, law
+from orchestrator.physics.onset import Onset, of_grains
+from orchestrator.physics.reported import in_units
 from orchestrator.physics.threshold import (
     AUTO,
     LAWS_OF,
@@ -34,15 +36,10 @@ from orchestrator.physics.threshold import (
     default_laws,
     regime,
     standing_out,
-    threshold,
-    why_not,
 )
-from orchestrator.physics.velocity import (
-    LAMINAR_BELOW,
-    measurable_speeds,
-    open_water_reynolds,
-)
-from orchestrator.types import BoolArray, FloatArray, Row
+from orchestrator.physics.velocity import LAMINAR_BELOW, open_water_reynolds
+from orchestrator.physics.verdict import Reason
+from orchestrator.types import Row
 
 Table = dict[str, NDArray[Any]]
 """Columns of equal length by their names."""
@@ -54,6 +51,7 @@ def thresholds(
     points: Mapping[str, Any],
     asked: str = AUTO,
     criterion: str = BY_FLUID,
+    bed_slope: float | None = None,
 ) -> Table:
     """Find the thresholds of single grains under every force law.
 
@@ -71,6 +69,9 @@ def thresholds(
         their pockets in a gust of `saltation.PEAK` times the mean stress and hop on
         after it; their threshold is the larger of the two mean stresses. Grains that
         cannot hop go on where the mean stress turns them over their neighbours.
+    bed_slope
+        Slope at which a channel falls, whatever its sign: the depth and the mean
+        velocity are then those of its uniform flow.
 
     Returns
     -------
@@ -104,19 +105,28 @@ def thresholds(
         remedy = f"take the criterion {LEAVES}, or another law"
         raise InputError(what, "threshold: criterion", remedy)
     if "depth" in points:
+        if bed_slope is not None:
+            remedy = "leave --depth out: it follows from the slope"
+            raise InputError("both a depth and a bed slope", "--bed-slope", remedy)
         _check_depth(grains)
     # numbers beyond all floats end as laws that do not hold
     with np.errstate(all="ignore"):
-        table = _of_all_laws(grains, asked, criterion)
+        table, against = _of_all_laws(grains, asked, criterion)
     if criterion == GOES_ON and not np.isfinite(table["shields"]).any():
         remedy = f"take the criterion {LEAVES}, or a larger grain"
         raise InputError(verdict.NO_START, "threshold: criterion", remedy)
     if not table["valid"].any():
         place = int(np.argmax(table["answer"]))
-        reason = f"{table['law'][place]}: {table['law_ends'][place]}"
+        reason = f"{table['law'][place]}: {verdict.texts(against[place])}"
         remedy = "are all numbers in SI units?"
         raise InputError(f"no force law holds; {reason}", "threshold", remedy)
-    judge(table)
+    if bed_slope is not None:
+        table |= river.uniform_flow(table, bed_slope)
+        for row, text in enumerate(river.against_depths(table)):
+            if text:
+                against[row].append(Reason("depth", text))
+                table["valid"][row] = False
+    _judge(table, against)
     return table
 
 
@@ -128,26 +138,29 @@ def _check_criterion(criterion: str) -> None:
         raise InputError(what, "threshold: criterion", remedy)
 
 
-def _of_all_laws(grains: Table, asked: str, criterion: str) -> Table:
-    """The thresholds of grains under every law, a row for each grain and law."""
-    exposure = _exposure(grains)
+def _of_all_laws(
+    grains: Table, asked: str, criterion: str
+) -> tuple[Table, list[list[Reason]]]:
+    """The thresholds of grains under every law, a row for each grain and law.
+
+    Beside them is what the law of each row has against it.
+    """
     inputs = {each.column: grains[name] for name, each in PARAMETERS.items()}
-    by_law = {name: _threshold(name, exposure, grains) for name in LAWS}
-    regimes = regime(by_law["low"], by_law["high"]).astype(object)
-    picked = _picked(asked, regimes, by_law[DEFAULT].friction_velocity, exposure)
-    hopping = _hopping(grains) if criterion == GOES_ON else None
-    level = _level_ustar(grains, criterion, by_law, hopping)
+    level = {**inputs, "alpha_deg": np.zeros(len(grains["diameter"]))}
+    by_law = {name: of_grains(inputs, name, criterion) for name in LAWS}
+    in_steady_flow = {name: at.leaving for name, at in by_law.items()}
+    regimes = regime(in_steady_flow["low"], in_steady_flow["high"]).astype(object)
+    picked = _picked(asked, regimes, in_steady_flow[DEFAULT], grains)
     blocks = []
     for name, at in by_law.items():
-        block = _block(name, at, exposure, grains)
+        block = _block(at, inputs)
         kind: Table = {**inputs, "force_law": block["law"]}
-        if hopping is not None:
-            block = _going_on(block, hopping, exposure, grains)
+        if at.criteria is not None:
             kind["criterion"] = np.full(len(block["law"]), GOES_ON, object)
         block["regime"] = regimes
         measured = beside({**block, **kind})
         block |= measured
-        block["level_ustar_m_s"] = level[name]
+        block["level_ustar_m_s"] = of_grains(level, name, criterion).friction_velocity
         block["measured_level_ustar_m_s"] = measured_level_ustar({**inputs, **measured})
         block["answer"] = np.array([name in laws for laws in picked])
         blocks.append(block)
@@ -155,55 +168,39 @@ def _of_all_laws(grains: Table, asked: str, criterion: str) -> Table:
     for name in blocks[0]:
         of_laws = [block[name] for block in blocks]
         table[name] = np.stack(of_laws, axis=1).ravel()
-    return table
+    by_grain = zip(*(at.reasons() for at in by_law.values()), strict=True)
+    return table, [*itertools.chain.from_iterable(by_grain)]
 
 
-def _level_ustar(
-    grains: Table,
-    criterion: str,
-    by_law: Mapping[str, Threshold],
-    hopping: "_Hopping | None",
-) -> dict[str, FloatArray]:
-    """Friction velocity of each grain on a level bed, m/s, by the force law."""
-    is_sloping = grains["slope_deg"] != 0
-    if is_sloping.any():
-        grains = {**grains, "slope_deg": np.zeros(len(is_sloping))}
-        exposure = _exposure(grains)
-        by_law = {name: _threshold(name, exposure, grains) for name in LAWS}
-        hopping = _hopping(grains) if criterion == GOES_ON else None
-    found = {}
-    for name, at in by_law.items():
-        ustar = at.friction_velocity
-        if hopping is not None:
-            further = hopping.thresholds.initiation(saltation.PEAK)
-            moved = saltation.motion(at.shields, further, hopping.can).shields
-            ustar = ustar * np.sqrt(moved / at.shields)
-        found[name] = ustar
-    return found
+def _block(at: Onset, inputs: Table) -> Table:
+    """The columns that the thresholds under one force law have by themselves.
+
+    A law is valid where it holds for the grain that leaves.
+    """
+    density = inputs["rho_f_kg_m3"]
+    depth = np.where(density < GAS_BELOW, np.nan, inputs["depth_m"])
+    found = in_units(at.friction_velocity, {**inputs, "depth_m": depth})
+    found |= {
+        "ustar_m_s": at.friction_velocity,
+        "shields": at.shields,
+        "reynolds": at.reynolds,
+        "drag_n": at.drag,
+        "lift_n": at.lift,
+    }
+    block: Table = {"law": np.full(len(density), at.law, object)}
+    block |= {column: found[column] for column in QUANTITIES}
+    block["valid"] = at.valid
+    if at.criteria is not None:
+        block |= at.criteria.columns()
+    return block
 
 
-def _exposure(grains: Table) -> Exposure:
-    """The grains in their fluids."""
-    return Exposure(
-        diameter=grains["diameter"],
-        roughness=grains["roughness"],
-        fluid_density=grains["fluid_density"],
-        viscosity=grains["viscosity"],
-        lift_coefficient=grains["lift_coefficient"],
-    )
-
-
-def judge(table: Table, of_depth: Sequence[str] = ()) -> None:
+def _judge(table: Table, against: Sequence[Sequence[Reason]]) -> None:
     """Say whether the thresholds of a table are usable, and what speaks against them.
 
-    A law whose flow in open water may be laminar is not valid.
-
-    Parameters
-    ----------
-    table
-        The table of `thresholds`, with any depth; it gets the columns of the verdict.
-    of_depth
-        What is against the depth of each; empty where nothing is.
+    The table gets the columns of the verdict; `against` is what the law and the depth
+    of each row have against it. A law whose flow in open water may be laminar is not
+    valid.
     """
     with np.errstate(all="ignore"):
         reynolds = open_water_reynolds(
@@ -218,9 +215,6 @@ def judge(table: Table, of_depth: Sequence[str] = ()) -> None:
     flow = np.where(table["rho_f_kg_m3"] < GAS_BELOW, np.nan, reynolds)
     columns = {
         **table,
-        "force_law": table["law"],
-        "law": table["law_ends"],
-        "law_remedy": table["law_remedy"],
         "flow_reynolds": flow,
         "standing_out": standing_out(1.0, table["beta_deg"]),
     }
@@ -228,45 +222,14 @@ def judge(table: Table, of_depth: Sequence[str] = ()) -> None:
         columns["criterion"] = np.full(len(flow), GOES_ON, object)
     cells = zip(*(column.tolist() for column in columns.values()), strict=True)
     rows = [dict(zip(columns, row, strict=True)) for row in cells]
-    reasons = [
-        [*verdict.of_grain(row), *verdict.of_measurements(row, is_closed=True)]
-        for row in rows
-    ]
-    for place, text in enumerate(of_depth):
-        if text:
-            reasons[place].append(verdict.Reason("depth", text))
-            table["valid"][place] = False
+    reasons = []
+    for row, of_law in zip(rows, against, strict=True):
+        of_grain = verdict.of_grain(row, of_law)
+        of_measurements = verdict.of_measurements(row, is_closed=True)
+        reasons.append([*of_grain, *of_measurements])
     for name, values in verdict.columns(rows, reasons).items():
         is_word = name != "usable"
         table[name] = np.array(values, object if is_word else bool)
-
-
-def why_no_depth(depth: float, diameter: float) -> str:
-    """Say why a depth is none of a flow over a bed of grains.
-
-    Parameters
-    ----------
-    depth
-        The depth, m.
-    diameter
-        Diameter of the grains, m.
-
-    Returns
-    -------
-    str
-        The reason; empty for a depth that covers the grains and is no more than
-        `LARGEST_DEPTH`.
-
-    Examples
-    --------
-    >>> why_no_depth(4e-4, 5e-4)
-    'a depth of 0.0004 m does not cover a grain of 0.0005 m'
-    """
-    if not depth > diameter:
-        return f"a depth of {depth:g} m does not cover a grain of {diameter:g} m"
-    if depth > LARGEST_DEPTH:
-        return f"a depth of {depth:g} m is deeper than {LARGEST_DEPTH:g} m"
-    return ""
 
 
 def _check_law(asked: str) -> None:
@@ -285,67 +248,12 @@ def _check_depth(grains: Table) -> None:
     density = grains["fluid_density"]
     remedy = "give the depth of a liquid, in m; of water: fluid.kind water"
     pairs = zip(grains["depth"].tolist(), grains["diameter"].tolist(), strict=True)
-    for what in itertools.starmap(why_no_depth, pairs):
+    for what in itertools.starmap(river.why_no_depth, pairs):
         if what:
             raise InputError(what, "threshold: depth", remedy)
     if (density < GAS_BELOW).all():
         what = f"{density[0]:g} kg/m3 is a gas"
         raise InputError(what, "threshold: depth", remedy)
-
-
-def _threshold(name: str, exposure: Exposure, grains: Table) -> Threshold:
-    """The thresholds of the grains under one force law."""
-    return threshold(
-        LAWS[name],
-        exposure,
-        density=grains["density"],
-        slope_deg=grains["slope_deg"],
-        gravity=grains["gravity"],
-        entrainment_angle_deg=grains["entrainment_angle_deg"],
-        cohesion=grains["cohesion"],
-    )
-
-
-def _block(name: str, at: Threshold, exposure: Exposure, grains: Table) -> Table:
-    """The columns that the threshold under one force law has by itself."""
-    ustar = at.friction_velocity
-    density = grains["fluid_density"]
-    found = {
-        "ustar_m_s": ustar,
-        "stress_pa": density * ustar**2,
-        "shields": at.shields,
-        "reynolds": at.reynolds,
-        "drag_n": at.drag,
-        "lift_n": at.lift,
-        **measurable_speeds(
-            ustar,
-            roughness=grains["roughness"],
-            fluid_density=density,
-            viscosity=grains["viscosity"],
-            depth=np.where(density < GAS_BELOW, np.nan, grains["depth"]),
-        ),
-    }
-    block: Table = {"law": np.full(len(density), name, object)}
-    block |= {column: found[column] for column in QUANTITIES}
-    block["valid"] = at.valid
-    reasons = why_not(
-        LAWS[name],
-        ustar,
-        exposure,
-        density=grains["density"],
-        slope_deg=grains["slope_deg"],
-        gravity=grains["gravity"],
-    )
-    # without a threshold no law is beyond its range
-    is_known = np.isfinite(ustar)
-    block["law_ends"] = np.where(is_known, np.array(reasons, object), "")
-    remedies = np.full(len(ustar), "", object)
-    further = LAWS[name].goes_on
-    if further:
-        holds = LAWS[further].valid(ustar, exposure) & (block["law_ends"] != "")
-        remedies[holds] = f'choose forces.law = "{further}"'
-    block["law_remedy"] = remedies
-    return block
 
 
 def _criterion(points: Mapping[str, Any], asked: str) -> str:
@@ -357,103 +265,22 @@ def _criterion(points: Mapping[str, Any], asked: str) -> str:
     return LEAVES if is_paper or asked in OF_PAPER else GOES_ON
 
 
-class _Hopping(NamedTuple):
-    """Whether grains can hop, and their thresholds by two laws of rebound."""
-
-    can: BoolArray
-    thresholds: saltation.Thresholds
-    at_most: saltation.Thresholds
-
-
-def _hopping(grains: Table) -> _Hopping:
-    """How the grains hop over the bed."""
-    hoppers = saltation.Grains.of(
-        grains["diameter"],
-        density=grains["density"],
-        fluid_density=grains["fluid_density"],
-        viscosity=grains["viscosity"],
-        slope_deg=grains["slope_deg"],
-        roughness=grains["roughness"],
-        gravity=grains["gravity"],
-    )
-    return _Hopping(
-        saltation.hops(hoppers),
-        saltation.tabulated(hoppers),
-        saltation.tabulated(hoppers, at_most=True),
-    )
-
-
-def _going_on(
-    block: Table,
-    hopping: _Hopping,
-    exposure: Exposure,
-    grains: Table,
-) -> Table:
-    """The columns of a force law for grains that leave in a gust, and go on after it.
-
-    Drag and lift are those in the gust at the threshold; grains that cannot hop have no
-    gust. A law is valid where it holds
-    for the grain that leaves.
-    """
-    stresses = _criteria(block["shields"], hopping)
-    shields = stresses.pop("shields")
-    density = grains["fluid_density"]
-    excess = (grains["density"] - density) * grains["gravity"] * grains["diameter"]
-    ustar = np.sqrt(shields * excess / density)
-    law = LAWS[block["law"][0]]
-    in_gust = ustar * np.sqrt(np.where(hopping.can, saltation.PEAK, 1.0))
-    changed = {**block, **stresses}
-    changed |= measurable_speeds(
-        ustar,
-        roughness=grains["roughness"],
-        fluid_density=density,
-        viscosity=grains["viscosity"],
-        depth=np.where(density < GAS_BELOW, np.nan, grains["depth"]),
-    )
-    changed["ustar_m_s"] = ustar
-    changed["stress_pa"] = density * ustar**2
-    changed["shields"] = shields
-    changed["reynolds"] = exposure.reynolds(ustar)
-    changed["drag_n"] = law.drag(in_gust, exposure)
-    changed["lift_n"] = law.lift(in_gust, exposure)
-    is_missing = hopping.can & ~np.isfinite(stresses["shields_goes_on"])
-    changed["valid"] = block["valid"] & ~is_missing
-    return changed
-
-
-def _criteria(steady: FloatArray, hopping: _Hopping) -> Table:
-    """The threshold of grains that go on, and the columns `OF_CRITERION`.
-
-    `steady` is the Shields number that turns them over their neighbours.
-    """
-    can = hopping.can
-    goes_on = hopping.thresholds.initiation(saltation.PEAK)
-    at_most = hopping.at_most.initiation(saltation.PEAK)
-    found = saltation.motion(steady, goes_on, can)
-    highest = saltation.motion(steady, at_most, can).shields
-    decides = np.where(found.goes_on, GOES_ON, LEAVES)
-    return {
-        "shields": found.shields,
-        "shields_leaves": np.where(can, steady / saltation.PEAK, steady),
-        "shields_goes_on": np.where(can, goes_on, np.nan),
-        "shields_goes_on_high": np.where(can, highest, np.nan),
-        "shields_cessation": np.where(can, hopping.thresholds.cessation, steady),
-        "decides": decides.astype(object),
-    }
-
-
 def _picked(
-    asked: str,
-    regimes: NDArray[Any],
-    ustar: FloatArray,
-    exposure: Exposure,
+    asked: str, regimes: NDArray[Any], by_default: Threshold, grains: Table
 ) -> list[tuple[str, ...]]:
-    """The laws that answer each point; `ustar` is its threshold under `DEFAULT`."""
+    """The laws that answer each point."""
     if asked == PAPER:
         return [LAWS_OF[regime] for regime in regimes]
     if asked == AUTO:
-        names = np.broadcast_to(default_laws(ustar, exposure), len(regimes))
-        return [(name,) for name in names.tolist()]
+        exposure = Exposure(
+            diameter=grains["diameter"],
+            roughness=grains["roughness"],
+            fluid_density=grains["fluid_density"],
+            viscosity=grains["viscosity"],
+            lift_coefficient=grains["lift_coefficient"],
+        )
+        names = default_laws(by_default.friction_velocity, exposure)
+        return [(name,) for name in np.broadcast_to(names, len(regimes)).tolist()]
     return [(asked,)] * len(regimes)
 
 

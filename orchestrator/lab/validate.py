@@ -21,12 +21,12 @@ from orchestrator.flow.stress import WallStress, bubble
 from orchestrator.lab.sphere import speed_of, sphere
 from orchestrator.lab.strips import PERCENTILES, ROUGH, Strips
 from orchestrator.physics import saltation
-from orchestrator.physics.constants import GAS_BELOW, GRAVITY
+from orchestrator.physics.constants import GAS_BELOW, GRAVITY, LIFT_COEFFICIENT
 from orchestrator.physics.gusts import peak_over_mean
-from orchestrator.physics.laws import CLIFT_GAUVIN, LAWS, Exposure
+from orchestrator.physics.laws import CLIFT_GAUVIN, LAWS
 from orchestrator.physics.measured import kirchner_pivot
-from orchestrator.physics.threshold import LAWS_OF, PAPER, Threshold, weight
-from orchestrator.physics.threshold import threshold as threshold_of
+from orchestrator.physics.onset import Criteria, Onset, of_grains
+from orchestrator.physics.threshold import LAWS_OF, PAPER, weight
 from orchestrator.report import style
 from orchestrator.report.card import Card, Number, Worth
 from orchestrator.report.page import Section
@@ -44,6 +44,8 @@ INTENSITY = 0.4
 """Intensity of the wall stress under gusts: standard deviation over mean."""
 EVENTS = 100
 """Of so many events the largest moves a grain."""
+GIVEN = ("d_m", "rho_sol_kg_m3", "rho_f_kg_m3", "nu_m2_s", "cohesion_n_m")
+"""Columns of measured beds that those of a grain are, too."""
 FREE = 5000.0
 """Particle Reynolds number of the spheres whose drag was measured, about."""
 ENOUGH = 1.5
@@ -142,7 +144,7 @@ def single(
     law: str,
     beta_deg: float = 60,
     ratio: float = 30,
-) -> Threshold:
+) -> Onset:
     """Find the thresholds of single grains on some measured beds.
 
     Parameters
@@ -158,26 +160,19 @@ def single(
 
     Returns
     -------
-    Threshold
-        Thresholds, of shape (rows,).
+    Onset
+        Thresholds of leaving the pocket, of shape (rows,).
     """
-    d = beds["d_m"].to_numpy(float)
-    exposure = Exposure(
-        diameter=d,
-        roughness=d / ratio,
-        fluid_density=beds["rho_f_kg_m3"].to_numpy(float),
-        viscosity=beds["nu_m2_s"].to_numpy(float),
-    )
-    slope = beds["slope"].to_numpy(float)
-    return threshold_of(
-        LAWS[law],
-        exposure,
-        density=beds["rho_sol_kg_m3"].to_numpy(float),
+    table = {
+        **{name: beds[name] for name in GIVEN},
         # a bed that falls with the flow has a positive slope in the table
-        slope_deg=-np.degrees(np.arctan(slope)),
-        entrainment_angle_deg=beta_deg,
-        cohesion=beds["cohesion_n_m"].to_numpy(float),
-    )
+        "alpha_deg": -np.degrees(np.arctan(beds["slope"])),
+        "beta_deg": beta_deg,
+        "z0_m": beds["d_m"] / ratio,
+        "alpha_s": LIFT_COEFFICIENT,
+        "g_m_s2": GRAVITY,
+    }
+    return of_grains(table, law)
 
 
 def over_hump(stress: WallStress) -> pd.DataFrame:
@@ -238,11 +233,10 @@ def going_on(
         Shields numbers of the mean flow, of shape (rows,).
     """
     grains = hoppers(beds, ratio)
-    goes_on = saltation.tabulated(grains).initiation(gust)
     if not leaves:
-        return goes_on
+        return saltation.tabulated(grains).initiation(gust)
     steady = single(beds, "bridged-gravel", 60, ratio).shields
-    return saltation.motion(steady, goes_on, saltation.hops(grains), gust).shields
+    return Criteria(steady, grains, gust).shields
 
 
 def hoppers(beds: pd.DataFrame, ratio: float = 30) -> saltation.Grains:

@@ -294,7 +294,7 @@ class Validity:
         return f"{self.quantity} {three_digits:g} is {side}"
 
 
-def reasons(ranges: Iterable[Validity], count: int) -> list[str]:
+def reasons(ranges: Iterable[Validity], count: int) -> list[list[str]]:
     """Say which limits each of some grains is beyond.
 
     Parameters
@@ -306,20 +306,20 @@ def reasons(ranges: Iterable[Validity], count: int) -> list[str]:
 
     Returns
     -------
-    list of str
-        For each grain the limits in words; empty where all ranges hold.
+    list of list of str
+        For each grain the limits in words; none where all ranges hold.
 
     Examples
     --------
     >>> reasons([Validity("Re*", np.array([2.0, 40.0]), 0.0, 3.0)], 2)
-    ['', 'Re* 40 is not below 3']
+    [[], ['Re* 40 is not below 3']]
     """
     texts_by_range = []
     for each in ranges:
         values = np.broadcast_to(each.value, count).tolist()
         texts_by_range.append([each.text(value) for value in values])
     texts_by_grain = zip(*texts_by_range, strict=True)
-    return ["; ".join(filter(None, texts)) for texts in texts_by_grain]
+    return [[text for text in texts if text] for texts in texts_by_grain]
 
 
 class ForceLaw(ABC):

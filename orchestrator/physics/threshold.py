@@ -489,7 +489,7 @@ def why_not(
     density: ArrayLike | None = None,
     slope_deg: ArrayLike = 0.0,
     gravity: ArrayLike = GRAVITY,
-) -> list[str]:
+) -> list[list[str]]:
     """Say why thresholds of some grains do not hold under a law.
 
     Parameters
@@ -510,8 +510,8 @@ def why_not(
 
     Returns
     -------
-    list of str
-        For each grain the reasons in words; empty where there are none.
+    list of list of str
+        For each grain the reasons in words.
 
     Examples
     --------
@@ -519,7 +519,7 @@ def why_not(
     ...     diameter=1e-3, roughness=1e-3 / 30, fluid_density=1000.0, viscosity=1e-6
     ... )
     >>> why_not(LAWS["low"], np.array([0.002, 0.02]), sand)
-    ['', 'Re* 20 is not below 3']
+    [[], ['Re* 20 is not below 3']]
     """
     ranges = list(law.ranges(ustar, exposure))
     if density is not None:

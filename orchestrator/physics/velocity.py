@@ -155,7 +155,7 @@ def measurable_speeds(
     fluid_density: ArrayLike,
     viscosity: ArrayLike,
     depth: ArrayLike,
-    closed: bool = False,
+    closed: ArrayLike = False,
 ) -> dict[str, FloatArray]:
     """Compute the speeds of an undisturbed flow that are measured.
 

@@ -55,15 +55,17 @@ class Reason(NamedTuple):
     remedy: str = ""
 
 
-def of_grain(row: Mapping[Any, Any]) -> Iterator[Reason]:
+def of_grain(row: Mapping[Any, Any], of_law: Iterable[Reason]) -> Iterator[Reason]:
     """Find what speaks against the threshold of a grain, or of such a grain in a bed.
 
     Parameters
     ----------
     row
-        The threshold with the columns of its scene and those of `beside`; `law`, what
-        its force law has against it, `law_remedy`; `standing_out`, the part of it above
-        its neighbours; and `flow_reynolds`, that of the flow.
+        The threshold with the columns of its scene and those of `beside`;
+        `standing_out`, the part of it above its neighbours; and `flow_reynolds`, that
+        of the flow.
+    of_law
+        What its force law has against it.
 
     Yields
     ------
@@ -72,8 +74,7 @@ def of_grain(row: Mapping[Any, Any]) -> Iterator[Reason]:
     """
     if not math.isfinite(row["reynolds"]) and "count" not in row:
         yield _not_reached(row)
-    if row["law"]:
-        yield Reason("law", row["law"], row["law_remedy"])
+    yield from of_law
     standing_out = row["standing_out"]
     if standing_out <= 0:
         yield Reason("hidden", "hidden grain: it lies below the tops of its neighbours")
@@ -236,6 +237,22 @@ def verdict(row: Mapping[Any, Any], reasons: Sequence[Reason]) -> Word:
     return COMPARED if math.isnan(correction(row)) else CORRECTED
 
 
+def texts(reasons: Iterable[Reason]) -> str:
+    """Join what reasons are, for people.
+
+    Parameters
+    ----------
+    reasons
+        The reasons.
+
+    Returns
+    -------
+    str
+        Their texts.
+    """
+    return "; ".join(each.text for each in reasons)
+
+
 def columns(
     rows: Iterable[Mapping[Any, Any]], reasons: Iterable[Sequence[Reason]]
 ) -> dict[str, list[Any]]:
@@ -257,8 +274,9 @@ def columns(
     for row, against in zip(rows, reasons, strict=True):
         made["usable"].append(not against)
         made["verdict"].append(verdict(row, against))
-        made["reason"].append("; ".join(each.code for each in against))
-        made["why_not"].append("; ".join(each.text for each in against))
+        codes = dict.fromkeys(each.code for each in against)
+        made["reason"].append("; ".join(codes))
+        made["why_not"].append(texts(against))
         remedies = dict.fromkeys(each.remedy for each in against if each.remedy)
         made["remedy"].append("; ".join(remedies))
     return made

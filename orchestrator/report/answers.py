@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -14,7 +13,6 @@ from orchestrator.grains.pile import Pile
 from orchestrator.physics.constants import GRAIN_COLUMNS
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import MEASURED_SOURCE, wilcock_crowe_hiding
-from orchestrator.physics.threshold import SingleGrain, thresholds_of
 from orchestrator.physics.verdict import USABLE
 from orchestrator.report import counted, labels, sheets, single, theory
 from orchestrator.report.card import Card, Mark, Number, Worth
@@ -36,8 +34,7 @@ from orchestrator.report.subjects import (
     solid,
 )
 from orchestrator.study.profile import WITH_X
-from orchestrator.tables.quoted import MEASURED, SEEDS, grain_ustar
-from orchestrator.types import BoolArray, FloatArray
+from orchestrator.tables.quoted import MEASURED, SEEDS, of_rows
 
 NONE = Card(
     "When do these grains start to move?",
@@ -49,8 +46,6 @@ NONE = Card(
 """The card of a study without results."""
 NUMBERS = "load steps, count and the known error of the method"
 """What the numerical interval of a share of a bed is of."""
-OF_ONE_GRAIN = (*GRAIN_COLUMNS.values(), "gusts", "criterion")
-"""Columns that the thresholds of one grain by all laws follow from."""
 SHAPES = {
     "triangle": "pile",
     "dune": "dune",
@@ -617,23 +612,8 @@ def of_grain(row: pd.Series) -> Card:
     Card
         The card.
     """
-    return single.card(row, laws_that_hold(row))
-
-
-def laws_that_hold(row: pd.Series) -> dict[str, float]:
-    """Find the friction velocities by the force laws that hold for a single grain.
-
-    Parameters
-    ----------
-    row
-        A threshold with the columns of its scene.
-
-    Returns
-    -------
-    dict of str to float
-        Friction velocity at the threshold, m/s, by the name of the law.
-    """
-    return {name: ustar for name, (ustar, holds) in by_law(row).items() if holds}
+    found = by_law(row)
+    return single.card(row, {name: at for name, (at, holds) in found.items() if holds})
 
 
 def by_law(row: pd.Series) -> dict[str, tuple[float, bool]]:
@@ -650,53 +630,10 @@ def by_law(row: pd.Series) -> dict[str, tuple[float, bool]]:
         Friction velocity at the threshold, m/s, and whether the law holds there, by the
         name of the law.
     """
-    return dict(_by_law(tuple((column, row.get(column)) for column in OF_ONE_GRAIN)))
-
-
-@lru_cache(maxsize=8)  # the card and both drawings of a grain ask for the same
-def _by_law(
-    grain: tuple[tuple[str, Any], ...],
-) -> tuple[tuple[str, tuple[float, bool]], ...]:
-    """The same of the values of `OF_ONE_GRAIN`."""
-    rows = pd.DataFrame([dict(grain)] * len(LAWS)).assign(force_law=list(LAWS))
-    # what goes on depends on no law: all are asked for at once
-    ustar = grain_ustar(rows)
-    found = {}
-    for place, name in enumerate(LAWS):
-        (holds,) = _holds(rows.iloc[[place]], ustar[[place]])
-        found[name] = float(ustar[place]), bool(holds)
-    return tuple(found.items())
-
-
-def by_this_law(rows: pd.DataFrame) -> tuple[FloatArray, BoolArray]:
-    """Find the thresholds of single grains by one law, by their own criterion.
-
-    Parameters
-    ----------
-    rows
-        Thresholds with the columns of their scenes, of one force law.
-
-    Returns
-    -------
-    ustar : ndarray
-        Friction velocity at the threshold, m/s, shape (n,).
-    holds : ndarray
-        Whether the law holds there, shape (n,).
-    """
-    ustar = grain_ustar(rows)
-    return ustar, _holds(rows, ustar)
-
-
-def _holds(rows: pd.DataFrame, ustar: FloatArray) -> BoolArray:
-    """Whether the one force law of rows holds where the grains leave their pockets.
-
-    `ustar` is their threshold, m/s: without one there is no law that holds.
-    """
-    name = str(rows["force_law"].iloc[0])
-    columns = list(GRAIN_COLUMNS.values())
-    grains = [SingleGrain.of_row(row) for row in rows[columns].to_dict("records")]
-    holds = [bool(at.valid) for at in thresholds_of(name, grains)]
-    return np.array(holds, bool) & np.isfinite(ustar)
+    rows = pd.DataFrame([row] * len(LAWS)).assign(force_law=list(LAWS))
+    found = of_rows(rows)
+    pairs = zip(found["ustar"].tolist(), found["holds"].tolist(), strict=True)
+    return dict(zip(LAWS, pairs, strict=True))
 
 
 # many laws, and hills

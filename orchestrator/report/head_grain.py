@@ -10,6 +10,7 @@ from matplotlib.figure import Figure as Canvas
 
 from orchestrator.physics import saltation
 from orchestrator.physics.curves import Air, shao_lu, soulsby_whitehouse
+from orchestrator.physics.onset import hoppers
 from orchestrator.report import answers, single
 from orchestrator.report.drawing import (
     ANSWER,
@@ -28,7 +29,7 @@ from orchestrator.report.drawing import (
 from orchestrator.report.style import Look
 from orchestrator.report.subjects import Quantity, is_gas
 from orchestrator.study.criterion import GOES_ON
-from orchestrator.tables.quoted import hoppers
+from orchestrator.tables.quoted import of_rows
 
 FEW = 13
 """Sizes of the curve of a grain that goes on where no table holds it."""
@@ -59,8 +60,9 @@ def of_grain(row: pd.Series) -> Head:
         # each size takes a tenth of a second
         here = _other_sizes(row, FEW)
     d = here["d_m"].to_numpy()
-    ustar, holds = answers.by_this_law(here)
-    computed = _told_by(here, np.where(holds, ustar, np.nan), told)
+    found = of_rows(here)
+    ustar = np.where(found["holds"], found["ustar"], np.nan)
+    computed = _told_by(here, ustar, told)
     measured = _told_by(here, _curve(row, d), told)
     curves = pd.DataFrame({"mm": 1e3 * d, "computed": computed, "measured": measured})
 

@@ -18,19 +18,16 @@ from orchestrator.physics.constants import GRAIN_COLUMNS
 from orchestrator.physics.curves import Air
 from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.measured import BUFFINGTON_MONTGOMERY, MEASURED_SOURCE
+from orchestrator.physics.onset import hoppers, of_grains
 from orchestrator.physics.threshold import (
     LAWS_OF,
-    SingleGrain,
-    Threshold,
     shields_at,
-    thresholds_of,
 )
 from orchestrator.report import labels
 from orchestrator.report.page import caption
 from orchestrator.report.results import Results, split
 from orchestrator.report.subjects import fluid
 from orchestrator.study.criterion import GOES_ON
-from orchestrator.tables.quoted import grain_ustar, hoppers
 from orchestrator.types import BoolArray, FloatArray
 
 PAIR = LAWS_OF["transition"]
@@ -390,10 +387,7 @@ def going_on(rows: pd.DataFrame) -> list[Going]:
         here = here[saltation.is_tabulated(hoppers(here))]
         if here.empty:
             continue
-        ustar = grain_ustar(here)
-        reynolds = ustar * here["d_m"].to_numpy() / first["nu_m2_s"]
-        excess = first["rho_sol_kg_m3"] / first["rho_f_kg_m3"] - 1
-        tau = ustar**2 / (excess * first["g_m_s2"] * here["d_m"].to_numpy())
+        at = of_grains(here, str(first["force_law"]), GOES_ON, first["gust"])
         bed = Bed._make(first[BED].tolist())
         line = Line(str(first["force_law"]), bed, np.inf, 0.0)
         within = ""
@@ -402,7 +396,8 @@ def going_on(rows: pd.DataFrame) -> list[Going]:
         elif len(fluids) > 1:
             within = f" in {fluid(first['rho_f_kg_m3'], first['nu_m2_s'])}"
         name = f"{line.name}{within}: {GOING}"
-        found.append(Going(line.law, bed, name, reynolds, tau, line.holds(reynolds)))
+        holds = line.holds(at.reynolds)
+        found.append(Going(line.law, bed, name, at.reynolds, at.shields, holds))
     return found
 
 
@@ -444,31 +439,11 @@ def span(scenes: pd.DataFrame) -> tuple[float, float]:
         Its ends; infinite and 0 where no grain has a threshold.
     """
     found = []
-    for law in scenes["force_law"].unique():
-        of_law = scenes[scenes["force_law"] == law]
-        found += [threshold.reynolds for threshold in thresholds(of_law, law)]
-    reynolds = np.array(found, float)
+    for law, of_law in scenes.groupby("force_law"):
+        found.append(of_grains(of_law, str(law)).reynolds)
+    reynolds = np.concatenate([*found, np.empty(0)])
     reynolds = reynolds[np.isfinite(reynolds) & (reynolds > 0)]
     return float(reynolds.min(initial=np.inf)), float(reynolds.max(initial=0.0))
-
-
-def thresholds(scenes: pd.DataFrame, law: str) -> list[Threshold]:
-    """Find the closed form of the single grains of some rows under a law.
-
-    Parameters
-    ----------
-    scenes
-        Rows with the columns of their grains.
-    law
-        Name of the force law.
-
-    Returns
-    -------
-    list of Threshold
-        A threshold for each row.
-    """
-    rows = scenes[list(GRAIN_COLUMNS.values())].to_dict("records")
-    return thresholds_of(law, [SingleGrain.of_row(row) for row in rows])
 
 
 def in_gas(scenes: pd.DataFrame) -> "pd.Series[bool]":

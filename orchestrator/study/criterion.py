@@ -6,12 +6,12 @@ criterion open, its fluid and its forces decide, whatever its method is.
 """
 
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from orchestrator.physics import saltation
+from orchestrator.physics.onset import Criteria
 from orchestrator.study.closed_form import closed_form
 from orchestrator.study.parts import GrainBed
 from orchestrator.study.question import why_not_going_on
@@ -51,34 +51,6 @@ def goes_on(scene: Scene) -> bool:
 def _is_single_by_dem(scene: Scene) -> bool:
     """Whether LIGGGHTS follows a single grain, of which it knows no hops."""
     return scene.method.kind == "dem" and isinstance(scene.bed, GrainBed)
-
-
-class GoingOn(NamedTuple):
-    """Mean stresses at which grains leave and go on, arrays of shape (n,).
-
-    Attributes
-    ----------
-    shields
-        Shields number from which they do both.
-    leaves
-        That from which the gust turns a grain over its neighbour; of one that cannot
-        hop, the mean stress.
-    goes_on
-        That from which it hops on after the gust; NaN of one that cannot hop.
-    at_most
-        The threshold with the weakest rebounds; NaN of one that cannot hop.
-    cessation
-        That below which motion ceases once it is under way.
-    hops_decide
-        Whether hopping on holds it longer than its pocket.
-    """
-
-    shields: FloatArray
-    leaves: FloatArray
-    goes_on: FloatArray
-    at_most: FloatArray
-    cessation: FloatArray
-    hops_decide: BoolArray
 
 
 def peak_of(scene: Scene) -> float:
@@ -174,7 +146,7 @@ def _initiation(
     return shields, saltation.hops(grains)
 
 
-def of_single_grain(scene: Scene) -> GoingOn:
+def of_single_grain(scene: Scene) -> Criteria:
     """Find the mean stresses at which the single grain of a scene leaves and goes on.
 
     Parameters
@@ -184,23 +156,8 @@ def of_single_grain(scene: Scene) -> GoingOn:
 
     Returns
     -------
-    GoingOn
+    Criteria
         The stresses, arrays of shape (1,).
     """
     steady = np.atleast_1d(closed_form(scene).shields) * scene.gust
-    grains = hoppers(scene, scene.bed.slope_deg)
-    peak = peak_of(scene)
-    usual = saltation.tabulated(grains)
-    weakest = saltation.tabulated(grains, at_most=True)
-    further = usual.initiation(peak)
-    can = saltation.hops(grains)
-    found = saltation.motion(steady, further, can, peak)
-    highest = saltation.motion(steady, weakest.initiation(peak), can, peak)
-    return GoingOn(
-        shields=found.shields,
-        leaves=np.where(can, steady / peak, steady),
-        goes_on=np.where(can, further, np.nan),
-        at_most=np.where(can, highest.shields, np.nan),
-        cessation=np.where(can, usual.cessation, steady),
-        hops_decide=found.goes_on,
-    )
+    return Criteria(steady, hoppers(scene, scene.bed.slope_deg), peak_of(scene))

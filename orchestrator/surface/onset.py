@@ -11,7 +11,10 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from orchestrator.physics import saltation
+from orchestrator.physics.constants import GRAIN_COLUMNS
 from orchestrator.physics.laws import LAWS, Exposure
+from orchestrator.physics.onset import Criteria
+from orchestrator.physics.shields import shields_of, ustar_of
 from orchestrator.physics.threshold import SingleGrain
 from orchestrator.physics.velocity import log_law_speed
 from orchestrator.surface.across import slope_along_deg, threshold_across
@@ -185,12 +188,9 @@ def goes_on(
         slope_deg=along,
         gravity=grain.gravity,
     )
-    excess = (grain.density / grain.fluid_density - 1) * grain.gravity
-    unit = np.sqrt(excess * grain.diameter)
-    going = saltation.tabulated(grains).initiation(saltation.PEAK)
-    can = saltation.hops(grains)
-    found = saltation.motion((leaving / unit) ** 2, going, can)
-    return np.asarray(np.sqrt(found.shields) * unit)
+    table = {column: getattr(grain, name) for name, column in GRAIN_COLUMNS.items()}
+    both = Criteria(shields_of(leaving, table), grains)
+    return ustar_of(both.shields, table)
 
 
 def wind_of(

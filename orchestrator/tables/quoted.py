@@ -5,19 +5,16 @@ Beside each stands what a measured threshold gives: the same flow, with the meas
 threshold of one grain on a level bed in place of the computed one.
 """
 
-import re
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from orchestrator.physics import saltation
-from orchestrator.physics.beside import GOES_ON, measured_level_ustar
-from orchestrator.physics.constants import GRAIN_COLUMNS
-from orchestrator.physics.gusts import peak_over_mean
-from orchestrator.physics.threshold import SingleGrain, thresholds_of
-from orchestrator.physics.velocity import measurable_speeds
+from orchestrator.physics.beside import LEAVES, measured_level_ustar
+from orchestrator.physics.onset import of_grains
+from orchestrator.physics.reported import in_units
+from orchestrator.physics.shields import ustar_of
 from orchestrator.types import BoolArray, FloatArray
 
 ENDS = ("_low", "_high")
@@ -31,8 +28,6 @@ OF_GRAIN = ("shields_dem_low", "shields_dem_high")
 """Columns of the ends of the numerical interval of a Shields number."""
 OF_FIRST = ("first_ustar0_numerical_low_m_s", "first_ustar0_numerical_high_m_s")
 """The same of the friction velocity at which motion starts."""
-GUSTS = re.compile(r"(\d+) of intensity (\S+),")
-"""Events and intensity in the words of the column ``gusts``."""
 
 
 class _Ends(NamedTuple):
@@ -71,11 +66,10 @@ def quoted(rows: pd.DataFrame, twins: "pd.Series[int] | None" = None) -> dict[st
         with the measured threshold. NaN where there is none.
     """
     ustar = _ustar(rows)
-    density = rows["rho_f_kg_m3"].to_numpy(float)
     theta = rows["shields"].to_numpy(float)
     of_row = _interval(rows)
     held = _held(of_row, theta, twins)
-    columns: dict[str, Any] = {"stress_pa": density * ustar**2}
+    columns: dict[str, Any] = {"stress_pa": _in_units(rows, ustar)["stress_pa"]}
     columns |= {f"shields{end}": at for end, at in zip(ENDS, held, strict=True)}
     columns["interval_of"] = _named(rows, of_row, held, twins)
     ends = _held(_Ends(*(_rooted(ustar, at, theta) for at in of_row)), ustar, twins)
@@ -83,11 +77,10 @@ def quoted(rows: pd.DataFrame, twins: "pd.Series[int] | None" = None) -> dict[st
         columns |= _in_units(rows, at, end)
     if "first_ustar0_m_s" in rows:
         columns |= _first(rows, twins)
-    level = grain_ustar(rows.assign(alpha_deg=0.0))
+    level = of_rows(rows.assign(alpha_deg=0.0))["ustar"]
     measured = {}
     for name in ("low", "high"):
-        theta = rows[f"measured_{name}"].to_numpy(float)
-        measured[name] = np.sqrt(theta * _weight(rows) / density)
+        measured[name] = ustar_of(rows[f"measured_{name}"], rows)
     best = measured_level_ustar(rows)
     columns["level_ustar_m_s"] = level
     columns["measured_level_ustar_m_s"] = best
@@ -234,128 +227,51 @@ def _named(
     return np.asarray(names[first])
 
 
-def _in_units(rows: pd.DataFrame, ustar: FloatArray, end: str) -> dict[str, FloatArray]:
+def _in_units(
+    rows: pd.DataFrame, ustar: FloatArray, end: str = ""
+) -> dict[str, FloatArray]:
     """A friction velocity (m/s) with its speeds and its stress, by column."""
-    speeds = _speeds_of(rows, ustar)
-    density = rows["rho_f_kg_m3"].to_numpy(float)
-    columns = {
-        f"ustar0{end}_m_s": ustar,
-        f"stress{end}_pa": density * ustar**2,
-    }
-    for name in SPEEDS:
-        columns[f"{name}{end}_m_s"] = speeds[f"{name}_m_s"]
-    return columns
+    found = in_units(ustar, rows, end)
+    names = (f"ustar0{end}_m_s", f"stress{end}_pa")
+    speeds = (f"{name}{end}_m_s" for name in SPEEDS)
+    return {name: found[name] for name in (*names, *speeds)}
 
 
-def _speeds_of(rows: pd.DataFrame, ustar: FloatArray) -> dict[str, FloatArray]:
-    """The measurable speeds of undisturbed flows of some friction velocities, m/s."""
-    is_closed = (rows["flow_top"] == "closed channel").to_numpy()
-    parts = []
-    for closed in (False, True):
-        speeds = measurable_speeds(
-            ustar,
-            roughness=rows["z0_m"].to_numpy(float),
-            fluid_density=rows["rho_f_kg_m3"].to_numpy(float),
-            viscosity=rows["nu_m2_s"].to_numpy(float),
-            depth=rows["depth_m"].to_numpy(float),
-            closed=closed,
-        )
-        parts.append(speeds)
-    is_open, is_shut = parts
-    return {
-        name: np.where(is_closed, is_shut[name], column)
-        for name, column in is_open.items()
-    }
-
-
-def _weight(rows: pd.DataFrame) -> FloatArray:
-    """Weight of a layer of grains under the fluid, (rho_sol - rho_f) g d, Pa."""
-    excess = rows["rho_sol_kg_m3"] - rows["rho_f_kg_m3"]
-    return (excess * rows["g_m_s2"] * rows["d_m"]).to_numpy(float)
-
-
-def grain_ustar(rows: pd.DataFrame) -> FloatArray:
-    """Compute the threshold of one grain by each row's law, criterion and gusts.
+def of_rows(rows: pd.DataFrame) -> dict[str, Any]:
+    """Find the threshold of one grain by each row's law, criterion and gusts.
 
     Parameters
     ----------
     rows
-        Rows with the columns `GRAIN_COLUMNS`, ``force_law`` and ``gusts``; without
-        ``criterion`` grains leave their pockets.
+        Rows with the columns `GRAIN_COLUMNS` and ``force_law``; without ``criterion``
+        grains leave their pockets, without ``gust`` the flow has none.
 
     Returns
     -------
-    ndarray
-        Friction velocity of the mean flow on the slope of each row, m/s, shape (n,).
+    dict of str to ndarray
+        Friction velocity of the mean flow on the slope of each row, that at which the
+        grain leaves in a steady flow, m/s, and whether its law holds there, shape (n,).
     """
-    found = np.full(len(rows), np.nan)
-    for law in rows["force_law"].unique():
-        is_of_law = (rows["force_law"] == law).to_numpy()
-        of_law = rows.loc[is_of_law, list(GRAIN_COLUMNS.values())]
-        grains = [SingleGrain.of_row(row) for row in of_law.to_dict("records")]
-        at = [each.friction_velocity for each in thresholds_of(str(law), grains)]
-        found[is_of_law] = np.array(at, float)
-    gust = _gusts(rows)
-    leaving = found / np.sqrt(np.nan_to_num(gust, nan=1.0))
-    if "criterion" not in rows:
-        return leaving
-    is_going_on = (rows["criterion"] == GOES_ON).to_numpy()
-    if not is_going_on.any():
-        return leaving
-    peak = np.nan_to_num(gust, nan=saltation.PEAK)[is_going_on]
-    # those that only leave their pockets are not followed over their beds
-    going = rows[is_going_on]
-    leaving[is_going_on] = _going_on(going, found[is_going_on], peak)
-    return leaving
-
-
-def _gusts(rows: pd.DataFrame) -> FloatArray:
-    """Largest over mean stress of the gusts of each row; NaN without gusts."""
-    told = rows.get("gusts", pd.Series(None, rows.index, dtype=object))
-    found = told.astype(object).map(_gust, na_action="ignore")
-    return np.asarray(found, float)
-
-
-def _gust(told: str) -> float:
-    """Largest over mean stress of gusts that a table has as words."""
-    parts = GUSTS.match(told)
-    assert parts
-    return peak_over_mean(float(parts[2]), float(parts[1]))
-
-
-def hoppers(rows: pd.DataFrame) -> saltation.Grains:
-    """Make the single grains of rows as they hop over their beds.
-
-    Parameters
-    ----------
-    rows
-        Rows with the columns `GRAIN_COLUMNS`, n of them.
-
-    Returns
-    -------
-    Grains
-        The n grains.
-    """
-    return saltation.Grains.of(
-        rows["d_m"],
-        density=rows["rho_sol_kg_m3"],
-        fluid_density=rows["rho_f_kg_m3"].to_numpy(float),
-        viscosity=rows["nu_m2_s"],
-        slope_deg=rows["alpha_deg"],
-        roughness=rows["z0_m"],
-        gravity=rows["g_m_s2"],
-    )
-
-
-def _going_on(rows: pd.DataFrame, leaving: FloatArray, peak: FloatArray) -> FloatArray:
-    """The same of grains that go on, from the steady flow that turns them over."""
-    density = rows["rho_f_kg_m3"].to_numpy(float)
-    per_shields = _weight(rows) / density
-    grains = hoppers(rows)
-    further = saltation.tabulated(grains).initiation(peak)
-    steady = leaving**2 / per_shields
-    found = saltation.motion(steady, further, saltation.hops(grains), peak)
-    return np.asarray(np.sqrt(found.shields * per_shields))
+    found = {
+        "ustar": np.full(len(rows), np.nan),
+        "leaving": np.full(len(rows), np.nan),
+        "holds": np.zeros(len(rows), bool),
+    }
+    criteria = np.full(len(rows), LEAVES, object)
+    if "criterion" in rows:
+        criteria = rows["criterion"].to_numpy(object)
+    gust = np.full(len(rows), np.nan)
+    if "gust" in rows:
+        gust = rows["gust"].to_numpy(float)
+    place = pd.Series(np.arange(len(rows)))
+    keys = [rows["force_law"].to_numpy(object), criteria]
+    for (law, criterion), places in place.groupby(keys):
+        part = rows.iloc[places]
+        at = of_grains(part, str(law), str(criterion), gust[places])
+        found["ustar"][places] = at.friction_velocity
+        found["leaving"][places] = at.leaving.friction_velocity
+        found["holds"][places] = at.valid & np.isfinite(at.friction_velocity)
+    return found
 
 
 def _is_flat(rows: pd.DataFrame) -> Any:

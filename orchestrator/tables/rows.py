@@ -18,11 +18,12 @@ from orchestrator.grains.motion import MODES, Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold
 from orchestrator.physics import measured
-from orchestrator.physics.velocity import measurable_speeds, outer_roughness
+from orchestrator.physics.reported import in_units
+from orchestrator.physics.velocity import outer_roughness
 from orchestrator.plan import Plan
 from orchestrator.study import fields
 from orchestrator.study.closed_form import closed_form, law_holds
-from orchestrator.study.criterion import GOES_ON, LEAVES, GoingOn, of_single_grain
+from orchestrator.study.criterion import GOES_ON, LEAVES, of_single_grain
 from orchestrator.study.declare import UnfitError
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study, changed
@@ -51,6 +52,8 @@ ALONE: Row = {
     "decides": LEAVES,
 }
 """Columns of the criterion of a single grain that only leaves its pocket."""
+SPEEDS = ("wind_1m_m_s", "wind_10m_m_s", "current_1m_m_s", "mean_velocity_m_s")
+"""Columns of the speeds of undisturbed flows."""
 FEW_GRAINS = 10
 """Grains of a size class below which the interval of its threshold is wide."""
 WAY_UP = (
@@ -116,6 +119,7 @@ def scenes(study: Study, plan: Plan) -> Iterator[Row]:
             "scene_id": asked.id,
             "group": "; ".join(groups[asked.id]),
             **fields.question(asked),
+            "gust": asked.gust if asked.flow.gusts else nan,
             "law_holds": law_holds(asked),
             "case": case if scene.method.kind == "dem" else None,
             "flow_case": flow_case,
@@ -188,7 +192,9 @@ def single_grain(
         of_criterion = {**ALONE}
         if scene.threshold.criterion == GOES_ON:
             both = of_single_grain(scene)
-            of_criterion = _criteria(both)
+            of_criterion = {"criterion": GOES_ON}
+            for column, (value,) in both.columns().items():
+                of_criterion[column] = value
             ratio = float(both.shields[0]) / shields
             shields = float(both.shields[0])
             ustar *= ratio**0.5
@@ -216,18 +222,6 @@ def single_grain(
         yield row
 
 
-def _criteria(both: GoingOn) -> Row:
-    """The columns of a single grain that goes on."""
-    return {
-        "criterion": GOES_ON,
-        "shields_leaves": float(both.leaves[0]),
-        "shields_goes_on": float(both.goes_on[0]),
-        "shields_goes_on_high": float(both.at_most[0]),
-        "shields_cessation": float(both.cessation[0]),
-        "decides": _decisive(both.hops_decide[0]),
-    }
-
-
 def _single_grains_by_dem(
     cells: Iterable[SingleGrainCase], cases: Path
 ) -> dict[str, _ByDem]:
@@ -249,18 +243,18 @@ def _speeds(scene: Scene, ustar: float) -> Row:
     """Columns of the speeds of an undisturbed flow of a friction velocity (m/s)."""
     flow = scene.flow
     fluid = scene.fluid
-    speeds = measurable_speeds(
-        ustar,
-        roughness=scene.bed.roughness,
-        fluid_density=fluid.density,
-        viscosity=fluid.viscosity,
-        depth=flow.depth or np.nan,
-        closed=flow.top == "closed channel",
-    )
+    undisturbed = {
+        "rho_f_kg_m3": fluid.density,
+        "nu_m2_s": fluid.viscosity,
+        "z0_m": scene.bed.roughness,
+        "depth_m": flow.depth or np.nan,
+        "flow_top": flow.top,
+    }
+    speeds = in_units(ustar, undisturbed)
     row = {}
-    for column, speed in speeds.items():
-        if np.isfinite(speed):
-            row[column] = float(speed)
+    for column in SPEEDS:
+        if np.isfinite(speeds[column]):
+            row[column] = float(speeds[column])
     mean = row.get("mean_velocity_m_s")
     if mean:
         row["discharge_m2_s"] = mean * (flow.depth or 0.0)
@@ -630,12 +624,8 @@ def _decided(answer: Answer) -> Row:
     if not answer.pile.goes_on:
         return {"criterion": LEAVES, "decides": LEAVES}
     by_hops = answer.pile.hops_decide(answer.cases)
-    return {"criterion": GOES_ON, "decides": _decisive(by_hops.mean() > 0.5)}
-
-
-def _decisive(by_hops: bool) -> str:
-    """The criterion that holds a grain longer: hopping on, or leaving its pocket."""
-    return GOES_ON if by_hops else LEAVES
+    decides = GOES_ON if by_hops.mean() > 0.5 else LEAVES
+    return {"criterion": GOES_ON, "decides": decides}
 
 
 def _needed(fraction: float, count: int) -> int:

@@ -1,6 +1,6 @@
 """Whether thresholds are usable, and their scatter over seeds."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,13 +10,13 @@ from orchestrator.flow.run import SPEED_HEIGHT
 from orchestrator.grains.threshold import within
 from orchestrator.physics import verdict
 from orchestrator.physics.beside import GOES_ON, ROW_HOLD, beside
-from orchestrator.physics.laws import LAWS, Exposure
-from orchestrator.physics.threshold import standing_out, why_not
+from orchestrator.physics.onset import against_law
+from orchestrator.physics.threshold import standing_out
 from orchestrator.physics.velocity import open_water_reynolds
 from orchestrator.physics.verdict import Reason
 from orchestrator.study import fields
 from orchestrator.tables.check import Contradictions
-from orchestrator.tables.quoted import OF_PILE, grain_ustar, quoted
+from orchestrator.tables.quoted import OF_PILE, of_rows, quoted
 
 CARRIED_OFF = 0.1
 """Share of the moved grains from which a threshold is one of lift-off."""
@@ -132,13 +132,7 @@ def with_usable(
         is_dem = rows["method"] == "dem"
         rows["reynolds"] = rows["reynolds"].where(is_dem, rows["reynolds_closed_form"])
         rows["shields"] = rows["shields_dem"].where(is_dem, rows["shields_closed_form"])
-    ustar = rows["reynolds"] * rows["nu_m2_s"] / rows["d_m"]
-    if not is_pile:
-        ustar = _leaving(rows, ustar)
-    rows["law"] = rows["law_remedy"] = ""
-    for name, part in rows.groupby("force_law"):
-        of_law = _beyond_law(str(name), part, ustar[part.index])
-        rows.loc[part.index, ["law", "law_remedy"]] = of_law
+    against_law = _against_law(rows, is_pile)
     rows["standing_out"] = standing_out(rows["relative_size"], rows["beta_deg"])
     rows["flow_reynolds"] = _flow_reynolds(rows)
     measured = beside(rows)
@@ -150,8 +144,8 @@ def with_usable(
     units = quoted(rows, twins)
     records = rows.assign(**units).to_dict("records")
     reasons = []
-    for row in records:
-        against = [*_reasons(row, tolerance)]
+    for row, of_law in zip(records, against_law, strict=True):
+        against = [*_reasons(row, of_law, tolerance)]
         key = (row["scene_id"], row.get("fraction", np.nan))
         if contradicted and key in contradicted:
             against.append(Reason("contradicted", contradicted[key]))
@@ -160,16 +154,24 @@ def with_usable(
     return pd.concat([table, pd.DataFrame(made, index=table.index)], axis=1)
 
 
-def _leaving(rows: pd.DataFrame, ustar: "pd.Series[float]") -> "pd.Series[float]":
-    """Friction velocity at which the force law of single grains is asked, m/s.
+def _against_law(rows: pd.DataFrame, is_pile: bool) -> list[list[Reason]]:
+    """What the force law of each row has against its threshold.
 
-    It is that at which a grain leaves its pocket: one that goes on does so in a gust.
+    It is asked where a grain leaves its pocket: one that goes on does so in a gust. A
+    pile has the share of grains that lift carried off.
     """
-    if "criterion" not in rows:
-        return ustar
-    goes_on = rows["criterion"] == GOES_ON
-    steady = grain_ustar(rows[goes_on].drop(columns="criterion").assign(gusts=None))
-    return ustar.mask(goes_on, pd.Series(steady, rows.index[goes_on]))
+    ustar = np.array(rows["reynolds"] * rows["nu_m2_s"] / rows["d_m"], float)
+    if not is_pile and "criterion" in rows:
+        goes_on = (rows["criterion"] == GOES_ON).to_numpy()
+        ustar[goes_on] = of_rows(rows[goes_on])["leaving"]
+    found: list[list[Reason]] = [[] for _ in ustar]
+    for name in rows["force_law"].unique():
+        places = np.flatnonzero(rows["force_law"] == name)
+        part = rows.iloc[places]
+        of_law = against_law(str(name), part, ustar[places], lifts=not is_pile)
+        for place, reasons in zip(places.tolist(), of_law, strict=True):
+            found[place] = reasons
+    return found
 
 
 def _flow_reynolds(rows: pd.DataFrame) -> "pd.Series[float]":
@@ -197,48 +199,15 @@ def _flow_reynolds(rows: pd.DataFrame) -> "pd.Series[float]":
     return pd.Series(channel, rows.index).fillna(layer / nu)
 
 
-def _beyond_law(
-    name: str, rows: pd.DataFrame, ustar: "pd.Series[float]"
-) -> list[tuple[str, str]]:
-    """What is against a force law in some rows at their u*, m/s, and what helps."""
-    law = LAWS[name]
-    d = rows["d_m"].to_numpy()
-    exposure = Exposure(
-        diameter=d,
-        roughness=rows["z0_over_d"].to_numpy() * d,
-        fluid_density=rows["rho_f_kg_m3"].to_numpy(),
-        viscosity=rows["nu_m2_s"].to_numpy(),
-        lift_coefficient=rows["alpha_s"].to_numpy(),
-    )
-    weights = {}
-    # a pile has the share of grains that lift carried off
-    if "share_carried_off" not in rows:
-        weights["density"] = rows["rho_sol_kg_m3"].to_numpy()
-        weights["slope_deg"] = rows["alpha_deg"].to_numpy()
-        weights["gravity"] = rows["g_m_s2"].to_numpy()
-    speeds = np.asarray(ustar, float)
-    texts = why_not(law, speeds, exposure, **weights)
-    remedies = [""] * len(texts)
-    if law.goes_on:
-        holds = LAWS[law.goes_on].valid(speeds, exposure)
-        for row in np.flatnonzero(holds).tolist():
-            if texts[row]:
-                remedies[row] = f'choose forces.law = "{law.goes_on}"'
-    # without a threshold no law is beyond its range
-    is_known = np.isfinite(speeds)
-    return [
-        pair if known else ("", "")
-        for pair, known in zip(zip(texts, remedies, strict=True), is_known, strict=True)
-    ]
-
-
-def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[Reason]:
-    """Reasons against the threshold of a row."""
+def _reasons(
+    row: Mapping[Any, Any], of_law: Sequence[Reason], tolerance: float | None
+) -> Iterator[Reason]:
+    """Reasons against the threshold of a row, with those of its law."""
     is_pile = "share_carried_off" in row
     if is_pile and np.isnan(row["reynolds"]):
         what, remedy = _reached(row)
         yield Reason("not reached", f"not reached: {what}", remedy)
-    yield from verdict.of_grain(row)
+    yield from verdict.of_grain(row, of_law)
     if is_pile:
         yield from _reasons_of_pile(row, tolerance)
     elif isinstance(row.get("gusts"), str):

@@ -8,6 +8,7 @@ import pytest
 
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import BUFFINGTON_MONTGOMERY
+from orchestrator.physics.onset import of_grains
 from orchestrator.physics.threshold import shields_at
 from orchestrator.report import shields, theory
 from orchestrator.report.results import Results
@@ -112,10 +113,10 @@ def test_closed_form_lines_are_solid_where_their_equation_holds(
 def test_grains_of_every_law_lie_on_its_line(law: str, bed: pd.DataFrame) -> None:
     scenes = bed.assign(force_law=law)
     (line,) = [one for one in theory.lines(scenes) if one.law == law]
-    for exact in theory.thresholds(scenes, law):
-        assert line.tau(exact.reynolds) == pytest.approx(exact.shields, rel=1e-6)
-        assert line.holds(exact.reynolds) == exact.valid
-        assert line.first <= exact.reynolds <= line.last
+    exact = of_grains(scenes, law)
+    assert line.tau(exact.reynolds) == pytest.approx(exact.shields, rel=1e-6)
+    assert (line.holds(exact.reynolds) == exact.valid).all()
+    assert (line.first, line.last) == (exact.reynolds.min(), exact.reynolds.max())
 
 
 @pytest.fixture

@@ -1,0 +1,318 @@
+"""The threshold of grains by a force law and a criterion, made once.
+
+A grain leaves its pocket, or it also goes on after that. One that goes on leaves in a
+gust and hops on after it; one that cannot hop goes on where the mean stress turns it
+over its neighbours.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from orchestrator.physics import saltation
+from orchestrator.physics.beside import GOES_ON, LEAVES
+from orchestrator.physics.constants import GRAIN_COLUMNS
+from orchestrator.physics.laws import LAWS, Exposure
+from orchestrator.physics.shields import ustar_of
+from orchestrator.physics.threshold import Threshold, threshold, why_not
+from orchestrator.physics.verdict import Reason
+from orchestrator.types import BoolArray, FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Criteria:
+    """Mean stresses at which grains leave in a gust and go on after it, shape (n,).
+
+    Attributes
+    ----------
+    steady
+        Shields number at which a flow without gusts turns each over its neighbours.
+    hoppers
+        The grains as they hop over their beds.
+    peak
+        Stress of the gust over the mean stress.
+    """
+
+    steady: FloatArray
+    hoppers: saltation.Grains
+    peak: ArrayLike = saltation.PEAK
+
+    @cached_property
+    def can_hop(self) -> BoolArray:
+        """Whether each can hop."""
+        return saltation.hops(self.hoppers)
+
+    @cached_property
+    def _usual(self) -> saltation.Thresholds:
+        """The thresholds of hops, with the usual rebounds."""
+        return saltation.tabulated(self.hoppers)
+
+    def _motion(self, thresholds: saltation.Thresholds) -> saltation.Motion:
+        """What both criteria ask together."""
+        further = thresholds.initiation(self.peak)
+        return saltation.motion(self.steady, further, self.can_hop, self.peak)
+
+    @cached_property
+    def _both(self) -> saltation.Motion:
+        return self._motion(self._usual)
+
+    @property
+    def shields(self) -> FloatArray:
+        """Shields number from which each leaves and goes on."""
+        return self._both.shields
+
+    @property
+    def hops_decide(self) -> BoolArray:
+        """Whether hopping on holds each longer than its pocket."""
+        return self._both.goes_on
+
+    @property
+    def leaves(self) -> FloatArray:
+        """That from which the gust turns each over, or the flow one that cannot hop."""
+        return np.where(
+            self.can_hop, self.steady / np.asarray(self.peak, float), self.steady
+        )
+
+    @property
+    def goes_on(self) -> FloatArray:
+        """That from which each hops on after the gust; NaN of one that cannot hop."""
+        return np.where(self.can_hop, self._usual.initiation(self.peak), np.nan)
+
+    @property
+    def at_most(self) -> FloatArray:
+        """The threshold with the weakest rebounds; NaN of one that cannot hop."""
+        weakest = saltation.tabulated(self.hoppers, at_most=True)
+        return np.where(self.can_hop, self._motion(weakest).shields, np.nan)
+
+    @property
+    def cessation(self) -> FloatArray:
+        """That below which motion ceases once it is under way."""
+        return np.where(self.can_hop, self._usual.cessation, self.steady)
+
+    def columns(self) -> dict[str, Any]:
+        """Make the columns of both criteria.
+
+        Returns
+        -------
+        dict of str to ndarray
+            The Shields numbers, and the criterion that decides.
+        """
+        return {
+            "shields_leaves": self.leaves,
+            "shields_goes_on": self.goes_on,
+            "shields_goes_on_high": self.at_most,
+            "shields_cessation": self.cessation,
+            "decides": np.where(self.hops_decide, GOES_ON, LEAVES).astype(object),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Onset:
+    """The threshold of grains by a law and a criterion, arrays of shape (n,).
+
+    Attributes
+    ----------
+    law
+        Name of the force law.
+    leaving
+        The threshold of leaving the pocket in a steady flow.
+    criteria
+        The stresses at which the grains leave and go on; None where they only leave.
+    friction_velocity, shields, reynolds
+        u* of the mean flow, m/s, its Shields number and Re*.
+    drag, lift
+        The forces at the threshold, in the gust if there is one, N.
+    valid
+        Whether the law holds where the grain leaves, and the threshold is known.
+    table
+        The columns of the grains.
+    """
+
+    law: str
+    leaving: Threshold
+    criteria: Criteria | None
+    friction_velocity: FloatArray
+    shields: FloatArray
+    reynolds: FloatArray
+    drag: FloatArray
+    lift: FloatArray
+    valid: BoolArray
+    table: Any
+
+    def reasons(self) -> list[list[Reason]]:
+        """List what the law has against each threshold.
+
+        Returns
+        -------
+        list of list of Reason
+            The reasons of each grain; none without a threshold, which is beyond no
+            range.
+        """
+        return against_law(self.law, self.table, self.leaving.friction_velocity)
+
+
+def of_grains(
+    table: Any,
+    law: str,
+    criterion: str = LEAVES,
+    gust: ArrayLike = np.nan,
+) -> Onset:
+    """Find the thresholds of single grains by a force law and a criterion.
+
+    Parameters
+    ----------
+    table
+        A table, or a mapping, with the columns `GRAIN_COLUMNS` of n grains.
+    law
+        Name of the force law.
+    criterion
+        What a grain must do: `LEAVES` or `GOES_ON`.
+    gust
+        Largest over mean stress of the gusts of the flow. Without gusts, NaN, a grain
+        that leaves does so in the steady flow, and one that goes on leaves in a gust of
+        `saltation.PEAK`.
+
+    Returns
+    -------
+    Onset
+        The thresholds. u* is 0 where a grain needs no flow, infinite where no
+        flow is enough, NaN where that is not known.
+
+    Examples
+    --------
+    >>> sand = {"d_m": [1e-3], "rho_sol_kg_m3": 2650.0, "cohesion_n_m": 0.0}
+    >>> water = {"rho_f_kg_m3": 1000.0, "nu_m2_s": 1e-6, "g_m_s2": 9.81}
+    >>> bed = {"z0_m": 1e-3 / 30, "alpha_deg": 0.0, "beta_deg": 60.0, "alpha_s": 1.6}
+    >>> for criterion in (LEAVES, GOES_ON):
+    ...     at = of_grains({**sand, **water, **bed}, "bridged", criterion)
+    ...     print(at.shields.round(4), at.valid)
+    [0.0242] [ True]
+    [0.0327] [ True]
+    """
+    grains = _columns(table)
+    exposure = _exposure(grains)
+    leaving = threshold(
+        LAWS[law],
+        exposure,
+        density=grains["density"],
+        slope_deg=grains["slope_deg"],
+        entrainment_angle_deg=grains["entrainment_angle_deg"],
+        gravity=grains["gravity"],
+        cohesion=grains["cohesion"],
+    )
+    has_gust = np.isfinite(np.asarray(gust, float))
+    # the mean flow has less than the stress that is needed
+    peak = np.where(has_gust, gust, 1.0)
+    shields = leaving.shields / peak
+    ustar = leaving.friction_velocity / np.sqrt(peak)
+    criteria = None
+    valid = leaving.valid
+    if criterion == GOES_ON:
+        peak = np.where(has_gust, gust, saltation.PEAK)
+        criteria = Criteria(leaving.shields, hoppers(table), peak)
+        shields = criteria.shields
+        ustar = ustar_of(shields, table)
+        peak = np.where(criteria.can_hop, peak, 1.0)
+        valid = valid & (~criteria.can_hop | np.isfinite(criteria.goes_on))
+    with np.errstate(invalid="ignore"):
+        in_gust = ustar * np.sqrt(peak)
+        return Onset(
+            law=law,
+            leaving=leaving,
+            criteria=criteria,
+            friction_velocity=ustar,
+            shields=shields,
+            reynolds=exposure.reynolds(ustar),
+            drag=LAWS[law].drag(in_gust, exposure),
+            lift=LAWS[law].lift(in_gust, exposure),
+            valid=valid,
+            table=table,
+        )
+
+
+def against_law(
+    name: str, table: Any, ustar: FloatArray, lifts: bool = True
+) -> list[list[Reason]]:
+    """List what a force law has against friction velocities at which grains leave.
+
+    Parameters
+    ----------
+    name
+        Name of the law.
+    table
+        A table, or a mapping, with the columns `GRAIN_COLUMNS` of n grains.
+    ustar
+        Friction velocities, m/s, shape (n,).
+    lifts
+        Whether a grain that the lift carries off is none of the law; a pile has a share
+        of such grains.
+
+    Returns
+    -------
+    list of list of Reason
+        The reasons of each grain. There are none without a friction velocity.
+    """
+    law = LAWS[name]
+    grains = _columns(table)
+    exposure = _exposure(grains)
+    weights = {}
+    if lifts:
+        weights = {key: grains[key] for key in ("density", "slope_deg", "gravity")}
+    texts = why_not(law, ustar, exposure, **weights)
+    further = np.zeros(len(ustar), bool)
+    if law.goes_on:
+        further = LAWS[law.goes_on].valid(ustar, exposure)
+    remedy = f'choose forces.law = "{law.goes_on}"'
+    found = []
+    for place, of_grain in enumerate(texts):
+        helps = remedy if further[place] else ""
+        is_known = np.isfinite(ustar[place])
+        found.append([Reason("law", each, helps) for each in of_grain if is_known])
+    return found
+
+
+def hoppers(table: Any) -> saltation.Grains:
+    """Make the grains of a table as they hop over their beds.
+
+    Parameters
+    ----------
+    table
+        A table, or a mapping, with the columns `GRAIN_COLUMNS` of n grains; each lies
+        among its like.
+
+    Returns
+    -------
+    Grains
+        The n grains.
+    """
+    grains = _columns(table)
+    return saltation.Grains.of(
+        grains["diameter"],
+        density=grains["density"],
+        fluid_density=grains["fluid_density"],
+        viscosity=grains["viscosity"],
+        slope_deg=grains["slope_deg"],
+        roughness=grains["roughness"],
+        gravity=grains["gravity"],
+    )
+
+
+def _columns(table: Any) -> dict[str, FloatArray]:
+    """The quantities of grains by the names of `GRAIN_COLUMNS`, each of shape (n,)."""
+    given = [np.asarray(table[column], float) for column in GRAIN_COLUMNS.values()]
+    return dict(zip(GRAIN_COLUMNS, np.broadcast_arrays(*given), strict=True))
+
+
+def _exposure(grains: Mapping[str, FloatArray]) -> Exposure:
+    """Grains and the fluids around them, as the force laws take them."""
+    return Exposure(
+        diameter=grains["diameter"],
+        roughness=grains["roughness"],
+        fluid_density=grains["fluid_density"],
+        viscosity=grains["viscosity"],
+        lift_coefficient=grains["lift_coefficient"],
+    )
