@@ -31,7 +31,7 @@ from orchestrator.grains.peeling import (
 from orchestrator.grains.sheltering import Shelter
 from orchestrator.physics import threshold
 from orchestrator.physics.laws import LAWS, Exposure
-from orchestrator.physics.threshold import LIFT_OFF, root, thresholds_of
+from orchestrator.physics.threshold import LIFT_OFF, check_known, root, thresholds_of
 from orchestrator.runs.files import state_of
 from orchestrator.study.closed_form import closed_form, single_grain
 from orchestrator.study.criterion import GOES_ON, hopping_on, peak_of
@@ -179,6 +179,7 @@ def on_slopes(scene: Scene, slopes_deg: FloatArray) -> FloatArray:
     grains = [replace(grain, slope_deg=slope) for slope in slopes.tolist()]
     found = thresholds_of(scene.forces.law, grains)
     peaks = np.array([each.friction_velocity for each in found], float)
+    check_known(peaks, scene.forces.law)
     speeds = peaks / np.sqrt(scene.gust)
     is_loose = speeds < LOOSE * float(closed_form(scene).friction_velocity)
     return np.where(is_loose, 0.0, speeds)[place]
@@ -916,10 +917,18 @@ class Loads:
             is_lifted = counted & (self.loading.lift(last) > hold / LIFT_OFF)
             if not is_lifted.any():
                 return np.full_like(rolling, np.inf)
-            low = RANGE[0] * last
-            high = LIFT_OFF * last
-            local = root(lambda ustar: self.loading.lift(ustar) - hold, low, high)
-            flows = np.where(is_lifted, local / ratio, np.inf)[counted]
+            lifted = np.flatnonzero(is_lifted)
+
+            def excess(ustar: FloatArray, at: IntArray) -> FloatArray:
+                """Lift on some of these grains less what holds them, N."""
+                every = last.copy()
+                every[lifted[at]] = ustar
+                return np.asarray((self.loading.lift(every) - hold)[lifted[at]])
+
+            local = np.full_like(last, np.inf)
+            bounds = RANGE[0] * last[lifted], LIFT_OFF * last[lifted]
+            local[lifted] = root(excess, *bounds)
+            flows = (local / ratio)[counted]
         first = np.minimum(digits.all_rounded(flows), rolling)
         return np.where(np.isfinite(flows), first, np.inf)
 

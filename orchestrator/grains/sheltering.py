@@ -176,13 +176,16 @@ def balanced(
     if len(known):
         # at the top of its highest grain the flow misses a patch
         top = np.maximum.reduceat(gaps + sizes * diameter, starts)
-        low = np.zeros_like(stress)
-        high = np.broadcast_to(top, stress.shape)
-        is_crowded = excess(low) > 0
+        balanced = np.zeros_like(stress)
+        # grains that are not crowded stay at the bed's own level
+        row, column = np.nonzero(excess(balanced) > 0)
 
-        def beyond(level: FloatArray) -> FloatArray:
-            """The function whose root is the level, 0 where grains are not crowded."""
-            return np.where(is_crowded, excess(level), level)
+        def beyond(level: FloatArray, at: IntArray) -> FloatArray:
+            """The excess of some crowded patches at some friction velocities."""
+            every = np.zeros_like(stress)
+            every[row[at], column[at]] = level
+            return excess(every)[row[at], column[at]]
 
-        levels[:, known] = root(beyond, low, high)
+        balanced[row, column] = root(beyond, np.zeros(len(row)), top[column])
+        levels[:, known] = balanced
     return Shelter(ustar[:, 0], levels)

@@ -1,12 +1,13 @@
 """The threshold of motion of one exposed grain that rolls over its neighbour."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from orchestrator.errors import InputError
 from orchestrator.physics.constants import GRAIN_COLUMNS, GRAVITY, LIFT_COEFFICIENT
 from orchestrator.physics.laws import (
     DEFAULT,
@@ -41,8 +42,6 @@ LIFT_OFF = 1 + 1e-6
 On a level bed without drag the pivot itself is at 1, but for the ninth digit of its
 friction velocity.
 """
-MOST_STEPS = 100
-"""Steps after which `root` ends at the latest."""
 
 
 @dataclass(frozen=True)
@@ -187,217 +186,123 @@ def standing_out(
     return np.asarray((centre + size / 2 - 0.5) / size)
 
 
-@dataclass(frozen=True)
-class _Balances:
-    """Sums of forces and the targets that they reach, arrays of shape (n,)."""
+class Excess(Protocol):
+    """A function of some of n grains: what forces have beyond that which holds."""
 
-    law: ForceLaw
-    exposure: Exposure
-    along: FloatArray
-    outward: FloatArray
-    target: FloatArray
-
-    def excess(self, ustar: FloatArray) -> FloatArray:
-        """The sum of the forces at local friction velocities (m/s), less its target."""
-        drag = self.law.drag(ustar, self.exposure) * self.along
-        lift = self.law.lift(ustar, self.exposure) * self.outward
-        return np.asarray(drag + lift - self.target)
-
-    def at(self, places: IntArray) -> "_Balances":
-        """The balances at some places of the arrays."""
-        return _Balances(
-            law=self.law,
-            exposure=self.exposure.at(places),
-            along=self.along[places],
-            outward=self.outward[places],
-            target=self.target[places],
-        )
-
-    def first_rungs(self) -> tuple[FloatArray, FloatArray, BoolArray]:
-        """Friction velocities of `RUNGS` between which each first root lies, m/s.
-
-        The upper one is NaN where no rung reaches the target, or none is needed; the
-        truth values tell where a force was not known on the way. Rungs are climbed from
-        below, since the sum need not rise everywhere if a weight is negative.
-        """
-        is_unknown = np.isnan(self.target)
-        low = np.zeros_like(self.target)
-        high = np.full_like(self.target, np.nan)
-        unit = self.exposure.viscosity / self.exposure.diameter
-        left = np.flatnonzero(self.target > 0)
-        for rung in RUNGS:
-            ustar = rung * unit[left]
-            excess = self.at(left).excess(ustar)
-            is_unknown[left[np.isnan(excess)]] = True
-            is_reached = excess >= 0
-            high[left[is_reached]] = ustar[is_reached]
-            left = left[~is_reached]
-            low[left] = ustar[~is_reached]
-            if not len(left):
-                break
-        return low, high, is_unknown
-
-    def roots(self) -> FloatArray:
-        """The least local friction velocities that reach the targets, m/s.
-
-        0 where none is needed, infinite where none does, and NaN where the forces are
-        not known.
-        """
-        found = np.where(self.target > 0, np.inf, 0.0)
-        low, high, is_unknown = self.first_rungs()
-        found[is_unknown] = np.nan
-        solved = np.flatnonzero(np.isfinite(high))
-        if len(solved):
-            excess = self.at(solved).excess
-            found[solved] = root(excess, low[solved], high[solved])
-        return found
+    def __call__(self, x: FloatArray, places: IntArray, /) -> FloatArray:
+        """Compute it for the grains at some places, each for its own x."""
+        ...
 
 
-def friction_velocity_at(
-    law: ForceLaw,
-    exposure: Exposure,
-    target: ArrayLike,
-    *,
-    along: ArrayLike = 1.0,
-    outward: ArrayLike = 0.0,
-    speed_up: ArrayLike = 1.0,
-) -> FloatArray:
-    """Find the least undisturbed friction velocity at which forces reach a target.
-
-    The sum ``along drag + outward lift`` is that at the local friction velocity, which
-    is `speed_up` times the undisturbed one. Where the flow runs backwards (`speed_up` <
-    0) the drag changes its sign. About a contact, `along` and `outward` are the arms of
-    drag and lift over a length, and the target is the moment of the weight over the
-    same length.
-
-    Parameters
-    ----------
-    law
-        The force law.
-    exposure
-        The grain and the fluid.
-    target
-        The target, N.
-    along, outward
-        Weights of drag and lift in the sum.
-    speed_up
-        Local over undisturbed friction velocity.
-
-    Returns
-    -------
-    FloatArray
-        Undisturbed friction velocity, m/s, of the broadcast shape: 0 where the target
-        is not positive, since such a grain needs no flow, infinite where no flow
-        reaches it, NaN where that is not known.
-
-    Examples
-    --------
-    >>> sand = Exposure(
-    ...     diameter=1e-3, roughness=1e-3 / 30, fluid_density=1000.0, viscosity=1e-6
-    ... )
-    >>> print(friction_velocity_at(LAWS["bridged"], sand, [1e-6, 0.0]).round(5))
-    [0.01028 0.     ]
-    """
-    local = np.asarray(speed_up, float)
-    direction = np.sign(local)
-    given = np.broadcast_arrays(
-        *exposure.fields.values(),
-        direction * along,
-        np.asarray(outward),
-        np.asarray(target, float),
-        np.abs(local),
-    )
-    flat = [np.ravel(array).astype(float) for array in given]
-    *fields, along, outward, target, ratio = flat
-    of_grains = Exposure(**dict(zip(exposure.fields, fields, strict=True)))
-    balances = _Balances(law, of_grains, along, outward, target)
-    found = balances.roots()
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # without a local flow a grain goes that needs none, and no other
-        undisturbed = np.where(found == 0, 0.0, found / ratio)
-    return np.asarray(undisturbed.reshape(given[0].shape))
-
-
-class _Points(NamedTuple):
-    """Arguments of a function and its values there, arrays of one shape."""
-
-    x: FloatArray
-    y: FloatArray
-
-
-def _where(condition: BoolArray, one: _Points, other: _Points) -> _Points:
-    """Take one where a condition holds, else the other."""
-    x = np.where(condition, one.x, other.x)
-    return _Points(x, np.where(condition, one.y, other.y))
-
-
-def root(
-    function: Callable[[FloatArray], FloatArray],
-    low: FloatArray,
-    high: FloatArray,
-) -> FloatArray:
-    """Find the roots between bounds of different signs, all at once.
-
-    The method is that of T. R. Chandrupatla, Adv. Eng. Softw. 28, 1997. scipy's
-    `find_root` does the same, after an import of 0.35 s.
+def root(function: Excess, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Find a root of each of n grains.
 
     Parameters
     ----------
     function
-        A function of an array whose values are of the same shape.
+        The function.
     low, high
-        The bounds, arrays of that shape; the function has different signs there.
+        Bounds of different signs, shape (n,).
 
     Returns
     -------
     FloatArray
-        The roots, of the same shape, right to the last digits; NaN, not known, where
-        none is found in `MOST_STEPS` steps, or the function is NaN.
+        The roots, shape (n,), right to the last digits; NaN, not known, where none is
+        found.
 
     Examples
     --------
-    >>> print(root(lambda x: x**2 - [2.0, 3.0], np.zeros(2), np.full(2, 4.0)).round(6))
+    >>> squares = np.array([2.0, 3.0])
+    >>> found = root(lambda x, at: x**2 - squares[at], np.zeros(2), np.full(2, 4.0))
+    >>> print(found.round(6))
     [1.414214 1.732051]
     """
-    newest = _Points(low, function(low))
-    opposite = _Points(high, function(high))
-    part = np.full_like(low, 0.5)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        for _ in range(MOST_STEPS):
-            x = newest.x + part * (opposite.x - newest.x)
-            tried = _Points(x, function(x))
-            has_same_sign = np.sign(tried.y) == np.sign(newest.y)
-            outside = _where(has_same_sign, newest, opposite)
-            opposite = _where(has_same_sign, opposite, newest)
-            newest = tried
-            is_newest_best = np.abs(newest.y) < np.abs(opposite.y)
-            best = _where(is_newest_best, newest, opposite).x
-            width = np.abs(opposite.x - newest.x)
-            least_part = 2 * np.finfo(float).eps * np.abs(best) / width
-            is_found = (least_part > 0.5) | (newest.y == 0) | (opposite.y == 0)
-            if np.all(is_found):
-                break
-            part = _next_part(newest, opposite, outside)
-            part = np.clip(part, least_part, 1 - least_part)
-    is_known = is_found & np.isfinite(newest.y) & np.isfinite(opposite.y)
-    return np.where(is_known, best, np.nan)
+    from scipy.optimize.elementwise import find_root  # slow to import: no page waits
+
+    if not len(low):
+        return np.zeros(0)
+
+    def of_floats(x: FloatArray, places: FloatArray) -> FloatArray:
+        """The function of places that became floats as all arguments do."""
+        return function(x, places.astype(int))
+
+    found = find_root(of_floats, (low, high), args=(np.arange(len(low)),))
+    return np.where(found.success, found.x, np.nan)
 
 
-def _next_part(newest: _Points, opposite: _Points, outside: _Points) -> FloatArray:
-    """Part of the way between two bounds at which the root is looked for next.
+def least_ustar(excess: Excess, unit: FloatArray) -> FloatArray:
+    """Find the least friction velocity at which forces move each grain.
 
-    It is found by inverse quadratic interpolation through the bounds and the point
-    outside of them, where that is safe, else by bisection.
+    `RUNGS` are climbed from below, since the excess need not rise everywhere; the root
+    is between the first that is enough and the one before.
+
+    Parameters
+    ----------
+    excess
+        The forces beyond what holds the grains.
+    unit
+        Friction velocity of each grain at Re* = 1, m/s, shape (n,).
+
+    Returns
+    -------
+    FloatArray
+        Friction velocities, m/s, shape (n,): 0 where no flow is needed, infinite where
+        none is enough, NaN where that is not known, since the excess is NaN on the way.
+
+    Examples
+    --------
+    >>> held = np.array([4.0, 0.0, np.inf, np.nan])
+    >>> print(least_ustar(lambda u, at: u**2 - held[at], np.ones(4)))
+    [ 2.  0. inf nan]
     """
-    a, fa = newest
-    b, fb = opposite
-    c, fc = outside
-    xi = (a - b) / (c - b)
-    phi = (fa - fb) / (fc - fb)
-    is_safe = (phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi)
-    inverse = fa / (fb - fa) * fc / (fb - fc)
-    inverse += (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
-    return np.where(is_safe, inverse, 0.5)
+    at_rest = excess(np.zeros_like(unit), np.arange(len(unit)))
+    found = np.where(at_rest >= 0, 0.0, np.inf)
+    found[np.isnan(at_rest)] = np.nan
+    low = np.zeros_like(unit)
+    high = np.full_like(unit, np.nan)
+    left = np.flatnonzero(at_rest < 0)
+    for rung in RUNGS:
+        ustar = rung * unit[left]
+        beyond = excess(ustar, left)
+        found[left[np.isnan(beyond)]] = np.nan
+        is_enough = beyond >= 0
+        high[left[is_enough]] = ustar[is_enough]
+        is_short = beyond < 0
+        left = left[is_short]
+        low[left] = ustar[is_short]
+        if not len(left):
+            break
+    between = np.flatnonzero(np.isfinite(high))
+    found[between] = root(
+        lambda ustar, at: excess(ustar, between[at]), low[between], high[between]
+    )
+    return found
+
+
+def check_known(ustar: FloatArray, law: str) -> None:
+    """Refuse friction velocities some of which are not known.
+
+    Parameters
+    ----------
+    ustar
+        Friction velocities at which grains leave, m/s; NaN where that is not known.
+    law
+        Name of the force law.
+
+    Raises
+    ------
+    InputError
+        If one is NaN: it is neither that of a grain that lies loose nor of one that
+        never leaves.
+
+    Examples
+    --------
+    >>> check_known(np.array([0.0, 0.3, np.inf]), "bridged")
+    """
+    unknown = int(np.count_nonzero(np.isnan(ustar)))
+    if unknown:
+        what = f"{law} does not know from which flow {unknown} of {ustar.size} leave"
+        raise InputError(what, "forces.law", "choose another law")
 
 
 def threshold(
@@ -459,13 +364,7 @@ def threshold(
     )
     of_weight = submerged * pivot_resistance(slope_deg, entrainment_angle_deg)
     pull = np.asarray(cohesion, float) * exposure.diameter
-    ustar = friction_velocity_at(
-        law,
-        exposure,
-        of_weight + pull * np.sin(2 * beta),
-        along=np.sin(beta),
-        outward=np.cos(beta),
-    )
+    ustar = _least(law, exposure, beta, of_weight + pull * np.sin(2 * beta))
     # where no flow moves the grain the forces are those of an infinite one: NaN
     with np.errstate(invalid="ignore"):
         lift = law.lift(ustar, exposure)
@@ -479,6 +378,24 @@ def threshold(
             lift=lift,
             valid=law.valid(ustar, exposure) & rolls & (ustar > 0),
         )
+
+
+def _least(
+    law: ForceLaw, exposure: Exposure, beta: FloatArray, held: FloatArray
+) -> FloatArray:
+    """The least friction velocity of the pivot, m/s, for moments over d/2 (N)."""
+    given = np.broadcast_arrays(*exposure.fields.values(), beta, held)
+    *fields, angle, moment = [np.ravel(array).astype(float) for array in given]
+    grains = Exposure(**dict(zip(exposure.fields, fields, strict=True)))
+
+    def excess(ustar: FloatArray, places: IntArray) -> FloatArray:
+        at = grains.at(places)
+        drag = law.drag(ustar, at) * np.sin(angle[places])
+        lift = law.lift(ustar, at) * np.cos(angle[places])
+        return np.asarray(drag + lift - moment[places])
+
+    found = least_ustar(excess, grains.ustar(1.0))
+    return np.asarray(found.reshape(given[0].shape))
 
 
 def why_not(

@@ -8,48 +8,13 @@ J. Hydraul. Div. ASCE 89 (HY3), 1963; W. Wu, Computational River Dynamics, 2007,
 Eq. 3.46. Lift and cohesion are added here as the pivot of Eq. 1 has them.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from orchestrator.physics.constants import GRAVITY
 from orchestrator.physics.laws import Exposure, ForceLaw
-from orchestrator.physics.threshold import RUNGS, root, weight
+from orchestrator.physics.threshold import least_ustar, weight
 from orchestrator.types import FloatArray, IntArray
-
-
-@dataclass(frozen=True)
-class _Moments:
-    """Moments over d/2 on n grains, N: arrays of shape (n,) that no flow changes."""
-
-    law: ForceLaw
-    exposure: Exposure
-    beta: FloatArray
-    """Entrainment angle, rad."""
-    down: FloatArray
-    """Of the weight against the stress, negative where that goes down the slope."""
-    aside: FloatArray
-    """Of the weight across the stress."""
-    held: FloatArray
-    """Of the weight normal to the bed and of cohesion."""
-
-    def excess(self, ustar: FloatArray) -> FloatArray:
-        """Moment along the bed less that which holds, at friction velocities (m/s)."""
-        drag = self.law.drag(ustar, self.exposure) * np.sin(self.beta)
-        lift = self.law.lift(ustar, self.exposure) * np.cos(self.beta)
-        return np.asarray(np.hypot(drag - self.down, self.aside) + lift - self.held)
-
-    def at(self, places: IntArray) -> "_Moments":
-        """The moments on some of the grains."""
-        return _Moments(
-            law=self.law,
-            exposure=self.exposure.at(places),
-            beta=self.beta[places],
-            down=self.down[places],
-            aside=self.aside[places],
-            held=self.held[places],
-        )
 
 
 def slope_along_deg(slope_deg: ArrayLike, heading_deg: ArrayLike) -> FloatArray:
@@ -160,31 +125,13 @@ def threshold_across(
     )
     *fields, angle, down, aside, held = [np.ravel(array) for array in given]
     of_grains = Exposure(**dict(zip(exposure.fields, fields, strict=True)))
-    moments = _Moments(law, of_grains, angle, down, aside, held)
-    return _first(moments).reshape(given[0].shape)
 
+    def excess(ustar: FloatArray, places: IntArray) -> FloatArray:
+        """Moment over d/2 along the bed less that which holds, N."""
+        at = of_grains.at(places)
+        drag = law.drag(ustar, at) * np.sin(angle[places]) - down[places]
+        lift = law.lift(ustar, at) * np.cos(angle[places])
+        return np.asarray(np.hypot(drag, aside[places]) + lift - held[places])
 
-def _first(moments: _Moments) -> FloatArray:
-    """The least friction velocities at which the moments along the bed win, m/s."""
-    unit = moments.exposure.viscosity / moments.exposure.diameter
-    at_rest = moments.excess(np.zeros_like(unit))
-    is_loose = at_rest >= 0
-    found = np.where(is_loose, 0.0, np.inf)
-    found[np.isnan(at_rest)] = np.nan
-    low = np.zeros_like(unit)
-    high = np.full_like(unit, np.nan)
-    left = np.flatnonzero(~is_loose)
-    for rung in RUNGS:
-        ustar = rung * unit[left]
-        excess = moments.at(left).excess(ustar)
-        found[left[np.isnan(excess)]] = np.nan
-        is_reached = excess >= 0
-        high[left[is_reached]] = ustar[is_reached]
-        left = left[~is_reached]
-        low[left] = rung * unit[left]
-        if not len(left):
-            break
-    solved = np.flatnonzero(np.isfinite(high))
-    if len(solved):
-        found[solved] = root(moments.at(solved).excess, low[solved], high[solved])
-    return found
+    found = least_ustar(excess, of_grains.ustar(1.0))
+    return found.reshape(given[0].shape)

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.physics.constants import GAS_BELOW
-from orchestrator.physics.threshold import SingleGrain
+from orchestrator.physics.threshold import SingleGrain, check_known
 from orchestrator.surface import onset
 from orchestrator.surface.heights import Plane, Surface
 from orchestrator.surface.maps import Grid
@@ -186,6 +186,7 @@ class Ground:
     ) -> tuple[FloatArray, FloatArray]:
         """Local u* at which a grain leaves, and goes on, m/s; NaN where it is loose."""
         leaving = onset.leaves(self.grain, self.law, slope, heading)
+        check_known(leaving, self.law)
         is_loose = leaving == 0
         going = onset.goes_on(self.grain, leaving, slope, heading)
         return np.where(is_loose, np.nan, leaving), np.where(is_loose, np.nan, going)

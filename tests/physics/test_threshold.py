@@ -6,19 +6,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
+from orchestrator.errors import InputError
 from orchestrator.physics import curves
 from orchestrator.physics import threshold as physics
 from orchestrator.physics.constants import LIFT_COEFFICIENT
 from orchestrator.physics.laws import LAWS, Bridged, Exposure
 from orchestrator.physics.threshold import (
     Threshold,
-    friction_velocity_at,
+    check_known,
+    least_ustar,
     root,
     shields_at,
     threshold,
 )
 from orchestrator.surface.across import threshold_across
-from orchestrator.types import FloatArray
+from orchestrator.types import FloatArray, IntArray
 
 few = settings(max_examples=30, deadline=None)
 every_law = pytest.mark.parametrize("name", LAWS)
@@ -225,42 +227,34 @@ def test_a_small_grain_hides_between_its_neighbours() -> None:
     assert np.all(np.diff(physics.standing_out(sizes, 60.0)) > 0)
 
 
-class TestFrictionVelocityAt:
-    where = Exposure(
-        diameter=1e-3, roughness=1e-4, fluid_density=1000.0, viscosity=1e-6
-    )
+SAND = Exposure(diameter=1e-3, roughness=1e-4, fluid_density=1000.0, viscosity=1e-6)
+UNIT = np.full(4, SAND.ustar(1.0))
+"""A grain in water, and friction velocities of four such grains at Re* = 1, m/s."""
 
-    def test_the_local_flow_is_the_undisturbed_one_sped_up(self) -> None:
-        ratio = np.array([0.5, 1.0, 1.6])
-        found = friction_velocity_at(LAWS["bridged"], self.where, 1e-6, speed_up=ratio)
-        np.testing.assert_allclose(found * ratio, np.full(3, found[1]), rtol=1e-14)
 
-    def test_a_flow_that_runs_backwards_turns_the_drag_but_not_the_lift(self) -> None:
-        law, sums = LAWS["bridged"], {"along": 0.8, "outward": 0.5}
-        forth = friction_velocity_at(law, self.where, 1e-6, speed_up=0.7, **sums)
-        mirrored = {**sums, "along": -0.8}
-        back = friction_velocity_at(law, self.where, 1e-6, speed_up=-0.7, **mirrored)
-        assert float(back) == pytest.approx(float(forth), rel=1e-14)
+def test_unreached_is_infinite_and_no_need_of_flow_is_zero() -> None:
+    along = np.array([-1.0, 0.0, 1.0, 1.0])
+    target = np.array([1e-6, 1e-6, 0.0, -1e-6])
 
-    def test_unreached_is_infinite_and_no_need_of_flow_is_zero(self) -> None:
-        given = {
-            "along": np.array([-1.0, 1.0, 1.0, 1.0]),
-            "speed_up": np.array([1, 0, 1, 1.0]),
-        }
-        target = np.array([1e-6, 1e-6, 0.0, -1e-6])
-        found = friction_velocity_at(LAWS["bridged"], self.where, target, **given)
-        np.testing.assert_array_equal(found, [np.inf, np.inf, 0.0, 0.0])
+    def excess(ustar: FloatArray, at: IntArray) -> FloatArray:
+        return np.asarray(LAWS["bridged"].drag(ustar, SAND) * along[at] - target[at])
 
-    def test_of_several_roots_it_is_the_least(self) -> None:
-        # lift against drag: the lift is above a quarter of the drag for Re* of about 2 to 1000
-        law, weights = LAWS["bridged"], {"along": -0.25, "outward": 1.0}
-        flows = self.where.ustar(np.geomspace(1e-3, 1e4, 4001))
-        total = law.lift(flows, self.where) - 0.25 * law.drag(flows, self.where)
-        target = 0.5 * total.max()
-        above = np.flatnonzero(total >= target)
-        assert above[-1] < len(flows) - 1
-        found = float(friction_velocity_at(law, self.where, target, **weights))
-        assert flows[above[0] - 1] <= found <= flows[above[0]]
+    np.testing.assert_array_equal(least_ustar(excess, UNIT), [np.inf, np.inf, 0, 0])
+
+
+def test_of_several_roots_it_is_the_least() -> None:
+    # lift against drag: the lift is above a quarter of the drag for Re* of about 2 to 1000
+    law = LAWS["bridged"]
+    flows = SAND.ustar(np.geomspace(1e-3, 1e4, 4001))
+
+    def total(ustar: FloatArray) -> FloatArray:
+        return np.asarray(law.lift(ustar, SAND) - 0.25 * law.drag(ustar, SAND))
+
+    target = 0.5 * total(flows).max()
+    above = np.flatnonzero(total(flows) >= target)
+    assert above[-1] < len(flows) - 1
+    (found,) = least_ustar(lambda ustar, at: total(ustar) - target, UNIT[:1])
+    assert flows[above[0] - 1] <= found <= flows[above[0]]
 
 
 def test_the_regime_is_that_of_the_ranges_of_eqs_2_and_4_and_gravel_is_high() -> None:
@@ -311,19 +305,16 @@ def test_a_lift_lowers_the_threshold() -> None:
     assert float(lifted) < float(without_lift.friction_velocity)
 
 
-def test_a_root_that_is_not_found_is_not_known(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_root_that_is_not_found_is_not_known() -> None:
     """The last place tried was told as the root."""
+    target = np.array([0.5, 8.0, 100.0])
 
-    def cubes(x: FloatArray) -> FloatArray:
-        return np.where(x > 1, np.nan, x**3 - [0.5, 8.0])
+    def cubes(x: FloatArray, at: IntArray) -> FloatArray:
+        return np.where(x > 1.5, np.nan, x**3 - target[at])
 
-    low, high = np.zeros(2), np.array([1.0, 4.0])
-    with np.errstate(invalid="ignore"):
-        found = root(cubes, low, high)
+    found = root(cubes, np.zeros(3), np.array([1.0, 4.0, 1.0]))
     assert found[0] == pytest.approx(0.5 ** (1 / 3), rel=1e-12)
-    assert np.isnan(found[1])
-    monkeypatch.setattr(physics, "MOST_STEPS", 3)
-    assert np.isnan(root(lambda x: x**3 - 0.5, low[:1], high[:1])).all()
+    assert np.isnan(found[1:]).all()
 
 
 class Blind(Bridged):
@@ -345,3 +336,6 @@ def test_what_a_law_does_not_know_is_neither_never_nor_at_once() -> None:
         assert np.isnan(found[0])
         assert 0 < found[1] < 0.2
         assert found[2] == 0
+        with pytest.raises(InputError, match="from which flow 1 of 3 leave"):
+            check_known(found, "blind")
+        check_known(found[1:], "blind")
