@@ -229,7 +229,7 @@ def of(
     checking = _piles(checks or {}, cases)
     grains = {}
     for asked, answer in decisions.items():
-        if asked not in piles and answer.scene.method.kind == "dem":
+        if asked not in piles and answer.scene.method.facts.needs_run:
             grains[answer.scene.id] = answer.scene
     cells = tuple(batches(grains.values()))
     every = [*piles.values(), *checking.values()]

@@ -255,7 +255,8 @@ def _of_piles(
     """The problems of piles that DEM answers, under the given stress or one's own."""
     for scene_id, pile in planned.piles.items():
         # replicas of lattices are in the intervals of the others
-        if pile.bed.is_replica or pile.scene.method.kind != "dem":
+        is_reference = pile.scene.method.is_resolved_in_time
+        if pile.bed.is_replica or not is_reference:
             continue
         name = names[scene_id]
         if "pile" in kinds:

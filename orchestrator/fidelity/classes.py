@@ -30,7 +30,6 @@ LEAST_DISORDER = 0.02
 MOST_DISORDER = 0.2
 """Largest gaps of the class of other random gaps, d."""
 NEAR_ROWS = ("aligned", f"disordered up to {LEAST_DISORDER:g} d")
-CURVED_SHAPES = ("cosine", "gaussian", "rushil")
 
 
 def scene_class(part: str, scene: Scene) -> str:
@@ -98,7 +97,7 @@ def _grain_class(scene: Scene) -> str:
         if is_near_row:
             name = "aligned"
         return f"{name}, lifted"
-    if bed.shape == "flat" and not bed.profile:
+    if bed.form.is_level and not bed.profile:
         return f"{name}, level bed"
     if is_curved(bed):
         return f"{name}, curved forms"
@@ -124,9 +123,7 @@ def is_curved(bed: PileBed) -> bool:
     bool
         Whether it has none.
     """
-    if bed.profile or bed.brink_radius or bed.windward == "curved":
-        return True
-    return bed.shape in CURVED_SHAPES
+    return bool(bed.profile) or bed.is_bent or bed.form.is_curved
 
 
 def is_small(scene: Scene) -> bool:

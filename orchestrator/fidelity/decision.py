@@ -18,9 +18,12 @@ from orchestrator.fidelity.fidelities import FIDELITIES, LOCAL, Fidelity, fideli
 from orchestrator.fidelity.known import UNKNOWN, Known, known
 from orchestrator.grains.loads import LONGEST_PACKED, Geometry, has_rows_along
 from orchestrator.grains.pile import Pile
+from orchestrator.study import methods, models
 from orchestrator.study.criterion import GOES_ON, goes_on
 from orchestrator.study.fields import FIELDS, default_of
 from orchestrator.study.method import HELD_FROM
+from orchestrator.study.methods import ThresholdMethod
+from orchestrator.study.models import FlowModel
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import changed, value_of
@@ -112,15 +115,16 @@ class Decision:
         """Whether the closed form along the bed answers because the bed is long."""
         if self.scene.threshold.criterion == GOES_ON:
             return False
-        return self.fidelity is LOCAL and self.asked.method.kind == "auto"
+        return self.fidelity is LOCAL and self.asked.method.is_open
 
     @property
     def is_unchecked(self) -> bool:
         """Whether it is a pile for which a fidelity without DEM was chosen."""
         is_pile = isinstance(self.scene.bed, PileBed)
+        method = self.scene.method.facts
         # rows without an end hold their grains by DEM: it is no check of places
-        is_by_grains = self.scene.method.kind not in ("dem", "local")
-        return is_pile and self.is_chosen and is_by_grains
+        is_quasi_static = method.packs_grains and not method.is_resolved_in_time
+        return is_pile and self.is_chosen and is_quasi_static
 
 
 def decide(scene: Scene, tolerance: float | None) -> Decision:
@@ -158,10 +162,10 @@ def _going_on(scene: Scene, tolerance: float | None) -> Decision:
     closed form along its line, and all others as those whose grains must leave.
     """
     resolved = with_criterion(scene)
-    if scene.method.kind != "auto":
+    if not scene.method.is_open:
         decision = _leaving(resolved, tolerance)
     elif not isinstance(scene.bed, PileBed):
-        answer = changed(resolved, {"method.kind": "pivot"})
+        answer = _by(resolved, methods.PIVOT)
         return Decision(scene, answer, None, UNKNOWN, HOPS)
     elif has_endless_rows(scene):
         decision = _along_the_bed(resolved, tolerance)
@@ -175,12 +179,13 @@ def _along_the_bed(scene: Scene, tolerance: float | None) -> Decision:
 
     They are answered in closed form. A tolerance chooses the mesh of the flow.
     """
-    answer = changed(scene, {"method.kind": "local"})
+    answer = _by(scene, methods.LOCAL)
+    model = answer.method.flow.facts
     written = Decision(scene, answer, LOCAL, known(LOCAL, answer), ENDLESS)
-    if tolerance is None or answer.method.flow.model == "flat":
+    if tolerance is None or not model.follows_bed:
         return written
-    if answer.method.flow.model != "solve":
-        why = f"the study asks for the flow model {answer.method.flow.model}"
+    if not model.is_solved:
+        why = f"the study asks for the flow model {model.name}"
         return replace(written, why=f"{ENDLESS}; {why}")
     errors = {}
     for one in CHOSEN:
@@ -200,6 +205,11 @@ def _along_the_bed(scene: Scene, tolerance: float | None) -> Decision:
         f"{ENDLESS}, its flow by {why} within the tolerance",
         is_chosen=True,
     )
+
+
+def _by(scene: Scene, method: ThresholdMethod) -> Scene:
+    """The scene by a method, refused as a study file would be."""
+    return changed(scene, {"method.kind": method.name})
 
 
 def with_criterion(scene: Scene) -> Scene:
@@ -334,39 +344,40 @@ def on_fidelity(
 @cache
 def written(scene: Scene) -> Scene:
     """A scene as it is written, with the method that answers in place of ``auto``."""
-    if scene.method.kind != "auto":
+    if not scene.method.is_open:
         return scene
-    return changed(scene, {"method.kind": method_of(scene)[0]})
+    return _by(scene, method_of(scene)[0])
 
 
 @cache
-def method_of(scene: Scene) -> tuple[str, str]:
+def method_of(scene: Scene) -> tuple[ThresholdMethod, str]:
     """The method that answers a scene as it is written, and why.
 
     For ``auto`` that is DEM where it can: not on a lattice of more than
     `LONGEST_PACKED` grains, nor with what DEM does not know. There it is the closed
     form along the bed, else peeling, else pivots.
     """
-    method = scene.method.kind
     bed = scene.bed
-    if method != "auto":
-        return method, f"the study asks for the method {method}"
-    unknown = scene.unknown_to_dem
+    if not scene.method.is_open:
+        method = scene.method.facts
+        return method, f"the study asks for the method {method.name}"
+    misfit = methods.DEM.misfit(scene)
     if not isinstance(bed, PileBed):
         if scene.threshold.criterion == GOES_ON:
-            return "pivot", HOPS
-        if unknown:
-            return "pivot", f"by the closed form: {unknown}"
-        return "dem", "by DEM: a single grain"
+            return methods.PIVOT, HOPS
+        if misfit:
+            return methods.PIVOT, f"by the closed form: {misfit.what}"
+        return methods.DEM, "by DEM: a single grain"
     if is_along(scene):
-        return "local", ALONG
-    if unknown and bed.width:
-        return "pivot", f"by pivots: {unknown}, peeling no bed in space"
-    if unknown:
-        return "peeling", f"by peeling: {unknown}"
+        return methods.LOCAL, ALONG
+    if misfit and bed.width:
+        why = f"by pivots: {misfit.what}, peeling no bed in space"
+        return methods.PIVOT, why
+    if misfit:
+        return methods.PEELING, f"by peeling: {misfit.what}"
     if _is_long(scene):
-        return "peeling", f"by peeling: {LONG_BED}"
-    return "dem", "by DEM"
+        return methods.PEELING, f"by peeling: {LONG_BED}"
+    return methods.DEM, "by DEM"
 
 
 def is_along(scene: Scene) -> bool:
@@ -399,7 +410,7 @@ def _is_long(scene: Scene) -> bool:
 def _of_grain(scene: Scene, tolerance: float | None) -> Decision:
     """The decision on a single grain: with a tolerance by an exact closed form."""
     plain = as_written(scene)
-    if tolerance is None or plain.scene.method.kind != "dem":
+    if tolerance is None or not plain.scene.method.is_resolved_in_time:
         return plain
     if scene.method.grains.waiting_time < HELD_FROM:
         return as_written(scene, "the study asks for a ramp of the flow")
@@ -407,7 +418,7 @@ def _of_grain(scene: Scene, tolerance: float | None) -> Decision:
         return as_written(
             scene, "a slope beyond the entrainment angle: the closed form is off"
         )
-    exact = changed(scene, {"method.kind": "pivot"})
+    exact = _by(scene, methods.PIVOT)
     return Decision(scene, exact, None, UNKNOWN, EXACT, is_chosen=True)
 
 
@@ -416,18 +427,18 @@ def _why_as_written(scene: Scene, tolerance: float | None) -> str | None:
 
     It is empty where the method says it all.
     """
-    method = scene.method.kind
-    if method not in ("auto", "dem"):
+    if not any(each.is_resolved_in_time for each in scene.method.candidates):
         return ""
-    if method == "auto" and (scene.unknown_to_dem or is_along(scene)):
+    is_open = scene.method.is_open
+    if is_open and (methods.DEM.misfit(scene) or is_along(scene)):
         return ""
     if tolerance is None:
-        if method == "dem":
+        if not is_open:
             return ""
         if why := _why_not_by_default(scene):
             return why
     # the fidelities approximate DEM in a held, solved flow
-    if scene.method.flow.model != _best_model(scene):
+    if scene.method.flow.facts is not _best_model(scene):
         return f"the study asks for the flow model {scene.method.flow.model}"
     if scene.threshold.update:
         return "no error is known for a bed that changes"
@@ -451,10 +462,10 @@ def _why_not_by_default(scene: Scene) -> str:
     return ""
 
 
-def _best_model(scene: Scene) -> str:
+def _best_model(scene: Scene) -> FlowModel:
     """The flow model of the best fidelities: over a level bed no flow is solved."""
     assert isinstance(scene.bed, PileBed)
-    return "flat" if scene.bed.is_level else "solve"
+    return models.FLAT if scene.bed.is_level else models.SOLVE
 
 
 def _looked_up(scene: Scene, most: float) -> tuple[Fidelity | None, str]:
@@ -462,10 +473,10 @@ def _looked_up(scene: Scene, most: float) -> tuple[Fidelity | None, str]:
 
     No fidelity where no error is known.
     """
-    is_long = scene.method.kind == "auto" and _is_long(scene)
+    is_long = scene.method.is_open and _is_long(scene)
     errors: dict[Fidelity, Known] = {}
     for one in CHOSEN:
-        if is_long and one.is_dem:
+        if is_long and one.is_resolved_in_time:
             continue
         if one.takes(scene):
             found = known(one, scene)
@@ -518,7 +529,7 @@ def checks(answers: Iterable[Decision]) -> dict[str, Decision]:
     for answer in answers:
         if not answer.is_unchecked:
             continue
-        dem = changed(answer.asked, {"method.kind": "dem"})
+        dem = _by(answer.asked, methods.DEM)
         member = (Pile(dem).case.cost_s, answer.asked.id, dem)
         group = _check_group(answer.asked)
         cheapest[group] = min(

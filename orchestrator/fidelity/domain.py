@@ -418,13 +418,13 @@ def unmeasured(scene: Scene) -> str:
     str
         The property in words; empty where there is none.
     """
-    is_local = scene.method.kind == "local"
-    if is_local and scene.threshold.criterion != GOES_ON:
-        return 'method.kind = "local"'
+    is_packed = scene.method.may_pack_grains
+    if not is_packed and scene.threshold.criterion != GOES_ON:
+        return f'method.kind = "{scene.method.kind}"'
     for part in _parts(scene):
         if found := outside(part, scene):
             return found
-    if scene.method.flow.model == "solve":
+    if scene.method.flow.facts.is_solved:
         return _unmeasured_solve(scene)
     return ""
 
@@ -437,7 +437,7 @@ def _parts(scene: Scene) -> Iterator[str]:
     """
     if not _bed(scene).is_level:
         yield FLOW
-    if scene.method.kind != "local":
+    if scene.method.may_pack_grains:
         yield GRAINS
 
 

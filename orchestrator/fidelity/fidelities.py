@@ -12,8 +12,12 @@ from dataclasses import dataclass, field
 from orchestrator.digits import rounded
 from orchestrator.physics.constants import KARMAN
 from orchestrator.study import fidelities as written
+from orchestrator.study import models
 from orchestrator.study.closed_form import closed_form, outer_roughness
 from orchestrator.study.fidelities import Fields
+from orchestrator.study.methods import LOCAL as LOCAL_METHOD
+from orchestrator.study.methods import METHODS
+from orchestrator.study.models import MODELS, FlowModel
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import changed, value_of
@@ -62,10 +66,14 @@ class Rung:
     same_model: bool = True
     most_grains: float = math.inf
 
+    @property
+    def model(self) -> FlowModel | None:
+        """The flow model that it sets."""
+        name = self.sets.get("method.flow.model")
+        return None if name is None else MODELS[name]
+
     def takes(self, scene: Scene) -> bool:
         """Whether it can answer a pile.
-
-        Linear theory knows boundary layers over beds without obstacles.
 
         Parameters
         ----------
@@ -79,8 +87,12 @@ class Rung:
         """
         bed = scene.bed
         assert isinstance(bed, PileBed)
-        if self.sets.get("method.flow.model") == "waves":
-            return scene.flow.top == "boundary layer" and not bed.obstacles
+        model = self.model
+        if model is not None and model.misfit(scene):
+            return False
+        # an obstacle is never low
+        if model is not None and model.is_of_low_beds and bed.obstacles:
+            return False
         return packing(scene) not in self.not_on
 
     def changes(self, scene: Scene) -> Fields:
@@ -99,7 +111,7 @@ class Rung:
             Values by the fields' names.
         """
         fields = dict(self.fields(scene))
-        if self.sets.get("method.flow.model", "flat") != "flat":
+        if self.model is not None and self.model.follows_bed:
             fields["method.flow.roughness"] = outer_roughness(scene)
         return fields
 
@@ -178,9 +190,9 @@ class Fidelity:
     grains: Rung
 
     @property
-    def is_dem(self) -> bool:
-        """Whether grains are moved by DEM."""
-        return bool(self.grains.sets["method.kind"] == "dem")
+    def is_resolved_in_time(self) -> bool:
+        """Whether grains are moved in time."""
+        return METHODS[self.grains.sets["method.kind"]].is_resolved_in_time
 
     def takes(self, scene: Scene) -> bool:
         """Whether it can answer a pile.
@@ -290,7 +302,9 @@ def _load() -> tuple[Fidelity, ...]:
 
 
 FLAT = Rung(
-    "flat", "log law on a flat bed: u*₀ everywhere", {"method.flow.model": "flat"}
+    "flat",
+    "log law on a flat bed: u*₀ everywhere",
+    {"method.flow.model": models.FLAT.name},
 )
 FIDELITIES = _load()
 """The fidelities, from fast to accurate: the last one is the reference."""
@@ -302,7 +316,7 @@ LOCAL = Fidelity(
     "local",
     "closed form along the bed line",
     OWN,
-    Rung("local", "closed form along the bed line", {"method.kind": "local"}),
+    Rung("local", "closed form along the bed line", {"method.kind": LOCAL_METHOD.name}),
 )
 """A way without grains, for beds that have too many: its error is that of pivots."""
 

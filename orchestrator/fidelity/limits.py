@@ -14,7 +14,7 @@ import numpy as np
 from orchestrator.bed.line import BedLine, of_bed
 from orchestrator.errors import InputError
 from orchestrator.fidelity.decision import is_along, written
-from orchestrator.flow.model import FlowModel
+from orchestrator.flow.model import of_scene
 from orchestrator.flow.run import SPEED_HEIGHT
 from orchestrator.flow.theory import seen_by_the_flow
 from orchestrator.grains.loads import Geometry
@@ -125,9 +125,8 @@ def check(scene: Scene, where: str, *, grains: bool = True) -> None:
         warnings.warn(f"{limit.field}: {limit.what} ({remedy})", stacklevel=2)
     if isinstance(scene.bed, PileBed):
         try:
-            _ = FlowModel(
-                scene
-            ).cases  # a mesh that cannot be made is refused before anything runs
+            # a mesh that cannot be made is refused before anything runs
+            _ = of_scene(scene).cases
         except InputError as error:
             raise InputError(
                 error.what, f"{where}: {error.where}", error.remedy
@@ -153,14 +152,14 @@ def exceeded(scene: Scene, *, grains: bool = True) -> Iterator[Limit]:
     if isinstance(bed, PileBed):
         if grains:
             yield from _pile(scene, bed)
-        if scene.method.flow.model == "solve":
+        if scene.method.flow.facts.is_solved:
             yield from _solve(scene, bed)
-        else:
+        elif scene.method.flow.facts.is_of_low_beds:
             yield from _theory(scene, bed)
     if not grains:
         return
     yield from _slope(scene)
-    if scene.method.kind == "dem":
+    if scene.method.is_resolved_in_time:
         yield from _dem(scene)
 
 
@@ -296,8 +295,6 @@ def _unfit(scene: Scene, bed: PileBed, line: BedLine) -> str:
 
 def _theory(scene: Scene, bed: PileBed) -> Iterator[Limit]:
     """Limits of linear theory, which is of low beds."""
-    if scene.method.flow.model == "flat":
-        return
     line = of_bed(bed)
     seen = seen_by_the_flow(line)
     at = int(np.argmax(seen.slopes))

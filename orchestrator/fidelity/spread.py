@@ -97,7 +97,7 @@ def spread(scene: Scene, fraction: float) -> Spread:
         The spread; NaN where it is not known.
     """
     of_class = _spread(model_class(scene), fraction)
-    if scene.threshold.update or scene.method.flow.model != "solve":
+    if scene.threshold.update or not scene.method.flow.facts.is_solved:
         return of_class._replace(frozen_bed=math.nan)
     return of_class
 

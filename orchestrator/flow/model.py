@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from pathlib import Path
+from typing import ClassVar
 
 from orchestrator.bed.line import BedLine, of_bed
 from orchestrator.flow import theory
@@ -11,6 +12,7 @@ from orchestrator.flow.run import SPEED_HEIGHT, WALL_STRESS
 from orchestrator.flow.stress import WallStress
 from orchestrator.physics.velocity import log_law_speed
 from orchestrator.runs.files import state_of
+from orchestrator.study import models
 from orchestrator.study.method import FlowMethod
 from orchestrator.study.parts import Flow, PileBed
 from orchestrator.study.profile import Profile
@@ -24,8 +26,7 @@ FACE_DEG = 2.0
 class FlowModel:
     """A way to find the stress on the bed of a scene with a pile.
 
-    It is the undisturbed stress, that of linear theory, or that of steady turbulent
-    flow by OpenFOAM, which scenes that differ in their grains alone share.
+    Each model is a subclass, with its facts in `orchestrator.study.models`.
 
     Attributes
     ----------
@@ -34,6 +35,7 @@ class FlowModel:
     """
 
     scene: Scene
+    facts: ClassVar[models.FlowModel]
 
     @property
     def line(self) -> BedLine:
@@ -47,7 +49,7 @@ class FlowModel:
         height = SPEED_HEIGHT * self.line.h
         return float(log_law_speed(1.0, height, self.scene.solve_roughness))
 
-    @cached_property
+    @property
     def cases(self) -> tuple[FlowCase, ...]:
         """The run that it needs, if the flow is solved.
 
@@ -56,9 +58,7 @@ class FlowModel:
         InputError
             If the flow cannot be meshed; it names the field.
         """
-        if self.scene.method.flow.model != "solve":
-            return ()
-        return (_case(self.scene),)
+        return ()
 
     def stress(self, cases: Path) -> WallStress:
         """The stress along the bed.
@@ -73,14 +73,84 @@ class FlowModel:
         WallStress
             The stress on each face of the bed, over the undisturbed one.
         """
-        model = self.scene.method.flow.model
-        if model == "flat":
-            return theory.flat(self.line)
-        if model == "waves":
-            return theory.waves(self.line, self.scene.solve_roughness)
+        raise NotImplementedError
+
+
+class Solve(FlowModel):
+    """Steady turbulent flow, which scenes that differ in their grains alone share.
+
+    Attributes
+    ----------
+    scene
+        The scene.
+    """
+
+    facts = models.SOLVE
+
+    @cached_property
+    def cases(self) -> tuple[FlowCase, ...]:
+        """The run of OpenFOAM."""
+        return (_case(self.scene),)
+
+    def stress(self, cases: Path) -> WallStress:
+        """The stress that the finished run left."""
         (run,) = self.cases
         path = cases / run.name / WALL_STRESS
         return _read(path, state_of(path))
+
+
+class Waves(FlowModel):
+    """Linear theory.
+
+    Attributes
+    ----------
+    scene
+        The scene.
+    """
+
+    facts = models.WAVES
+
+    def stress(self, cases: Path) -> WallStress:
+        """The stress of all wavelengths of the bed line."""
+        del cases
+        return theory.waves(self.line, self.scene.solve_roughness)
+
+
+class Flat(FlowModel):
+    """The undisturbed stress.
+
+    Attributes
+    ----------
+    scene
+        The scene.
+    """
+
+    facts = models.FLAT
+
+    def stress(self, cases: Path) -> WallStress:
+        """The stress of a flat bed, on each face."""
+        del cases
+        return theory.flat(self.line)
+
+
+MODELS: dict[models.FlowModel, type[FlowModel]]
+MODELS = {model.facts: model for model in (Solve, Waves, Flat)}
+
+
+def of_scene(scene: Scene) -> FlowModel:
+    """Find the flow model of a scene.
+
+    Parameters
+    ----------
+    scene
+        The scene of a pile.
+
+    Returns
+    -------
+    FlowModel
+        The model.
+    """
+    return MODELS[scene.method.flow.facts](scene)
 
 
 @lru_cache(maxsize=256)

@@ -17,7 +17,7 @@ from orchestrator.bed.packing import APRON, Lattice, Packing, Places
 from orchestrator.bed.poured import PouredBed
 from orchestrator.errors import InputError
 from orchestrator.flow.case import FlowCase
-from orchestrator.flow.model import FlowModel
+from orchestrator.flow.model import FlowModel, of_scene
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains import peeling, sheltering
 from orchestrator.grains.peeling import (
@@ -33,6 +33,7 @@ from orchestrator.physics import threshold
 from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import LIFT_OFF, check_known, root, thresholds_of
 from orchestrator.runs.files import state_of
+from orchestrator.study import methods
 from orchestrator.study.closed_form import closed_form, single_grain
 from orchestrator.study.criterion import GOES_ON, hopping_on, peak_of
 from orchestrator.study.declare import UnfitError
@@ -214,7 +215,7 @@ class Geometry:
     @cached_property
     def model(self) -> FlowModel:
         """The flow over it."""
-        return FlowModel(self.scene)
+        return of_scene(self.scene)
 
     @property
     def flow(self) -> FlowCase:
@@ -258,7 +259,7 @@ class Geometry:
     @property
     def length(self) -> float:
         """Length of bed that has grains, d."""
-        if self.scene.method.kind == "local":
+        if not self.scene.method.may_pack_grains:
             return 0.0
         return self.packed_line.x[-2] - self.packed_line.x[1]
 
@@ -345,7 +346,7 @@ class Geometry:
         """The packing, on whichever sides the flow runs back."""
         bed = self.bed
         d = self.scene.grain.diameter
-        if self.scene.method.kind == "local":
+        if not self.scene.method.may_pack_grains:
             return packing.along(self.line, self.counts)
         for run in self.pouring:
             assert self.cases is not None, "the grains of a poured bed lie in its run"
@@ -633,7 +634,7 @@ class Geometry:
             place = x / self.scene.grain.diameter
             start = max(start, place - LONGEST_PACKED / 2)
             end = min(end, place + LONGEST_PACKED / 2)
-        by_pivots = self.scene.by("pivot")
+        by_pivots = self.scene.by(methods.PIVOT)
         return type(self)(by_pivots, self.cases, (start, end))
 
     def row_hold(self, cases: Path) -> float:
@@ -657,12 +658,12 @@ class Geometry:
         """
         if self.scene.is_poured or self.bed.is_wedge:
             return 1.0
-        is_local = self.scene.method.kind == "local"
-        if is_local and self.scene.threshold.criterion == GOES_ON:
+        is_packed = self.scene.method.may_pack_grains
+        if not is_packed and self.scene.threshold.criterion == GOES_ON:
             # places along the line are of single exposed grains
             return 1.0
         loads = self.loads(cases)
-        if not is_local:
+        if is_packed:
             return loads.row_hold()
         alone = loads.alone()
         place = int(np.argmin(np.where(alone > 0, alone, np.inf)))
@@ -863,7 +864,7 @@ class Loads:
         packed = bed.packing
         loading = self.loading
         renew = None
-        if bed.is_balanced and bed.scene.method.kind == "peeling":
+        if bed.is_balanced and bed.scene.method.facts.renews_balance:
             there = self.present.copy()
             ratio = np.where(packed.mobile, self.ratio * np.sqrt(bed.scene.gust), 0.0)
             loading = replace(loading, ratio=ratio)

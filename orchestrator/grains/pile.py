@@ -35,7 +35,9 @@ from orchestrator.grains.threshold import PileThreshold, of_grains, of_pile
 from orchestrator.physics.gusts import gust_stresses
 from orchestrator.runs.case import Case
 from orchestrator.solvers import liggghts
+from orchestrator.study import methods
 from orchestrator.study.criterion import GOES_ON
+from orchestrator.study.methods import ThresholdMethod
 from orchestrator.study.parts import Gusts
 from orchestrator.study.scene import BEYOND_ASKED, READ_LATER, Scene
 from orchestrator.types import BoolArray, FloatArray
@@ -935,9 +937,14 @@ class Dem(Method):
         return Worn.from_csv(cases / self.runs[-1].name)
 
 
-METHODS: dict[str, type[Method]]
-METHODS = {"local": Pivot, "pivot": Pivot, "peeling": Peeling, "dem": Dem}
-"""The methods by what a study file calls them, from fast to accurate."""
+METHODS: dict[ThresholdMethod, type[Method]]
+METHODS = {
+    methods.LOCAL: Pivot,
+    methods.PIVOT: Pivot,
+    methods.PEELING: Peeling,
+    methods.DEM: Dem,
+}
+"""The method of each kind."""
 
 
 @dataclass(frozen=True)
@@ -962,7 +969,7 @@ class Pile(Geometry):
 
         The scene's method is not left open (``auto``).
         """
-        return METHODS[self.scene.method.kind](self)
+        return METHODS[self.scene.method.facts](self)
 
     @cached_property
     def runs(self) -> tuple[Case, ...]:

@@ -111,7 +111,7 @@ class Choice:
         Fidelity
             The flow is that of `QUASI_STATIC`; a flow model that is not solved is kept.
         """
-        flow = QUASI_STATIC.flow if scene.method.flow.model == "solve" else OWN
+        flow = QUASI_STATIC.flow if scene.method.flow.facts.is_solved else OWN
         grains = DYNAMIC.grains if self.dynamic else QUASI_STATIC.grains
         return Fidelity(f"{flow.name} | {grains.name}", "", flow, grains)
 
@@ -144,7 +144,7 @@ class Choice:
         others = "lattices" if scene.is_poured else "poured"
         if self.packings == others:
             return False
-        return scene.method.flow.model == "solve" or not self.of_solved_flow
+        return scene.method.flow.facts.is_solved or not self.of_solved_flow
 
     def _holds(self, other: Scene) -> bool:
         """Whether a scene with an alternative is one to compare with."""

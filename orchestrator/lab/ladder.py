@@ -203,7 +203,6 @@ def _pair(flow: Rung, grains: Rung) -> Fidelity:
 
 def _pairs(scene: Scene, bed: PileBed) -> Iterator[Fidelity]:
     """The pairs of rungs that are measured on a pile."""
-    is_dem = scene.method.kind == "dem"
     line = of_bed(bed)
     exposed = line.lengths[line.counted(bed.counts)].sum() / scene.grain.diameter - 1e-6
 
@@ -216,7 +215,7 @@ def _pairs(scene: Scene, bed: PileBed) -> Iterator[Fidelity]:
     if is_solved:
         for flow in taken(FLOW):
             yield _pair(flow, PEELING)
-    if not is_dem:
+    if not scene.method.is_resolved_in_time:
         return
     best = REFERENCE.flow
     if bed.is_level:
@@ -271,7 +270,7 @@ def _about(scene: Scene, pair: Fidelity, count: int) -> Row:
         "scene": label(scene),
         **point(scene),
         "packing": packed,
-        "asked": scene.method.kind,
+        "in_time": scene.method.is_resolved_in_time,
         **{f"class_{part}": scene_class(part, scene) for part in RUNGS},
         "count": count,
         "flow_rung": pair.flow.name,
@@ -401,7 +400,7 @@ def together(points: pd.DataFrame) -> pd.DataFrame:
             return math.nan
         return float(max(values, key=abs))
 
-    rows = points[points["asked"] == "dem"].groupby(["packing", *PAIR], sort=False)
+    rows = points[points["in_time"]].groupby(["packing", *PAIR], sort=False)
     columns: dict[str, Any] = {
         "piles": ("scene_id", "size"),
         "cost_core_s": ("cost_core_s", "mean"),
@@ -448,7 +447,7 @@ def known_errors(points: pd.DataFrame) -> pd.DataFrame:
         reference was not run with other numbers.
     """
     beside = np.where(points["class_flow"] == LEVEL_BED, FLAT.name, REFERENCE.name)
-    grains = points[(points["flow_rung"] == beside) & (points["asked"] == "dem")]
+    grains = points[(points["flow_rung"] == beside) & points["in_time"]]
     flow = points[(points["grain_rung"] == PEELING.name) & points["same_model"]]
     tables = [
         _known(grains, GRAINS, "grain_rung", AGAIN),
@@ -481,7 +480,8 @@ def measured_domain(pairs: Iterable[Decision]) -> pd.DataFrame:
         if (pair.flow, pair.grains) == (REFERENCE.flow, PEELING):
             scenes[FLOW].append(scene)
         best = pair.flow_over(scene) in (REFERENCE.flow, FLAT)
-        if best and pair.grains is REFERENCE.grains and scene.method.kind == "dem":
+        in_time = scene.method.is_resolved_in_time
+        if best and pair.grains is REFERENCE.grains and in_time:
             scenes[GRAINS].append(scene)
     return domain.of(scenes)
 

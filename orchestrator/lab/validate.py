@@ -32,6 +32,7 @@ from orchestrator.report.card import Card, Number, Worth
 from orchestrator.report.page import Section
 from orchestrator.report.style import Figure
 from orchestrator.study.fidelities import Fields
+from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
 from orchestrator.surface import truth
@@ -478,7 +479,7 @@ def experiment(study: Study, out: Path) -> Experiment:
 
 def _is_hill(scene: Scene) -> bool:
     """Whether the bed of a scene is a hill of RUSHIL."""
-    return getattr(scene.bed, "shape", "") == "rushil"
+    return isinstance(scene.bed, PileBed) and scene.bed.form.has_measured_flow
 
 
 def _reversed_flow(name: str, scene: Scene, runs: Runs) -> dict[str, float]:

@@ -11,6 +11,7 @@ import pandas as pd
 from orchestrator.study import fields
 from orchestrator.study.method import HELD_FROM
 from orchestrator.tables import COLUMNS, Tables, with_methods, with_scenes
+from orchestrator.tables.facts import needs_run
 from orchestrator.types import BoolArray, FloatArray
 
 Verdict = Literal["reproduced", "partly", "not", "no data"]
@@ -191,7 +192,7 @@ class Evidence:
         table = with_scenes(table, self.scenes)
         if name in ANSWERS:
             return table
-        return table[table["method"] == "dem"]
+        return table[needs_run(table)]
 
     @cached_property
     def _exact(self) -> pd.DataFrame:

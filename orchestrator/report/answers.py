@@ -34,6 +34,8 @@ from orchestrator.report.subjects import (
     solid,
 )
 from orchestrator.study.profile import WITH_X
+from orchestrator.study.shapes import SHAPES
+from orchestrator.tables.facts import packs_grains
 from orchestrator.tables.quoted import MEASURED, SEEDS, of_rows
 
 NONE = Card(
@@ -46,18 +48,6 @@ NONE = Card(
 """The card of a study without results."""
 NUMBERS = "load steps, count and the known error of the method"
 """What the numerical interval of a share of a bed is of."""
-SHAPES = {
-    "triangle": "pile",
-    "dune": "dune",
-    "cosine": "hill",
-    "gaussian": "hill",
-    "rushil": "hill",
-    "trapezoid": "pile with a level top",
-    "step up": "step",
-    "step down": "step",
-    "flat": "level bed",
-}
-"""Shapes of beds in questions."""
 
 
 @lru_cache(maxsize=1)
@@ -166,9 +156,9 @@ def _question(row: pd.Series, pile: Pile, told: Quantity) -> str:
     if bed.profile:
         return f"When does the {name} of {bed.profile.name} start to move, and where?"
     grains = f"{name} of {length(float(row['d_m']))}"
-    shape = SHAPES[bed.shape]
+    shape = bed.form.word
     if bed.forms > 1:
-        shape = f"train of {bed.forms} {shape}s"
+        shape = f"train of {bed.forms} {bed.form.words}"
     return f"At which {told.flow} does a {shape} of {grains} start to move?"
 
 
@@ -188,7 +178,7 @@ def _scene(row: pd.Series, pile: Pile, results: Results) -> str:
         slope = f"{bed.slope_deg:g}° windward"
         shape = f"{length(bed.height)} high, {slope}"
     count = f"{row['count']:.0f} counted grains"
-    if row["method"] == "local":
+    if not packs_grains(row):
         count = "too many grains to follow each"
     if bed.profile or bed.counted:
         grains_ = results.tables["pile_grain"]
@@ -332,7 +322,7 @@ def share(row: pd.Series, told: Quantity) -> Number:
     low, high = _speeds(row, "ustar0")
     of_what = _interval_of(row, NUMBERS)
     part = percent(row["fraction"])
-    what = "of the bed" if row["method"] == "local" else "of the grains"
+    what = "of the grains" if packs_grains(row) else "of the bed"
     return _flow_number(row, told, f"{part} {what}", (ustar, low, high), of_what)
 
 
@@ -440,8 +430,7 @@ def _common_shape(rows: pd.DataFrame) -> str:
     shapes = set(rows["bed_shape"])
     if rows["profile"].notna().any() or len(shapes) > 1:
         return "beds"
-    word = SHAPES[str(shapes.pop())]
-    return "piles with a level top" if " with " in word else f"{word}s"
+    return SHAPES[str(shapes.pop())].words
 
 
 def _span_of(rows: pd.DataFrame) -> str:

@@ -19,6 +19,7 @@ from orchestrator.report.results import Results
 from orchestrator.report.subjects import WIND, is_gas, length, place_of_file
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
+from orchestrator.tables.facts import packs_grains
 
 MOST = 6
 """Remarks up to which those are added that are true of every study of a kind."""
@@ -271,7 +272,7 @@ def _counted(scene: Scene, bed: PileBed, x: pd.Series) -> Iterator[Remark]:
 
 def _closed_form(row: pd.Series, bed: PileBed) -> Iterator[Remark]:
     """That a bed was answered along its line, and what checks that."""
-    if row["method"] != "local":
+    if packs_grains(row):
         return
     text = (
         "The bed has too many grains to follow each: the local stress is compared with "

@@ -15,6 +15,7 @@ from orchestrator.study import fields
 from orchestrator.study.method import HELD_FROM
 from orchestrator.study.study import Study
 from orchestrator.tables import Tables, with_methods, with_scenes
+from orchestrator.tables.facts import needs_run
 from orchestrator.tables.rows import measured_hill
 
 FRACTION = 0.3  # n/N at which one threshold stands for all of its pile
@@ -132,8 +133,8 @@ class Results:
             return self.at_fraction
         here = seeds_as_one(self.at_fraction)
         here = here[here["shields"].notna()]
-        order = here.assign(dem=here["method"] == "dem", wears=here["update"] > 0)
-        by = ["alpha_deg", "usable", "d_m", "dem", "wears", "z0_over_d"]
+        order = here.assign(run=needs_run(here), wears=here["update"] > 0)
+        by = ["alpha_deg", "usable", "d_m", "run", "wears", "z0_over_d"]
         return order.sort_values(
             by, ascending=[True, *[False] * 4, True], kind="stable"
         )
@@ -334,7 +335,7 @@ def by_dem(table: pd.DataFrame) -> pd.DataFrame:
     DataFrame
         The rows; an empty table as it is.
     """
-    return table[table["method"] == "dem"] if len(table) else table
+    return table[needs_run(table)] if len(table) else table
 
 
 def valid(table: pd.DataFrame) -> "pd.Series[bool]":

@@ -15,6 +15,7 @@ from orchestrator.report import counted, labels, single
 from orchestrator.report.results import Results, measured_hills, split
 from orchestrator.report.subjects import MEAN, STRESS, TERMS, WIND, Quantity, is_gas
 from orchestrator.study import fields
+from orchestrator.tables.facts import needs_run
 
 SPEEDS = {
     "wind_1m_m_s": "wind at 1 m",
@@ -234,12 +235,12 @@ def single_grains(results: Results) -> pd.DataFrame:
     rows = results.joined("single_grain")
     if rows.empty:
         return rows
-    is_dem = rows["method"] == "dem"
-    re = rows["reynolds"].where(is_dem, rows["reynolds_closed_form"])
+    is_run = needs_run(rows)
+    re = rows["reynolds"].where(is_run, rows["reynolds_closed_form"])
     values = {
-        "shields": rows["shields_dem"].where(is_dem, rows["shields_closed_form"]),
-        "ustar0_m_s": rows["ustar_m_s"].where(is_dem, rows["ustar_closed_form_m_s"]),
-        "by": is_dem.map({True: "DEM", False: "closed form"}),
+        "shields": rows["shields_dem"].where(is_run, rows["shields_closed_form"]),
+        "ustar0_m_s": rows["ustar_m_s"].where(is_run, rows["ustar_closed_form_m_s"]),
+        "by": is_run.map({True: "DEM", False: "closed form"}),
     }
     return pd.concat([rows.assign(reynolds=re), pd.DataFrame(values)], axis=1)
 

@@ -30,6 +30,7 @@ from orchestrator.report.style import Figure, Look
 from orchestrator.report.theory import BINS, Line
 from orchestrator.study import fields
 from orchestrator.study.criterion import GOES_ON
+from orchestrator.tables.facts import needs_run
 from orchestrator.types import BoolArray, FloatArray
 
 SHAPES = "os^DvP<X>p8hd*"
@@ -210,10 +211,10 @@ def about(rows: pd.DataFrame) -> dict[str, Any]:
     """
     if rows.empty:
         return {}
-    is_dem = rows["method"] == "dem"
+    is_run = needs_run(rows)
 
     def used(column: str, scale: float = 1.0) -> str:
-        values = rows.loc[is_dem, column] * scale
+        values = rows.loc[is_run, column] * scale
         return ", ".join(f"{value:.6g}" for value in sorted(set(values)))
 
     drawn = theory.drawn(rows["force_law"])
@@ -224,8 +225,8 @@ def about(rows: pd.DataFrame) -> dict[str, Any]:
         "hollow": not valid(rows).all(),
         "viscosities": rows["nu_m2_s"].nunique(),
         "methods": labels.methods(rows),
-        "others": labels.methods(rows[~is_dem]),
-        "dem": is_dem.any(),
+        "others": labels.methods(rows[~is_run]),
+        "dem": is_run.any(),
         "increment": used("load_increment", 100.0),
         "waiting": used("waiting_time"),
         "criterion": used("displacement_criterion"),
@@ -677,7 +678,7 @@ def _few_exact(grains: pd.DataFrame) -> pd.DataFrame:
     """Single grains, of which few that the closed form answered are points as well."""
     if grains.empty or len(grains) > FEW:
         return grains
-    is_exact = grains["method"] != "dem"
+    is_exact = ~needs_run(grains)
     exact = {
         "shields_dem": "shields_closed_form",
         "reynolds": "reynolds_closed_form",

@@ -26,6 +26,7 @@ from orchestrator.report.subjects import (
     length,
     solid,
 )
+from orchestrator.study.shapes import SHAPES
 
 Row = Any
 """A row of a table with the columns of its scene, or a mapping with them."""
@@ -195,8 +196,10 @@ def is_level(row: Row) -> bool:
     bool
         Whether it is.
     """
-    is_shape = not isinstance(row.get("profile"), str)
-    return row.get("bed_shape") == "flat" and is_shape
+    shape = SHAPES.get(row.get("bed_shape", ""))
+    if shape is None or isinstance(row.get("profile"), str):
+        return False
+    return shape.is_level
 
 
 def place_of(quantity_: Quantity, row: Row) -> str:

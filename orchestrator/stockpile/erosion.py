@@ -23,7 +23,7 @@ from orchestrator.bed.line import BedLine
 from orchestrator.errors import InputError
 from orchestrator.experiment import Experiment, Results, Runs, page_texts, piles
 from orchestrator.fidelity import limits
-from orchestrator.flow.model import FlowModel
+from orchestrator.flow.model import of_scene
 from orchestrator.flow.stress import WallStress
 from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.physics.threshold import thresholds_of
@@ -238,7 +238,7 @@ def _form(scene: Scene) -> list[str]:
     assert isinstance(bed, PileBed)
     words = [str(bed.profile.name if bed.profile else bed.shape)]
     if _rises(bed):
-        height = FlowModel(scene).line.h
+        height = of_scene(scene).line.h
         words += [f"{height:g} m high", f"{bed.slope_deg:g}°"]
     words.append(f"z₀ {1e3 * scene.solve_roughness:g} mm")
     return words
@@ -263,7 +263,7 @@ def solved(scene: Scene, threshold: float | None, cases: Path) -> Surface:
     """
     bed = scene.bed
     assert isinstance(bed, PileBed)
-    faces = _faces(bed, FlowModel(scene).line, FlowModel(scene).stress(cases))
+    faces = _faces(bed, of_scene(scene).line, of_scene(scene).stress(cases))
     if threshold is None:
         level = replace(single_grain(scene), slope_deg=0.0)
         (own,) = thresholds_of(scene.forces.law, [level])
@@ -330,7 +330,7 @@ def grouped(
         # a scene without obstacles is the first one, whatever the order of the file
         first_bare = sorted(members, key=lambda scene: scene != bare)
         surfaces = [solved(scene, threshold, cases) for scene in first_bare]
-        line = FlowModel(bare).line
+        line = of_scene(bare).line
         base = _base(line.x, line.z, line.h)
         is_flat = not _rises(bed) or line.h < FLAT_BELOW * base
         found.append(Pile(name, surfaces, is_flat, bare in members))
@@ -371,7 +371,7 @@ def experiment(study: Study, out: Path) -> Experiment:
     least, source = given_threshold(study.erosion.threshold, where)
     asked = piles(study)
     check_winds((scene.fluid for scene in asked), where)
-    flows = {scene: FlowModel(scene) for scene in asked}
+    flows = {scene: of_scene(scene) for scene in asked}
     for scene in flows:
         limits.check(scene, where, grains=False)
 

@@ -50,7 +50,7 @@ def goes_on(scene: Scene) -> bool:
 
 def _is_single_by_dem(scene: Scene) -> bool:
     """Whether LIGGGHTS follows a single grain, of which it knows no hops."""
-    return scene.method.kind == "dem" and isinstance(scene.bed, GrainBed)
+    return scene.method.is_resolved_in_time and isinstance(scene.bed, GrainBed)
 
 
 def peak_of(scene: Scene) -> float:

@@ -7,8 +7,9 @@ is ``auto`` leaves the choice to the program.
 """
 
 from functools import partial
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
+from orchestrator.study import methods, models
 from orchestrator.study.declare import (
     Fraction,
     Length,
@@ -18,6 +19,12 @@ from orchestrator.study.declare import (
     field,
 )
 
+if TYPE_CHECKING:
+    MethodName = str
+    ModelName = str
+else:
+    MethodName = Literal[tuple(methods.MEANINGS)]
+    ModelName = Literal[tuple(models.MODELS)]
 Turbulence = Literal["kEpsilon", "RNGkEpsilon", "realizableKE", "kOmegaSST"]
 _solved = partial(field, scope="solved flows")
 _dem = partial(field, scope="DEM")
@@ -26,13 +33,14 @@ _dem = partial(field, scope="DEM")
 class FlowMethod(Part):
     """How the flow over a pile is found: the model, and the numbers of a solve."""
 
-    model: Literal["solve", "waves", "flat"] = field(
-        "solve", scope="piles", column="flow_model", label="flow model"
+    model: ModelName = field(
+        models.SOLVE.name,
+        scope="piles",
+        column="flow_model",
+        label="flow model",
+        choices=models.MEANINGS,
     )
-    """where the stress on a pile comes from
-    - solve: OpenFOAM
-    - waves: linear theory with A and B of each wavelength (Fourrière et al. 2010)
-    - flat: log law of a flat bed, u* = u*₀"""
+    """where the stress on a pile comes from"""
     speed: float = _solved(
         10.0,
         symbol="U_e",
@@ -102,6 +110,11 @@ class FlowMethod(Part):
     )
     """flat bed from the forms to the outlet"""
 
+    @property
+    def facts(self) -> models.FlowModel:
+        """The facts of its model."""
+        return models.MODELS[self.model]
+
 
 HELD_FROM = 6.0
 """Least waiting time of load steps in which the flow is held, sqrt(d/g').
@@ -141,17 +154,42 @@ class GrainMethod(Part):
 class Method(Part):
     """How a scene is answered; `fidelity` names a set of its fields."""
 
-    kind: Literal["auto", "dem", "peeling", "pivot", "local"] = field(
-        "auto", column="method", label="threshold method"
+    kind: MethodName = field(
+        methods.AUTO,
+        column="method",
+        label="threshold method",
+        choices=methods.MEANINGS,
     )
     """how the threshold is found: DEM, peeling (pivots that free one another), the
     pivot of each grain by itself, or the closed form along the bed line, without grains
     and for any length; left open, the program chooses one by known errors and by what
-    each method knows
-    - auto: chosen for the scene
-    - dem: DEM
-    - peeling: peeling
-    - pivot: pivot
-    - local: closed form along the bed line"""
+    each method knows"""
     flow: FlowMethod = FlowMethod()
     grains: GrainMethod = GrainMethod()
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the program chooses the threshold method."""
+        return self.kind == methods.AUTO
+
+    @property
+    def candidates(self) -> tuple[methods.ThresholdMethod, ...]:
+        """The threshold methods that may answer: one, or all while it is open."""
+        if self.is_open:
+            return tuple(methods.METHODS.values())
+        return (self.facts,)
+
+    @property
+    def facts(self) -> methods.ThresholdMethod:
+        """The facts of its threshold method, which is not left open."""
+        return methods.METHODS[self.kind]
+
+    @property
+    def is_resolved_in_time(self) -> bool:
+        """Whether grains are moved in time, and no other method may be chosen."""
+        return all(each.is_resolved_in_time for each in self.candidates)
+
+    @property
+    def may_pack_grains(self) -> bool:
+        """Whether grains are packed by it, or may be while it is open."""
+        return any(each.packs_grains for each in self.candidates)

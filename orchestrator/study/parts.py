@@ -426,8 +426,9 @@ class PileBed(Bed):
 
         It is that of the forms, on a flat bed that of its obstacles.
         """
-        is_flat = self.shape == "flat" and not self.profile and self.obstacles
-        return max(each.height for each in self.obstacles) if is_flat else self.height
+        if self.form.is_level and not self.profile and self.obstacles:
+            return max(each.height for each in self.obstacles)
+        return self.height
 
     @property
     def highest(self) -> float:
@@ -498,7 +499,7 @@ class PileBed(Bed):
     @property
     def is_level(self) -> bool:
         """Whether the flow finds nothing on it that it has to go over or round."""
-        return self.shape == "flat" and not self.profile and not self.obstacles
+        return self.form.is_level and not self.profile and not self.obstacles
 
     @property
     def shape_name(self) -> str:
@@ -511,8 +512,8 @@ class PileBed(Bed):
 
         That is one triangle of two equal faces, of which the windward one is counted.
         """
-        equal = self.shape == "triangle" and self.lee_slope == self.slope_deg
-        return self.is_wedge and equal and not self.obstacles
+        is_equal = self.lee_slope == self.slope_deg
+        return self.is_wedge and is_equal and not self.obstacles
 
     @property
     def is_wedge(self) -> bool:
@@ -520,9 +521,9 @@ class PileBed(Bed):
 
         Grains on the windward one are counted.
         """
-        straight = self.windward == "straight" and not self.brink_radius  # of a dune
-        faces = self.shape in ("triangle", "dune") and straight
-        if not faces or self.forms > 1 or self.profile or self.counts != "windward":
+        if not self.form.is_wedge or self.is_bent:
+            return False
+        if self.forms > 1 or self.profile or self.counts != "windward":
             return False
         base = sum(
             self.height / tan(radians(slope))
@@ -531,6 +532,11 @@ class PileBed(Bed):
         return not any(
             o.x + o.reach > 0 and o.x - o.reach < base for o in self.obstacles
         )
+
+    @property
+    def is_bent(self) -> bool:
+        """Whether straight faces of its shape are curved or rounded."""
+        return self.windward == "curved" or bool(self.brink_radius)
 
     @property
     def is_replica(self) -> bool:

@@ -109,18 +109,6 @@ class Question(Part):
         return tuple(moved)
 
     @property
-    def unknown_to_dem(self) -> str:
-        """What of the question DEM does not know, in words.
-
-        It is empty where DEM knows all.
-        """
-        if self.grain.cohesion:
-            return "DEM knows no cohesion"
-        if self.flow.gusts and not isinstance(self.bed, PileBed):
-            return "DEM of single grains knows no gusts"
-        return ""
-
-    @property
     def gust(self) -> float:
         """Stress that moves the grains over the mean stress of the flow.
 
@@ -333,7 +321,7 @@ def _check_pile(question: Question, bed: PileBed) -> None:
         raise UnfitError("bed.relative_size", "it is of single grains", OUT)
     if bed.spacing and bed.forms == 1:
         raise UnfitError("bed.spacing", "one form has no neighbour", OUT)
-    has_height = bed.profile is not None or bed.shape != "flat"
+    has_height = bed.profile is not None or not bed.form.is_level
     if has_height and bed.height < LEAST_HEIGHT * d:
         what = f"less than five grains of {d:g} m"
         raise UnfitError("bed.height", what, f"at least {LEAST_HEIGHT * d:.4g} m")

@@ -13,9 +13,10 @@ from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.runs.files import canonical_json, digest_text
 from orchestrator.study.declare import UnfitError
 from orchestrator.study.method import Method
-from orchestrator.study.parts import GrainBed, PileBed, Sizes, percentile
+from orchestrator.study.methods import ThresholdMethod
+from orchestrator.study.parts import PileBed, Sizes, percentile
 from orchestrator.study.question import LEAST_DEPTH, OUT, Question
-from orchestrator.study.scopes import CLOSED, effective
+from orchestrator.study.scopes import effective
 
 SOLVE_VISCOSITY = 1e-5
 """Viscosity at which flows are solved, m2/s, where it is low enough for their cells."""
@@ -40,8 +41,6 @@ READ_LATER: dict[str, Any] = {
     "threshold": {"fractions", "criterion"},
 }
 """Fields that no run of a solver depends on, only the reading of its results."""
-LEFT_OPEN_METHOD = 'leave it out, or method.kind = "pivot"'
-LEFT_OPEN = 'method.kind = "auto", which takes one that does'
 
 
 class Scene(Question):
@@ -89,13 +88,13 @@ class Scene(Question):
         parts = {name: getattr(self, name) for name in Question.model_fields}
         return Question(**parts)
 
-    def by(self, kind: str) -> "Scene":
+    def by(self, method: ThresholdMethod) -> "Scene":
         """Make the same question by another threshold method.
 
         Parameters
         ----------
-        kind
-            A word of `Method.kind`.
+        method
+            The method.
 
         Returns
         -------
@@ -103,7 +102,7 @@ class Scene(Question):
             The scene.
         """
         parts = {name: getattr(self, name) for name in Scene.model_fields}
-        parts["method"] = self.method.model_copy(update={"kind": kind})
+        parts["method"] = self.method.model_copy(update={"kind": method.name})
         return Scene(**parts)
 
     def without_obstacles(self) -> "Scene":
@@ -167,12 +166,14 @@ class Scene(Question):
 
 def _check(scene: Scene) -> None:
     """Raise an `UnfitError` for the first field that does not fit the question."""
-    _check_kind(scene)
-    by_dem = scene.method.kind == "dem"
-    if scene.method.kind == "auto" and not scene.unknown_to_dem:
-        by_dem = True
+    misfits = {each: each.misfit(scene) for each in scene.method.candidates}
+    if all(misfits.values()):
+        first, *_ = filter(None, misfits.values())
+        raise first
+    knowing = [each for each, misfit in misfits.items() if misfit is None]
+    by_springs = any(each.is_resolved_in_time for each in knowing)
     stiffness = scene.method.grains.stiffness
-    if scene.is_poured and by_dem and stiffness > MOST_POURED_STIFFNESS:
+    if scene.is_poured and by_springs and stiffness > MOST_POURED_STIFFNESS:
         what = "such springs throw poured grains apart"
         most = f"at most {MOST_POURED_STIFFNESS:g}"
         raise UnfitError("method.grains.stiffness", what, most)
@@ -181,50 +182,21 @@ def _check(scene: Scene) -> None:
         _check_update(scene)
 
 
-def _check_kind(scene: Scene) -> None:
-    """Refuse a method that does not know the question; ``auto`` takes one that does."""
-    kind = scene.method.kind
-    if kind == "local":
-        _check_local(scene)
-    if kind == "peeling" and isinstance(scene.bed, PileBed) and scene.bed.width:
-        raise UnfitError("bed.width", "peeling needs a bed in a plane", OUT)
-    if kind != "dem":
-        return
-    if isinstance(scene.bed, GrainBed) and scene.threshold.criterion == "goes on":
-        what = "DEM of single grains knows no hops"
-        raise UnfitError("threshold.criterion", what, LEFT_OPEN_METHOD)
-    if scene.grain.cohesion > 0:
-        raise UnfitError("grain.cohesion", "DEM knows none", LEFT_OPEN)
-    if isinstance(scene.bed, GrainBed) and scene.flow.gusts is not None:
-        raise UnfitError("flow.gusts", "DEM of single grains knows none", LEFT_OPEN)
-
-
-def _check_local(scene: Scene) -> None:
-    if scene.is_poured or scene.forces.sheltering == "balanced":
-        raise UnfitError("method.kind", "local packs no grains", LEFT_OPEN)
-    if isinstance(scene.bed, PileBed) and scene.bed.packing == "horizontal":
-        what = "local is of rows along the bed, these are level"
-        raise UnfitError("method.kind", what, LEFT_OPEN)
-
-
 def _check_flow(scene: Scene, bed: PileBed) -> None:
     """Refuse a flow model or a mesh that does not fit the bed of a pile."""
-    is_solved = scene.method.flow.model == "solve"
+    model = scene.method.flow.facts
     if bed.profile is not None:
-        _check_points(scene, bed, is_solved)
+        _check_points(scene, bed, model.is_solved)
     if scene.flow.depth is None and not bed.is_level:
         lid = scene.method.flow.lid * bed.relief
         if lid < LEAST_DEPTH * bed.highest:
             least = f"{LEAST_DEPTH:g} heights of the forms or obstacles"
             what = f"{lid:g} m is less than {least}"
             raise UnfitError("method.flow.lid", what, "raise it")
-    if bed.is_level and scene.method.flow.model == "waves":
-        what = "over a level bed it is the flat flow"
-        raise UnfitError("method.flow.model", what, 'leave it out, or choose "flat"')
-    if scene.flow.top != "boundary layer" and scene.method.flow.model == "waves":
-        what = "linear theory has no top"
-        raise UnfitError("method.flow.model", what, 'choose "solve" or "flat"')
-    if is_solved and scene.first_cell_height > bed.relief / 4:
+    misfit = model.misfit(scene)
+    if misfit is not None:
+        raise misfit
+    if model.is_solved and scene.first_cell_height > bed.relief / 4:
         what = "above a quarter of the pile"
         raise UnfitError("method.flow.first_cell_height", what, "lower it")
 
@@ -247,7 +219,8 @@ def _check_update(scene: Scene) -> None:
     """Refuse updates of the bed under a flow or by a method that has none."""
     if not scene.threshold.update:
         return
-    if scene.method.flow.model != "solve" or scene.method.kind in CLOSED:
+    has_contacts = any(each.has_contacts for each in scene.method.candidates)
+    if not (scene.method.flow.facts.is_solved and has_contacts):
         what = 'it needs a flow that is solved and the method "dem"'
         raise UnfitError("threshold.update", what, OUT)
     if scene.first_cell_height > scene.grain.diameter:

@@ -7,10 +7,7 @@ from orchestrator.study.declare import Part, info_of
 from orchestrator.study.method import Method
 from orchestrator.study.parts import Forces, GrainBed, PileBed
 
-CLOSED = ("pivot", "local")
-"""Methods without contacts: nothing that moves changes the bed."""
 RANDOM = ("disordered", "poured")
-MAYBE_DEM = ("dem", "auto")
 
 
 class Asked(Protocol):
@@ -41,6 +38,14 @@ def _of_piles(
     )
 
 
+def _may_be_resolved_in_time(scene: Asked) -> bool:
+    return any(each.is_resolved_in_time for each in scene.method.candidates)
+
+
+def _may_have_contacts(scene: Asked) -> bool:
+    return any(each.has_contacts for each in scene.method.candidates)
+
+
 APPLIES: Mapping[str, Callable[[Asked], bool]] = {
     "every scene": lambda scene: True,
     "single grains": lambda scene: not isinstance(scene.bed, PileBed),
@@ -53,18 +58,16 @@ APPLIES: Mapping[str, Callable[[Asked], bool]] = {
     "random beds and replicas": _of_piles(
         lambda _, bed: bed.packing in RANDOM or bed.is_replica
     ),
-    "solved flows": _of_piles(lambda scene, bed: scene.method.flow.model == "solve"),
+    "solved flows": _of_piles(lambda scene, bed: scene.method.flow.facts.is_solved),
     "flows that change along the bed, and shared stress": _of_piles(
         lambda scene, bed: (
-            scene.method.flow.model != "flat" or scene.forces.sheltering != "none"
+            scene.method.flow.facts.follows_bed or scene.forces.sheltering != "none"
         )
     ),
-    "DEM": lambda scene: scene.method.kind in MAYBE_DEM,
-    "DEM of piles": _of_piles(lambda scene, bed: scene.method.kind in MAYBE_DEM),
-    "DEM and peeling": lambda scene: scene.method.kind not in CLOSED,
-    "DEM and peeling of piles": _of_piles(
-        lambda scene, bed: scene.method.kind not in CLOSED
-    ),
+    "DEM": _may_be_resolved_in_time,
+    "DEM of piles": _of_piles(lambda scene, bed: _may_be_resolved_in_time(scene)),
+    "DEM and peeling": _may_have_contacts,
+    "DEM and peeling of piles": _of_piles(lambda scene, bed: _may_have_contacts(scene)),
 }
 """The scenes on which a field has an effect, by the `scope` of its `Info`."""
 

@@ -3,8 +3,9 @@
 Each has a name, its fields, and its corners.
 
 The corners of a form, shape (n, 2), go downstream from its foot at the origin to its
-toe, m. A new shape is one entry of `SHAPES`; mesh, packing, checks, labels and the
-study file follow.
+toe, m. A new shape is one entry of `SHAPES`; mesh, packing, checks, classes of known
+errors, words of the page and the study file ask it. A field of the bed that no shape
+has yet is declared beside the others, in `PileBed`.
 """
 
 from collections.abc import Callable
@@ -27,10 +28,6 @@ height."""
 
 class Form(Protocol):
     """What the corners of a form follow from: fields of a bed, lengths in m."""
-
-    @property
-    def shape(self) -> str:
-        """Name of the shape."""
 
     @property
     def height(self) -> float:
@@ -64,17 +61,30 @@ class Shape:
     Attributes
     ----------
     name
-        Its name.
+        What a study file calls it.
     meaning
         What it is, in words.
+    word
+        What a question calls a bed of it, such as "pile".
     corners
         Makes the corners of one form of a bed.
     fields
         Fields of the bed that not all shapes have, and this one has.
     label
         What figures call it, where that is not the name.
+    plural
+        The plural of `word`, where that is not the word with an s.
     rises
         Whether it has a windward side, whose slope is the bed's.
+    is_level
+        Whether there is nothing to go over: its height only scales its length.
+    is_curved
+        Whether its sides are curves, without an edge at which a row of grains ends.
+    is_wedge
+        Whether it is two straight faces that meet in an edge, unless a field of the bed
+        bends them.
+    has_measured_flow
+        Whether the flow over it was measured, at the slopes of `measured`.
     lee_slope_deg
         Slope of the lee side by default, degrees; None is that of the windward side.
     counted
@@ -83,14 +93,23 @@ class Shape:
 
     name: str
     meaning: str
-    corners: Callable[[Form], FloatArray]  # of one form of a bed
-    fields: tuple[
-        str, ...
-    ] = ()  # of the bed that not all shapes have, and this one has
-    label: str = ""  # in figures, where that is not the name
-    rises: bool = True  # whether it has a windward side, whose slope is the bed's
-    lee_slope_deg: float | None = None  # by default; None: that of the windward side
-    counted: Literal["windward", "all"] = "windward"  # exposed grains, by default
+    word: str
+    corners: Callable[[Form], FloatArray]
+    fields: tuple[str, ...] = ()
+    label: str = ""
+    plural: str = ""
+    rises: bool = True
+    is_level: bool = False
+    is_curved: bool = False
+    is_wedge: bool = False
+    has_measured_flow: bool = False
+    lee_slope_deg: float | None = None
+    counted: Literal["windward", "all"] = "windward"
+
+    @property
+    def words(self) -> str:
+        """What a question calls several beds of it."""
+        return self.plural or f"{self.word}s"
 
 
 def _faces(bed: Form) -> FloatArray:
@@ -174,58 +193,107 @@ def _rushil(bed: Form) -> FloatArray:
     return bed.height * np.column_stack([x - x[0], z])
 
 
-def _level(bed: Form) -> FloatArray:
-    """Level bed, behind a face up to it or before a face down from it."""
+def _step_up(bed: Form) -> FloatArray:
+    """Level bed behind a face up to it."""
     height, length = bed.height, bed.level_length
-    if bed.shape == "step up":
-        face = height / tan(radians(bed.slope_deg))
-        return np.array([[0, 0], [face, height], [face + length, height]])
-    level = np.array([[0, 0], [length, 0]])
-    down = [length + height / tan(radians(bed.lee_slope or 90)), -height]
-    return np.vstack([level, down]) if bed.shape == "step down" else level
+    face = height / tan(radians(bed.slope_deg))
+    return np.array([[0, 0], [face, height], [face + length, height]])
+
+
+def _level(bed: Form) -> FloatArray:
+    return np.array([[0, 0], [bed.level_length, 0]])
+
+
+def _step_down(bed: Form) -> FloatArray:
+    """Level bed before a face down from it."""
+    foot = bed.level_length + bed.height / tan(radians(bed.lee_slope or 90))
+    return np.vstack([_level(bed), [foot, -bed.height]])
 
 
 TRAIN, LEE, LEVEL = ("forms", "spacing"), ("lee_slope_deg",), ("length",)
-DUNE = ("windward", "brink_radius", *TRAIN, *LEE)
-SLIP_FACE_DEG = 30.0  # lee slope of a dune and of a step down
-DOWN: tuple[bool, float, Literal["all"]] = (False, SLIP_FACE_DEG, "all")
+SLIP_FACE_DEG = 30.0
+"""Lee slope of a dune and of a step down."""
 _LISTED = (
-    Shape("triangle", "two straight faces", _faces, TRAIN + LEE),
     Shape(
-        "dune",
-        "a windward side and a slip face",
-        _dune,
-        DUNE,
+        name="triangle",
+        meaning="two straight faces",
+        word="pile",
+        corners=_faces,
+        fields=TRAIN + LEE,
+        is_wedge=True,
+    ),
+    Shape(
+        name="dune",
+        meaning="a windward side and a slip face",
+        word="dune",
+        corners=_dune,
+        fields=("windward", "brink_radius", *TRAIN, *LEE),
+        is_wedge=True,
         lee_slope_deg=SLIP_FACE_DEG,
     ),
     Shape(
-        "cosine",
-        "one wave of a cosine, trough to trough",
-        _cosine,
-        TRAIN,
-        "wave of a cosine",
-    ),
-    Shape("gaussian", "a Gaussian hill", _gaussian, TRAIN, "Gaussian hill"),
-    Shape(
-        "rushil", "a hill of the wind tunnel RUSHIL", _rushil, TRAIN, "hill of RUSHIL"
+        name="cosine",
+        meaning="one wave of a cosine, trough to trough",
+        word="hill",
+        corners=_cosine,
+        fields=TRAIN,
+        label="wave of a cosine",
+        is_curved=True,
     ),
     Shape(
-        "trapezoid",
-        "two straight faces and a level top",
-        _trapezoid,
-        LEVEL + TRAIN + LEE,
+        name="gaussian",
+        meaning="a Gaussian hill",
+        word="hill",
+        corners=_gaussian,
+        fields=TRAIN,
+        label="Gaussian hill",
+        is_curved=True,
     ),
-    Shape("step up", "a straight face up to higher ground", _level, LEVEL),
     Shape(
-        "step down",
-        "a straight face down to lower ground",
-        _level,
-        LEVEL + LEE,
-        "",
-        *DOWN,
+        name="rushil",
+        meaning="a hill of the wind tunnel RUSHIL",
+        word="hill",
+        corners=_rushil,
+        fields=TRAIN,
+        label="hill of RUSHIL",
+        is_curved=True,
+        has_measured_flow=True,
     ),
-    Shape("flat", "level bed", _level, LEVEL, rises=False, counted="all"),
+    Shape(
+        name="trapezoid",
+        meaning="two straight faces and a level top",
+        word="pile with a level top",
+        corners=_trapezoid,
+        fields=LEVEL + TRAIN + LEE,
+        plural="piles with a level top",
+    ),
+    Shape(
+        name="step up",
+        meaning="a straight face up to higher ground",
+        word="step",
+        corners=_step_up,
+        fields=LEVEL,
+    ),
+    Shape(
+        name="step down",
+        meaning="a straight face down to lower ground",
+        word="step",
+        corners=_step_down,
+        fields=LEVEL + LEE,
+        rises=False,
+        lee_slope_deg=SLIP_FACE_DEG,
+        counted="all",
+    ),
+    Shape(
+        name="flat",
+        meaning="level bed",
+        word="level bed",
+        corners=_level,
+        fields=LEVEL,
+        rises=False,
+        is_level=True,
+        counted="all",
+    ),
 )
-SHAPES = {
-    shape.name: shape for shape in _LISTED
-}  # all shapes, by what a study file calls them
+SHAPES = {shape.name: shape for shape in _LISTED}
+"""All shapes, by what a study file calls them."""

@@ -28,6 +28,7 @@ from orchestrator.study.fidelities import AUTO, fields_of
 from orchestrator.study.fields import FIELDS, PARTS, SEED, default_of
 from orchestrator.study.hints import HINTS
 from orchestrator.study.keys import Table, Tables, by_name, nested
+from orchestrator.study.models import FLAT
 from orchestrator.study.parts import Erosion, PileBed, Sizes, percentile
 from orchestrator.study.profile import WITH_X, Files
 from orchestrator.study.reading import (
@@ -451,7 +452,8 @@ def make_scene(
         made[name] = dict(tables[name])
     bed = made["bed"]
     _name_shape(bed, where)
-    is_flat = bed.get("shape") == "flat"
+    level_shapes = [shape.name for shape in SHAPES.values() if shape.is_level]
+    is_flat = bed.get("shape") in level_shapes
     is_level = is_flat and not (bed.get("profile") or bed.get("obstacles"))
     _write_method(made, is_level, where)
     made["fluid"] = fluid_of(made["fluid"], where)
@@ -493,7 +495,7 @@ def _write_method(tables: Tables, is_level: bool, where: str) -> None:
             if not (is_level and table == "method.flow"):
                 tables[table].setdefault(field, value)
     if is_level:
-        tables["method.flow"].setdefault("model", "flat")
+        tables["method.flow"].setdefault("model", FLAT.name)
     if bed.get("packing") == "poured":
         tables["method.grains"].setdefault("mobile_layers", POURED_LAYERS)
 

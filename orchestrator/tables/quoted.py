@@ -15,6 +15,8 @@ from orchestrator.physics.beside import LEAVES, measured_level_ustar
 from orchestrator.physics.onset import of_grains
 from orchestrator.physics.reported import in_units
 from orchestrator.physics.shields import ustar_of
+from orchestrator.study.shapes import SHAPES
+from orchestrator.tables.facts import needs_run
 from orchestrator.types import BoolArray, FloatArray
 
 ENDS = ("_low", "_high")
@@ -154,8 +156,7 @@ def _ustar(rows: pd.DataFrame) -> FloatArray:
     """Friction velocity of the undisturbed flow at each threshold, m/s."""
     if "ustar0_m_s" in rows:
         return rows["ustar0_m_s"].to_numpy(float)
-    is_dem = (rows["method"] == "dem").to_numpy()
-    return np.where(is_dem, rows["ustar_m_s"], rows["ustar_closed_form_m_s"])
+    return np.where(needs_run(rows), rows["ustar_m_s"], rows["ustar_closed_form_m_s"])
 
 
 def _is_tested(rows: pd.DataFrame) -> BoolArray:
@@ -278,5 +279,6 @@ def _is_flat(rows: pd.DataFrame) -> Any:
     """Whether each bed is level, so that its flow has one stress everywhere."""
     if "bed_shape" not in rows:
         return np.zeros(len(rows), bool)
-    is_flat = (rows["bed_shape"] == "flat") & rows["profile"].isna()
+    level = [shape.name for shape in SHAPES.values() if shape.is_level]
+    is_flat = rows["bed_shape"].isin(level) & rows["profile"].isna()
     return is_flat.to_numpy()

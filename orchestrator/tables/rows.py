@@ -121,7 +121,7 @@ def scenes(study: Study, plan: Plan) -> Iterator[Row]:
             **fields.question(asked),
             "gust": asked.gust if asked.flow.gusts else nan,
             "law_holds": law_holds(asked),
-            "case": case if scene.method.kind == "dem" else None,
+            "case": case if scene.method.facts.needs_run else None,
             "flow_case": flow_case,
         }
 
@@ -182,7 +182,7 @@ def single_grain(
     by_dem = _single_grains_by_dem(cells, cases)
     for asked, decision in plan.decisions.items():
         scene = decision.scene
-        is_missing = scene.method.kind == "dem" and scene.id not in by_dem
+        is_missing = scene.method.facts.needs_run and scene.id not in by_dem
         if asked in plan.piles or is_missing:
             continue
         found = by_dem.get(scene.id, _ByDem())
@@ -358,7 +358,7 @@ def measured_hill(pile: Pile) -> measured.MeasuredHill | None:
     """
     bed = pile.bed
     case = pile.flow
-    if bed.shape != "rushil" or bed.profile or bed.forms > 1 or bed.obstacles:
+    if not bed.form.has_measured_flow or bed.profile or bed.forms > 1 or bed.obstacles:
         return None
     return measured.rushil_hill(bed.slope_deg, case.height_m / case.roughness_m)
 
@@ -656,7 +656,7 @@ def _interval(
 
 def _smooth_bed(scene: Scene, ustar0: float) -> float:
     """How far at most tau_c moves, relative, if the flow has the z0 of its bed."""
-    if scene.method.flow.model == "flat":
+    if not scene.method.flow.facts.follows_bed:
         return 0.0
     outer = float(outer_roughness(scene.bed.roughness, ustar0, scene.fluid.viscosity))
     return PER_E_FOLD * log(outer / scene.solve_roughness)

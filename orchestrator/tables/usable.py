@@ -15,7 +15,9 @@ from orchestrator.physics.threshold import standing_out
 from orchestrator.physics.velocity import open_water_reynolds
 from orchestrator.physics.verdict import Reason
 from orchestrator.study import fields
+from orchestrator.study.methods import METHODS
 from orchestrator.tables.check import Contradictions
+from orchestrator.tables.facts import needs_run, packs_grains
 from orchestrator.tables.quoted import OF_PILE, of_rows, quoted
 
 CARRIED_OFF = 0.1
@@ -129,9 +131,9 @@ def with_usable(
     rows = table.merge(scenes[columns], on="scene_id", how="left")
     is_pile = "share_carried_off" in rows
     if not is_pile:
-        is_dem = rows["method"] == "dem"
-        rows["reynolds"] = rows["reynolds"].where(is_dem, rows["reynolds_closed_form"])
-        rows["shields"] = rows["shields_dem"].where(is_dem, rows["shields_closed_form"])
+        is_run = needs_run(rows)
+        rows["reynolds"] = rows["reynolds"].where(is_run, rows["reynolds_closed_form"])
+        rows["shields"] = rows["shields_dem"].where(is_run, rows["shields_closed_form"])
     against_law = _against_law(rows, is_pile)
     rows["standing_out"] = standing_out(rows["relative_size"], rows["beta_deg"])
     rows["flow_reynolds"] = _flow_reynolds(rows)
@@ -187,8 +189,7 @@ def _flow_reynolds(rows: pd.DataFrame) -> "pd.Series[float]":
         ustar0 = rows["ustar0_m_s"]
         layer = rows["u_e_m_s"] * SPEED_HEIGHT * rows["h_m"]
     else:
-        is_dem = rows["method"] == "dem"
-        ustar0 = rows["ustar_m_s"].where(is_dem, rows["ustar_closed_form_m_s"])
+        ustar0 = rows["ustar_m_s"].where(needs_run(rows), rows["ustar_closed_form_m_s"])
     channel = open_water_reynolds(
         ustar0,
         roughness=rows["z0_over_d"] * rows["d_m"],
@@ -213,7 +214,7 @@ def _reasons(
     elif isinstance(row.get("gusts"), str):
         what = "the error of the closed form under gusts is not known"
         yield Reason("gusts", what)
-    is_closed = not is_pile or row.get("method") == "local"
+    is_closed = not is_pile or not packs_grains(row)
     yield from verdict.of_measurements(row, is_closed)
 
 
@@ -249,7 +250,7 @@ def _held_row(row: Mapping[Any, Any]) -> Iterator[Reason]:
 
     The closed form along the bed line packs no rows: it is of single exposed grains.
     """
-    if row.get("method") == "local" or not row.get("row_hold", 0.0) > ROW_HOLD:
+    if not packs_grains(row) or not row.get("row_hold", 0.0) > ROW_HOLD:
         return
     times = f"{row['row_hold']:.2g} times the u* of a single one"
     said = f"the row has no end: its neighbours hold the first grain up to {times}"
@@ -267,7 +268,8 @@ def _reasons_of_bed(row: Mapping[Any, Any]) -> Iterator[Reason]:
         remedy = "give sizes = { sigma_g = 1.2 }"
         what = "equal spheres in one plane settle into a crystal"
         yield Reason("crystal", what, remedy)
-    is_renewed = row.get("method") == "peeling" or (row.get("update") or 0) > 0
+    renews = METHODS[row["method"]].renews_balance
+    is_renewed = renews or (row.get("update") or 0) > 0
     is_kept = row.get("sheltering") == "balanced" and not is_renewed
     if is_kept and row["fraction"] > KEPT_TO + 1e-9:
         beyond = f"beyond n/N = {KEPT_TO} grains that have gone still bear a part of it"

@@ -8,7 +8,7 @@ import pytest
 from orchestrator import plan, tables
 from orchestrator.errors import InputError
 from orchestrator.fidelity.decision import as_written
-from orchestrator.flow.model import FlowModel
+from orchestrator.flow.model import of_scene
 from orchestrator.grains.pile import Pile
 from orchestrator.physics.velocity import depth_mean_speed
 from orchestrator.study import study
@@ -79,7 +79,7 @@ def test_a_flat_beds_height_moves_nothing_behind_a_fence() -> None:
         TEXT.replace("slope_deg = 15.0", f"{flat}{height}") for height in (0.05, 0.2)
     ]
     scenes = [study.parse(text, name="t", where="t").scenes[0] for text in texts]
-    assert len({FlowModel(scene).cases for scene in scenes}) == 1
+    assert len({of_scene(scene).cases for scene in scenes}) == 1
     assert len({scene.first_cell_height for scene in scenes}) == 1
 
 

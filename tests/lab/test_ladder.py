@@ -111,7 +111,7 @@ def test_the_cost_of_a_pile_does_not_depend_on_what_was_asked_before(
 
 
 def _point(pair: tuple[str, str], factor: float = 1.0, **other: Any) -> dict[str, Any]:
-    names = {"scene_id": "a", "packing": "aligned", "asked": "dem", "same_model": True}
+    names = {"scene_id": "a", "packing": "aligned", "in_time": True, "same_model": True}
     classes = {"class_flow": "wall", "class_grains": "aligned"}
     times = {"flow_s": 1.0, "grains_s": 1.0, "model_floor": 0.2}
     taus = {name: factor * value for name, value in TAU.items()}

@@ -13,6 +13,7 @@ from orchestrator.physics.threshold import thresholds_of
 from orchestrator.report import along, answers, bed, flows
 from orchestrator.report.bed import Steps
 from orchestrator.report.results import FRACTION, Results
+from orchestrator.study import methods
 from orchestrator.study.closed_form import single_grain
 from tests import small_study
 from tests.report.conftest import axes_of
@@ -95,7 +96,7 @@ def pile(results: Results) -> Pile:
 @pytest.fixture(scope="module")
 def peeled(pile: Pile) -> Pile:
     """The same pile, whose grains leave by peeling."""
-    return replace(pile, scene=pile.scene.by("peeling"))
+    return replace(pile, scene=pile.scene.by(methods.PEELING))
 
 
 @pytest.fixture(scope="module")

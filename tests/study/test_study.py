@@ -14,7 +14,7 @@ from orchestrator.errors import InputError
 from orchestrator.fidelity import limits
 from orchestrator.grains.loads import Geometry
 from orchestrator.runs.files import canonical_json
-from orchestrator.study import closed_form, fields, parts, study
+from orchestrator.study import closed_form, fields, methods, parts, study
 from orchestrator.study.parts import Forces, Grain, GrainBed
 from orchestrator.study.scene import Scene
 
@@ -360,5 +360,5 @@ def test_the_question_does_not_depend_on_the_method() -> None:
     assert one.question == other.question
     assert one.method != other.method
     assert one.id != other.id
-    assert one.by("pivot").method.flow.cells_per_face == 40
+    assert one.by(methods.PIVOT).method.flow.cells_per_face == 40
     assert _parse(PILE).name == "test"

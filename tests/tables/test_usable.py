@@ -51,7 +51,7 @@ SCENE = {
         "relative_size": 1.0,
         "beta_deg": 60.0,
     },
-    **{"rho_sol_kg_m3": 2500.0, "g_m_s2": 9.81, "z0_m": 3e-5},
+    **{"rho_sol_kg_m3": 2500.0, "g_m_s2": 9.81, "z0_m": 3e-5, "method": "dem"},
 }
 STOPPED = {"final_fraction": 0.8}
 UNREACHED = {"reynolds": NAN, "shields": NAN, "share_carried_off": NAN}
