@@ -8,15 +8,12 @@ from pathlib import Path
 import pytest
 
 from orchestrator.runs.case import templates
+from tests.flow.conftest import copied, edit, of_hill
 
-LIGGGHTS = ("bed", "going", "poured", "rebound")
-FOAM = ("pile", "surface")
-OF_FLOWS = {
-    "lidHeight": FOAM,
-    "firstCentre": FOAM,
-    "columnOffset": ("pile",),
-    "slabOffset": ("surface",),
-}
+LIGGGHTS = ("bed", "poured", "rebound")
+BEDS = ("pile", "hill")
+"""Beds that the template has meshes of."""
+OF_FLOWS = ("lidHeight", "firstCentre", "approachOffset")
 
 
 def _allrun(case: Path) -> "subprocess.CompletedProcess[str]":
@@ -70,25 +67,55 @@ def test_a_density_that_is_changed_in_both_files_moves_the_threshold(
     assert at[0] != at[1]
 
 
-@pytest.mark.parametrize(
-    ("name", "template"),
-    [(name, template) for name, listed in OF_FLOWS.items() for template in listed],
-)
-def test_numbers_that_the_mesh_contradicts_are_refused(
-    name: str, template: str, tmp_path: Path
-) -> None:
-    case = tmp_path / "case"
-    shutil.copytree(templates() / "openfoam" / template, case)
-    # the mesh is made of what the template has, then as in the case of a study
+def _of_bed(bed: str, tmp_path: Path) -> Path:
+    """A copy of the template whose mesh is made, as in the case of a study."""
+    case = copied(tmp_path)
+    if bed == "hill":
+        of_hill(case)
     control = case / "system" / "controlDict"
     control.write_text(re.sub(r"(?m)^endTime .*", "endTime 1;", control.read_text()))
     _allrun(case)
     assert (case / "log.simpleFoam").is_file()
     (case / "log.gmshToFoam").unlink()
-    _multiplied(case / "parameters", name, 1.1)
+    return case
+
+
+def _is_refused(case: Path, name: str) -> None:
+    """Nothing is solved, and what the mesh has is named."""
     ended = _allrun(case)
     assert ended.returncode == 1
     assert re.fullmatch(
         rf"Allrun: {name} is .* in the mesh: change both.*\n", ended.stderr
     )
     assert not (case / "log.simpleFoam").exists()
+
+
+@pytest.mark.parametrize("bed", BEDS)
+@pytest.mark.parametrize("name", OF_FLOWS)
+def test_numbers_that_the_mesh_contradicts_are_refused(
+    name: str, bed: str, tmp_path: Path
+) -> None:
+    case = _of_bed(bed, tmp_path)
+    _multiplied(case / "parameters", name, 1.1)
+    _is_refused(case, name)
+
+
+@pytest.mark.parametrize(
+    ("bed", "old", "new"), [("pile", "empty", "slip"), ("hill", "slip", "empty")]
+)
+def test_sides_that_the_mesh_contradicts_are_refused(
+    bed: str, old: str, new: str, tmp_path: Path
+) -> None:
+    case = _of_bed(bed, tmp_path)
+    edit(case / "parameters", f" {old};", f" {new};")
+    _is_refused(case, "sides")
+
+
+def test_both_beds_of_the_template_have_the_same_parameters() -> None:
+    folder = templates() / "openfoam/flow"
+    names = []
+    for bed in (folder, folder / "hill"):
+        text = (bed / "parameters").read_text()
+        names.append(re.findall(r"(?m)^(\w+) ", text))
+    assert names[0] == names[1]
+    assert "sides" in names[0]

@@ -34,7 +34,9 @@ END LC_NUMERIC
 """
 FEW = 3
 """Iterations of a flow: enough to write numbers and to read them."""
-CASES = sorted(path.parent for path in templates().rglob("Allrun"))
+HILL = templates() / "openfoam/flow/hill"
+"""Files that replace those of the template."""
+CASES = [*sorted(path.parent for path in templates().rglob("Allrun")), HILL]
 SAMPLE = """title = "A pile"
 grain = { diameter = 2e-3 }
 bed = { kind = "pile", slope_deg = 20.0 }
@@ -72,7 +74,9 @@ def _ran(
     template: Path, folder: Path, environment: Mapping[str, str]
 ) -> dict[str, str]:
     """What a copy of a template says, and the tables and fields that it leaves."""
-    shutil.copytree(template, folder)
+    if template == HILL:
+        shutil.copytree(HILL.parent, folder)
+    shutil.copytree(template, folder, dirs_exist_ok=True)
     control = folder / "system" / "controlDict"
     if control.is_file():
         # a flow ends before it has converged, and its script says so

@@ -21,7 +21,7 @@ FIRST_CELL = 0.5
 """Height of the first cells, m: gmshToFoam takes flatter ones for inverted, since the
 faces of so coarse a mesh are twisted."""
 LEVEL = Level("template", 6, 1, 1.4, 1.6, 10_000)
-MESH = templates() / "openfoam/surface/surface.msh"
+MESH = templates() / "openfoam/flow/hill/mesh.msh"
 
 
 def hill(x: FloatArray, y: FloatArray) -> FloatArray:

@@ -12,8 +12,6 @@ from orchestrator import digits
 from orchestrator.bed.line import BedLine, triangle
 from orchestrator.errors import InputError, SolverError
 from orchestrator.flow.foam import (
-    BED_FLOW,
-    COLUMN_FLOW,
     INTERPOLATED_DIGITS,
     SolvedFlow,
     patch_types,
@@ -104,9 +102,7 @@ class FlowCase(OpenFoamCase):
     above: Flow = field(default_factory=Flow)
 
     kind: ClassVar[str] = "flow"
-    template: ClassVar[str] = "openfoam/pile"
-    recipe: ClassVar[int] = 9
-    results: ClassVar[tuple[str, ...]] = (BED_FLOW, COLUMN_FLOW)
+    recipe: ClassVar[int] = 10
     needs_bulky: ClassVar[bool] = True
     mesher: ClassVar[str] = "gmsh"
 
@@ -287,12 +283,11 @@ class FlowCase(OpenFoamCase):
         coarser
             The flow on half the cells; None for the log layer.
         """
-        set_values(directory / "parameters", self._solver_values())
+        self.write_parameters(directory, self._solver_values())
         set_values(directory / "parameters.geo", self._mesh_values())
         self.grid.write(directory / "bed_line.geo")
         if self.profile:
             (directory / "profile.csv").write_text(self.profile.text, encoding="utf-8")
-        (directory / "pile.msh").unlink()  # the mesh of the template
         types = {**patch_types(-self.height_m), "sides": "empty"}
         if self.is_closed:
             types["lid"] = "wall"
@@ -310,10 +305,9 @@ class FlowCase(OpenFoamCase):
         # ended.
         residual = RESIDUAL * min(1.0, CELLS_ALONG / self.grid.cells)
         return {
-            **self.approach.parameters,
             "top": TOPS[self.above.top],
             "lidHeight": self.lid_m,
-            "columnOffset": -self.height_m,
+            "approachOffset": -self.height_m,
             "firstCentre": self._first_centre,
             "turbulence": self.settings.turbulence_model,
             "convection": self.settings.convection_scheme,

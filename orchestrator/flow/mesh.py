@@ -146,7 +146,7 @@ class Grid:
         return cells[at], self.line.x[at], self.line.x[at + 1]
 
     def write(self, path: Path) -> None:
-        """Write the bed line and the cells along it as `pile.geo` includes them.
+        """Write the bed line and the cells along it as `mesh.geo` includes them.
 
         Parameters
         ----------
@@ -360,7 +360,7 @@ def _away(length: float, first: float, growth: float) -> Piece:
 
 
 def made_by_gmsh(directory: Path) -> "meshio.Mesh":
-    """The mesh of a case, which gmsh makes of `pile.geo` and what it includes.
+    """The mesh of a case, which gmsh makes of `mesh.geo` and what it includes.
 
     Any thread may call; one at a time makes its mesh.
 
@@ -392,12 +392,12 @@ def made_by_gmsh(directory: Path) -> "meshio.Mesh":
         gmsh.initialize(ARGUMENTS, readConfigFiles=False, interruptible=False)
         try:
             gmsh.option.setNumber("General.Terminal", 0)
-            gmsh.open(str(directory / "pile.geo"))
+            gmsh.open(str(directory / "mesh.geo"))
             gmsh.model.mesh.generate(3)
             return _checked(gmsh.model)
         except Exception as error:  # gmsh raises nothing narrower
             remedy = "check the slope, the height and the first cell in parameters.geo"
-            where = str(directory / "pile.geo")
+            where = str(directory / "mesh.geo")
             raise SolverError(f"no usable mesh: {error}", where, remedy) from error
         finally:
             gmsh.finalize()

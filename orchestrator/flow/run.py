@@ -13,7 +13,7 @@ import numpy as np
 
 from orchestrator import digits
 from orchestrator.errors import Exploded, SolverError
-from orchestrator.flow.foam import BED_FLOW, start_from
+from orchestrator.flow.foam import BED_FLOW, COLUMN_FLOW, start_from
 from orchestrator.flow.stress import APPROACH, Diagnostic, Stress, diagnostics
 from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.velocity import log_law_speed, log_law_ustar
@@ -90,7 +90,8 @@ class Approach:
 class OpenFoamCase(Case):
     """Steady turbulent flow over a bed, from one direction, on one mesh."""
 
-    results: ClassVar[tuple[str, ...]] = (BED_FLOW,)
+    template: ClassVar[str] = "openfoam/flow"
+    results: ClassVar[tuple[str, ...]] = (BED_FLOW, COLUMN_FLOW)
     derived: ClassVar[tuple[str, ...]] = (WALL_STRESS, DIAGNOSTICS)
     bulky: ClassVar[tuple[str, ...]] = (
         *(f"[1-9]*/{name}" for name in _FIELDS),
@@ -100,6 +101,8 @@ class OpenFoamCase(Case):
     )
     mesher: ClassVar[str]
     """The distribution that makes the mesh."""
+    of_template: ClassVar[tuple[str, ...]] = ("mesh.msh", "hill/*")
+    """Glob patterns of the files of the template that are no part of a case."""
 
     @property
     @abstractmethod
@@ -156,6 +159,24 @@ class OpenFoamCase(Case):
     def ustar0_m_s(self) -> float:
         """Friction velocity u*_0 of the approaching flow by the log law, m/s."""
         return self.approach.ustar_m_s
+
+    def write_parameters(self, directory: Path, values: Mapping[str, object]) -> None:
+        """Write ``parameters``, and drop what is the template's alone.
+
+        Parameters
+        ----------
+        directory
+            The case, a copy of the template.
+        values
+            Values of this mesh and its solve; those of the approaching flow come to
+            them.
+        """
+        own = {**self.approach.parameters, **values}
+        set_values(directory / "parameters", own)
+        for pattern in self.of_template:
+            for path in directory.glob(pattern):
+                path.unlink()
+        (directory / "hill").rmdir()
 
     def share(self, directory: Path) -> float:
         """Iterations over those that are expected, at most nearly all.

@@ -94,7 +94,7 @@ def check_log(directory: Path) -> int:
     residuals = re.findall(_RESIDUAL, text)
     residual = residuals[-1] if residuals else "not known"
     what = f"{PROGRAM} did not converge: the residual of Ux is {residual} after {last}"
-    remedy = "raise endTime in system/controlDict; if the residuals cycle, relax more"
+    remedy = "raise iterations in parameters; if the residuals cycle, relax more"
     raise Stalled(what, where, remedy)
 
 

@@ -11,7 +11,7 @@ from orchestrator.bed.deck import read_texts
 from orchestrator.digits import rounded
 from orchestrator.errors import SolverError, Stalled
 from orchestrator.flow.foam import BED_FLOW, SolvedFlow
-from orchestrator.flow.run import Approach, OpenFoamCase, set_values
+from orchestrator.flow.run import Approach, OpenFoamCase
 from orchestrator.flow.stress import Diagnostic
 from orchestrator.surface import mesh
 from orchestrator.surface.heights import Surface
@@ -21,6 +21,10 @@ from orchestrator.types import FloatArray
 
 RESIDUAL = 1e-4
 """Residual of p at which the mean stress on a hill is within 0.1 % of where it ends."""
+RESIDUAL_OF_K = 3e-3
+"""The same of k."""
+MOST_ITERATIONS = 400
+"""Iterations at which a flow is taken for one that cycles; others need 100 to 280."""
 ITERATIONS = 120
 """Iterations that a flow takes."""
 SPEED = 3.5e5
@@ -143,9 +147,9 @@ class SurfaceFlowCase(OpenFoamCase):
     first_cell_m: float | None = None
 
     kind: ClassVar[str] = "surface"
-    template: ClassVar[str] = "openfoam/surface"
-    recipe: ClassVar[int] = 1
+    recipe: ClassVar[int] = 2
     mesher: ClassVar[str] = "numpy"
+    of_template: ClassVar[tuple[str, ...]] = (*OpenFoamCase.of_template, "*.geo")
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -230,17 +234,18 @@ class SurfaceFlowCase(OpenFoamCase):
     def write(self, directory: Path, cases: Path) -> None:
         """Write parameters, the mesh and a flow to start from."""
         values = {
-            **self.approach.parameters,
+            "sides": "slip",
             "lidHeight": self.mesh.lid,
-            "slabOffset": -self.mesh.slab,
+            "approachOffset": -self.mesh.slab,
             "firstCentre": self.first_cell / 2,
             "turbulence": self.turbulence_model,
             "convection": self.convection_scheme,
             "residual": f"{RESIDUAL:.3g}",
+            "residualOfK": f"{RESIDUAL_OF_K:.3g}",
+            "iterations": MOST_ITERATIONS,
             "ranks": self.ranks,
         }
-        set_values(directory / "parameters", values)
-        (directory / "surface.msh").unlink()  # the mesh of the template
+        self.write_parameters(directory, values)
         self.mesh.write(directory)
         self.approach.start(directory / "0", self.mesh.over_bed.ravel())
 

@@ -45,8 +45,8 @@ method.grains.final_fraction = 0.8
 Driver = subprocess.Popen[str]
 ENDLESS = {
     "simpleFoam": (
-        "system/controlDict system/fvSolution",
-        "s/residualControl/unused/; s/endTime  *[0-9][0-9]*/endTime 1e9/",
+        "parameters system/fvSolution",
+        "s/residualControl/unused/; s/iterations  *[0-9][0-9]*/iterations 1e9/",
     ),
     "liggghts": (
         "parameters.liggghts",

@@ -77,4 +77,15 @@ def solve(shared: Shared) -> Solve:
 @pytest.fixture
 def template(tmp_path: Path) -> Path:
     """A copy of the template, as it lies."""
-    return Path(shutil.copytree(templates() / "openfoam" / "pile", tmp_path / "pile"))
+    return copied(tmp_path)
+
+
+def copied(folder: Path) -> Path:
+    """The template in a folder."""
+    return Path(shutil.copytree(templates() / "openfoam" / "flow", folder / "flow"))
+
+
+def of_hill(template: Path) -> Path:
+    """The template with the mesh and the parameters of its hill."""
+    shutil.copytree(template / "hill", template, dirs_exist_ok=True)
+    return template

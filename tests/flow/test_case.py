@@ -44,7 +44,7 @@ def test_a_case_from_its_inputs_to_its_table(solve: Solve) -> None:
         read
     ).items():  # the table loses nothing but digits beyond nine
         np.testing.assert_allclose(getattr(kept, name), values, rtol=5e-9)
-    assert (directory / "parameters").read_text().count("//") == 13
+    assert (directory / "parameters").read_text().count("//") == 17
     sums = (directory / "results.sha256").read_text().splitlines()
     assert [line.split()[1] for line in sums] == ["bed_flow.csv", "column_flow.csv"]
     # the fields, whose last digits are those of this processor, are known by their digests, too
@@ -191,12 +191,7 @@ def test_a_flat_bed_keeps_the_friction_velocity(
     )
     directory = case.prepare(flow, tmp_path)
     if not channel:  # the residuals of a flat bed do not fall: only noise is left
-        edit(
-            directory / "system/controlDict",
-            "endTime             1000;",
-            "endTime 300;",
-        )
-        edit(directory / "system/controlDict", "Interval       1000", "Interval 300")
+        edit(directory / "parameters", "iterations       1000;", "iterations 300;")
     allrun(directory)
     solved = SolvedFlow(directory)
     stress = solved.stress(flow.roughness_m)
@@ -312,11 +307,7 @@ def test_runs_without_an_answer(
 ) -> None:
     flow = changed(PILE, **settings)
     directory = case.prepare(flow, tmp_path)
-    edit(
-        directory / "system/controlDict",
-        "endTime             1000;",
-        f"endTime {last};",
-    )
+    edit(directory / "parameters", "iterations       1000;", f"iterations {last};")
     allrun(directory)
     with pytest.raises(error, match=cause):
         flow.collect(directory)

@@ -77,7 +77,7 @@ def test_a_mesh_for_each_shape(name: str, tmp_path: Path) -> None:
 
 
 def test_the_mesh_of_the_template_is_that_of_its_geometry(template: Path) -> None:
-    given = meshio.read(template / "pile.msh").points
+    given = meshio.read(template / "mesh.msh").points
     np.testing.assert_allclose(made_by_gmsh(template).points, given, atol=1e-9)
 
 
@@ -101,14 +101,14 @@ def test_threads_make_their_meshes_in_turn(tmp_path: Path) -> None:
     ("file", "old", "new", "cause"),
     [
         (
-            "pile.geo",
+            "mesh.geo",
             '"lid"',
             '"lib"',
             r"no usable mesh: without the physical groups \['lid'\]",
         ),
-        ("pile.geo", "Recombine Surface{:};", "", "not of hexahedra only"),
+        ("mesh.geo", "Recombine Surface{:};", "", "not of hexahedra only"),
         (
-            "pile.geo",
+            "mesh.geo",
             "= {x, thickness, lid}",
             "= {x, thickness, -lid}",
             "inverted cells",
@@ -120,7 +120,7 @@ def test_a_mesh_that_is_no_such_mesh(
     template: Path, file: str, old: str, new: str, cause: str
 ) -> None:
     edit(template / file, old, new)
-    with pytest.raises(SolverError, match=rf"pile\.geo: .*{cause}"):
+    with pytest.raises(SolverError, match=rf"mesh\.geo: .*{cause}"):
         made_by_gmsh(template)
 
 

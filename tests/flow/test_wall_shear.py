@@ -90,7 +90,7 @@ def test_the_stress_is_the_recorded_one_on_every_release(template: Path) -> None
     recorded = np.loadtxt(RECORDED, delimiter=",", skiprows=1)
     stress = SolvedFlow(template).wall_shear
     assert_same(stress, np.insert(recorded, 1, 0.0, axis=1))
-    reader = pyvista.POpenFOAMReader(str(template / "pile.foam"))
+    reader = pyvista.POpenFOAMReader(str(template / "flow.foam"))
     reader.set_active_time_value(reader.time_values[-1])
     boundary: Any = reader.read()["boundary"]
     seen = boundary["bed"].cell_data["wallShearStress"]
@@ -128,7 +128,9 @@ def test_a_study_reads_the_fields_with_six_digits(
 def test_the_last_iteration_is_read(template: Path) -> None:
     """Whichever of the directories a listing has first."""
     edit(
-        template / "system/controlDict", "writeInterval       1000;", "writeInterval 7;"
+        template / "system/controlDict",
+        "writeInterval       $iterations;",
+        "writeInterval 7;",
     )
     assert allrun(template).returncode == 0
     written = sorted(int(path.name) for path in template.glob("[1-9]*"))

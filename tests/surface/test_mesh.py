@@ -61,7 +61,7 @@ def volumes(mesh: Columns) -> FloatArray:
 
 def check_mesh(directory: Path) -> str:
     """What OpenFOAM's checkMesh says of a mesh, in a copy of the template."""
-    template = templates() / "openfoam/surface"
+    template = templates() / "openfoam/flow"
     for name in ("system", "0"):
         shutil.copytree(template / name, directory / name)
     shutil.copy(template / "parameters", directory)

@@ -14,12 +14,19 @@
 # As in OpenFOAM, gradients are by "Gauss linear", and on the bed grad(U) is that of the
 # cell with the part along n replaced by snGrad(U): gaussGrad::correctBoundaryConditions.
 # A face is divided into triangles about the mean of its corners, and a cell into
-# pyramids about the mean of the centres of its faces.
+# pyramids about the mean of the centres of its faces. A mesh with empty sides is one cell
+# thick along y, and its flow is in a plane.
 #
-# Writes besides what a study reads of the flow: bed_flow.csv has for each face of the bed
-# the stress of the flow on it along the face, over that on the slab before the inlet, and
-# the friction velocity there. It has four decimals, which all processors share, and the
-# friction velocity six digits.
+# Writes besides what a study reads of the flow, with as many digits as the fields of all
+# processors share. bed_flow.csv has for each face of the bed:
+#
+#   in a plane: the stress of the flow on it over the density and the velocity in the cell
+#   on it, both along the face and positive downstream, with six digits;
+#   in space: the stress of the flow on it along the face over that before the inlet, with
+#   four decimals, since thousands of faces share six digits no more, and the friction
+#   velocity before the inlet, with six digits.
+#
+# column_flow.csv has the mean velocity in the cells before the inlet, with six digits.
 
 BEGIN {
     # the items of the lists are lines such as "4(0 1 23 22)" and "(0.1 0 0.2)"
@@ -32,7 +39,7 @@ BEGIN {
     for (face in corners)
         want_points(corners[face])
     read_wanted(mesh "points", "", point_wanted, points)
-    read_wanted(time "/U", "internalField", measured, velocity)
+    read_wanted(time "/U", "internalField", velocity_wanted, velocity)
     bed_faces = read_all(time "/nut", "bed", nut)
     if (bed_faces != size["bed"])
         fail("the results are not whole: " time "/nut")
@@ -48,7 +55,11 @@ BEGIN {
     for (i = 0; i < bed_faces; i++)
         print_stress(start["bed"] + i, nu + nut[i])
     print ")\n;\n    }\n}\n\n// ************************************************ //"
-    write_bed_flow("bed_flow.csv")
+    if (is_plane)
+        write_plane_bed_flow("bed_flow.csv")
+    else
+        write_bed_flow("bed_flow.csv")
+    write_column_flow("column_flow.csv")
 }
 
 # Read the patches: their names in their order, types, first faces and numbers of faces.
@@ -75,6 +86,7 @@ function read_patches(file,    line, text, words, i, patch) {
     }
     if (!("bed" in start) || !("before" in start))
         fail(file ": there is no patch named bed, or none named before")
+    is_plane = type["sides"] == "empty"
 }
 
 # Open the first list of a file, or the first one behind a line that begins with some
@@ -154,7 +166,7 @@ function find_cells(    file, other, count, i, end, cell, beyond) {
     close_list(other)
 }
 
-# Find the sides of these cells, and the patches that some of them are in.
+# Find the sides of these cells, and the patches that bound cells on the bed.
 function find_sides(    file, other, count, i, cell, beyond, names, number, patch) {
     file = mesh "owner"
     other = mesh "neighbour"
@@ -174,23 +186,36 @@ function find_sides(    file, other, count, i, cell, beyond, names, number, patc
     split(patches, names, " ")
     for (; i < count; i++) {
         cell = next_item(file)
+        if (is_on(i, "before")) {
+            face_wanted[i] = 1
+            velocity_wanted[cell] = 1
+            owner[i] = cell
+        }
         if (!(cell in measured))
             continue
         add_side(cell, i)
         owner[i] = cell
+        if (!(cell in on_bed))
+            continue
         for (number = 1; number in names; number++) {
             patch = names[number]
-            if (i >= start[patch] && i < start[patch] + size[patch])
+            if (is_on(i, patch))
                 touched[patch] = 1
         }
     }
     close_list(file)
 }
 
+function is_on(face, patch) {
+    return face >= start[patch] && face < start[patch] + size[patch]
+}
+
 function add_side(cell, face) {
     face_wanted[face] = 1
-    if (cell in measured)
-        sides[cell] = sides[cell] " " face
+    if (!(cell in measured))
+        return
+    velocity_wanted[cell] = 1
+    sides[cell] = sides[cell] " " face
 }
 
 function want_points(list,    at, i) {
@@ -209,8 +234,8 @@ function set_velocity_on(patch,    values, i, face) {
             continue
         if (type[patch] == "wall")
             velocity_on[face] = "(0 0 0)"
-        else if (type[patch] == "cyclic")
-            # the slab before the inlet is one cell long: what leaves it enters it
+        else if (type[patch] == "cyclic" || type[patch] == "empty")
+            # before the inlet is one cell: what leaves it enters it; as in a plane aside
             velocity_on[face] = velocity[owner[face]]
         else if (patch == "sides")
             velocity_on[face] = slipping(face)
@@ -371,7 +396,7 @@ function print_stress(face, nu_eff,
     y = (g_xy + g_yx) * nx + (2 * g_yy - third) * ny + (g_yz + g_zy) * nz
     z = (g_xz + g_zx) * nx + (g_yz + g_zy) * ny + (2 * g_zz - third) * nz
     x *= nu_eff
-    y *= nu_eff
+    y *= is_plane ? 0 : nu_eff  # without round-off
     z *= nu_eff
     printf "(%.10g %.10g %.10g)\n", x, y, z
     through = x * nx + y * ny + z * nz
@@ -380,7 +405,23 @@ function print_stress(face, nu_eff,
     stress_z[face] = through * nz - z
 }
 
-# Write the stress along the faces of the bed over that on the slab before the inlet.
+# Write stress and velocity along the faces of a bed in a plane.
+function write_plane_bed_flow(file,    i, face, along_x, along_z, size_, at) {
+    print "tau_m2_s2,u_m_s" >file
+    for (i = 0; i < bed_faces; i++) {
+        face = start["bed"] + i
+        # downstream; the area vector points out of the flow, downwards
+        size_ = sqrt(area_x[face] ^ 2 + area_z[face] ^ 2)
+        along_x = -area_z[face] / size_
+        along_z = area_x[face] / size_
+        split(velocity[owner[face]], at, between)
+        printf "%.6g,%.6g\n", stress_x[face] * along_x + stress_z[face] * along_z,
+            at[2] * along_x + at[4] * along_z >file
+    }
+    close(file)
+}
+
+# Write the stress along the faces of the bed over that before the inlet.
 function write_bed_flow(file,    i, face, count, in_slab, upstream) {
     for (i = 0; i < size["before"]; i++)
         in_slab[owner[start["before"] + i]] = 1
@@ -393,13 +434,26 @@ function write_bed_flow(file,    i, face, count, in_slab, upstream) {
     }
     upstream /= count
     if (upstream <= 0)
-        fail("no flow in the slab before the inlet")
+        fail("no flow before the inlet")
     print "ustar0_m_s,tau_x,tau_y,tau_z" >file
     for (i = 0; i < bed_faces; i++) {
         face = start["bed"] + i
         printf "%.6g,%s,%s,%s\n", sqrt(upstream), decimals(stress_x[face] / upstream),
             decimals(stress_y[face] / upstream), decimals(stress_z[face] / upstream) >file
     }
+    close(file)
+}
+
+# Write the mean velocity in the cells before the inlet.
+function write_column_flow(file,    i, face, through, flux, at) {
+    for (i = 0; i < size["before"]; i++) {
+        face = start["before"] + i
+        split(velocity[owner[face]], at, between)
+        through -= area_x[face]
+        flux -= area_x[face] * at[2]
+    }
+    print "mean_velocity_m_s" >file
+    printf "%.6g\n", flux / through >file
     close(file)
 }
 
@@ -421,8 +475,8 @@ function print_head(    names, i, calculated) {
         if (names[i] == "bed")
             continue
         print "    " names[i] "\n    {"
-        if (type[names[i]] == "cyclic")
-            print "        type            cyclic;\n    }"
+        if (type[names[i]] == "cyclic" || type[names[i]] == "empty")
+            print "        type            " type[names[i]] ";\n    }"
         else
             print calculated "        value           uniform (0 0 0);\n    }"
     }

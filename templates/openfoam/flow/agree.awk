@@ -28,6 +28,7 @@ FILENAME == "boundary" {
     # a patch stands on one line or on several
     if ($0 ~ /^ *[a-z]+ *([{].*)?$/) patch = $1
     if (patch == "lid" && match($0, /type +[a-z]+/)) is_wall = substr($0, RSTART, RLENGTH) ~ /wall$/
+    if (patch == "sides" && match($0, /type +[a-z]+/)) is_plane = substr($0, RSTART, RLENGTH) ~ /empty$/
     if (patch == "inlet" && match($0, /offset [(][^ ]*/)) offset = substr($0, RSTART + 8, RLENGTH - 8)
 }
 
@@ -36,9 +37,11 @@ END {
     centre = (high - low) / 2
     if (abs(centre - value["firstCentre"]) > 1e-3 * centre)
         complain("firstCentre", value["firstCentre"], centre)
-    name = "columnOffset" in value ? "columnOffset" : "slabOffset"
-    if (abs(offset - value[name]) > 1e-4 * abs(offset)) complain(name, value[name], offset)
-    if ("top" in value && (value["top"] == "closed") != is_wall)
+    if (abs(offset - value["approachOffset"]) > 1e-4 * abs(offset))
+        complain("approachOffset", value["approachOffset"], offset)
+    if ((value["top"] == "closed") != is_wall)
         complain("top", value["top"], is_wall ? "closed" : "not closed")
+    if ((value["sides"] == "empty") != is_plane)
+        complain("sides", value["sides"], is_plane ? "empty" : "not empty")
     exit is_wrong
 }

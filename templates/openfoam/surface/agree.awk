@@ -1,1 +1,0 @@
-../pile/agree.awk
