@@ -10,6 +10,9 @@ from pathlib import Path
 
 import orchestrator
 from orchestrator.guests import GUESTS
+from orchestrator.study.methods import METHODS
+from orchestrator.study.models import MODELS
+from orchestrator.study.shapes import SHAPES
 
 PACKAGE = Path(orchestrator.__file__).parent
 PAGE = PACKAGE.parent / "docs" / "architecture.md"
@@ -118,3 +121,22 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
         if circle and circle not in circles:
             circles.append(circle)
     assert circles == []
+
+
+NAMES = {*METHODS, *MODELS, *SHAPES}
+"""Names of threshold methods, flow models and shapes of beds, by their seams."""
+
+
+def test_methods_models_and_shapes_are_asked_for_facts_and_never_for_their_names() -> (
+    None
+):
+    compared = []
+    for name, path in MODULES.items():
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if not isinstance(node, ast.Compare):
+                continue
+            words = [each for each in ast.walk(node) if isinstance(each, ast.Constant)]
+            found = {str(each.value) for each in words} & NAMES
+            if found:
+                compared.append(f"{name}:{node.lineno} compares {', '.join(found)}")
+    assert compared == []

@@ -14,7 +14,7 @@ import pandas as pd
 
 from orchestrator import pipeline, plan, tables
 from orchestrator.benchmark import checks, pack, scenes
-from orchestrator.benchmark.pack import KINDS, STUDY, Pack, Problem
+from orchestrator.benchmark.pack import KINDS, OF_POCKET, STUDY, Pack, Problem
 from orchestrator.errors import InputError, SolverError
 from orchestrator.grains.pile import Pile
 from orchestrator.plan import Plan
@@ -223,7 +223,7 @@ def _of_grains(
         name = names[scene.id]
         if "closed-form" in kinds:
             yield scenes.closed_form(name, scene)
-        if "pivot" in kinds and scenes.has_pivot(scene):
+        if OF_POCKET in kinds and scenes.has_pivot(scene):
             problem = scenes.pivot(name, scene, ustar.get(scene.id, np.nan))
             answered = planned.decisions[scene.id].scene
             if answered.id in cells and scene.id in ustar:

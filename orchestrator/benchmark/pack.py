@@ -53,13 +53,15 @@ LARGEST_TOLERANCE = 1.0
 """Largest relative tolerance of an expected answer."""
 NUMBER = "%.9g"
 """Format of the numbers in all tables."""
+OF_POCKET = "pivot"
+"""Kind of the scenes in which a grain is moved out of its pocket in time."""
 KINDS = {
     "closed-form": 1,
     "collision": 2,
     "incline": 2,
     "sliding": 2,
     "passing": 2,
-    "pivot": 2,
+    OF_POCKET: 2,
     "flow": 3,
     "pile": 4,
     "line": 5,

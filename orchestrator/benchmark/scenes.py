@@ -8,7 +8,7 @@ import pandas as pd
 
 from orchestrator.bed.deck import POURED_DRAG
 from orchestrator.benchmark.mechanics import mechanics, three_grains
-from orchestrator.benchmark.pack import Problem, expectation
+from orchestrator.benchmark.pack import OF_POCKET, Problem, expectation
 from orchestrator.flow.run import SPEED_HEIGHT
 from orchestrator.grains import cells
 from orchestrator.grains.loads import forces
@@ -64,7 +64,7 @@ _FLOW = (
 )
 ENTRIES = {
     "closed-form": f"{_GRAIN} relative_size",
-    "pivot": f"{_GRAIN} relative_size {_DEM}",
+    OF_POCKET: f"{_GRAIN} relative_size {_DEM}",
     "pile": f"{_GRAIN} {_DEM} {_BED}",
     "line": f"{_GRAIN} {_DEM} {_BED} {_FLOW}",
 }
@@ -166,7 +166,7 @@ def pivot(name: str, scene: Scene, ours: float) -> Problem:
     )
     grains = three_grains(centres * d, sizes * d)
     tables = {"grains": grains, "load_steps": load_steps}
-    return Problem(name, "pivot", parameters(scene, "pivot"), tables, [row])
+    return Problem(name, OF_POCKET, parameters(scene, OF_POCKET), tables, [row])
 
 
 def has_pivot(scene: Scene) -> bool:

@@ -9,7 +9,7 @@ angle, d/z0 and more. Outside of them there is none. ``tools/tested.py`` makes b
 """
 
 import csv
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -58,41 +58,19 @@ OF_STRIPS = ("sizes", "exposure", "sheltering", "gusts")
 """Words that tell tested strips apart, beside those of all tested intervals."""
 NUMBERS_OF_STRIPS = ("phi_deg", "poured_depth", "width", "mobile_layers", "fraction")
 """The same, of numbers."""
-OF_KIND = (
-    "bed",
-    "bed_shape",
-    "profile",
-    "obstacles",
-    "width",
-    "sizes",
-    "method",
-    "sheltering",
-    "counted",
-    "loaded_grains",
-    "length",
-    "h_m",
-    "d_m",
-    "criterion",
-    "decides",
-    "row_hold",
-)
-"""Columns that tell whether a bed is a strip, or one of grains that move alone."""
+TESTED_AS, GRAIN, STRIP = "tested_as", "grain", "strip"
+"""Column that says of thresholds on beds what the tested ones were of that are like
+them, and its words; that of any other bed is empty."""
 LIKE = 0.01
 """Relative difference from a number that was not varied up to which an interval is
 given: of the lift coefficient, of a grain's size over that of its neighbours, of the
 numbers of a strip. So much of its weight may cohesion hold a grain that has none."""
 LEVEL_DEG = 1.0
 """Steepest slope of a bed that is like those of the flumes, degrees."""
-ROW_HOLD = 1.05
-"""u*_0 of the first grain in its row, over that of the grain alone, from which the row
-holds it."""
 MOST_SLOPE_DEG = 30.0
 """Slope to which an interval of grains that go on is given, degrees."""
 FRICTION_DEG = (32.0, 50.0)
 """Friction angles of the slope laws that bound that of grains that go on, degrees."""
-LEAST_LENGTH = 20.0
-"""Length of the strips whose intervals were found, d: shorter ones have too few
-grains."""
 NO_ROWS = (np.nan, np.nan, np.nan, 0.0)
 """Median, tenth and ninetieth percentile, and count, where nothing was measured."""
 
@@ -394,54 +372,5 @@ def _kinds(table: Any, count: int) -> tuple[BoolArray, BoolArray]:
     """Whether thresholds are of single grains, or as of such, and whether of strips."""
     if "bed" not in table:
         return np.ones(count, bool), np.zeros(count, bool)
-    is_lone, is_strip = [], []
-    for row in _rows_of(table):
-        is_grain = row["bed"] == "grain"
-        is_lone.append(is_grain or _is_alone(row))
-        is_strip.append(not is_lone[-1] and _is_strip(row))
-    return np.array(is_lone, bool), np.array(is_strip, bool)
-
-
-def _rows_of(table: Any) -> Iterator[dict[str, Any]]:
-    """The rows of a table, with the columns of `OF_KIND` that it has."""
-    names = [name for name in OF_KIND if name in table]
-    columns = [np.asarray(table[name], object) for name in names]
-    for row in zip(*columns, strict=True):
-        # what a table lacks is NaN, which is true
-        known = (None if value != value else value for value in row)
-        yield dict(zip(names, known, strict=True))
-
-
-def _is_alone(row: Mapping[str, Any]) -> bool:
-    """Whether the grains of a pile go on as single exposed ones would.
-
-    They do along a bed line, in the closed form. Equal grains in rows do where going on
-    holds them longest, or where the row does not hold its first grain.
-    """
-    if row.get("criterion") != GOES_ON:
-        return False
-    if row.get("method") == "local":
-        return True
-    if row["sizes"] or row["width"] or row["sheltering"] != "none":
-        return False
-    held = row.get("row_hold")
-    is_free = held is not None and held < ROW_HOLD
-    return is_free or row.get("decides") == GOES_ON
-
-
-def _is_strip(row: Mapping[str, Any]) -> bool:
-    """Whether a bed is a level strip like those tested, all of whose grains count."""
-    # the strips that were tested have grains that leave
-    if row.get("criterion") == GOES_ON:
-        return False
-    # a profile and obstacles have a text
-    if row["bed_shape"] != "flat" or row["profile"] or row["obstacles"]:
-        return False
-    if row["counted"] not in (None, "all"):
-        return False
-    if not row["width"] or row["method"] != "pivot":
-        return False
-    if row["loaded_grains"] != "exposed":
-        return False
-    length = row["length"] or 4 * row["h_m"]
-    return bool(length / row["d_m"] > LEAST_LENGTH * (1 - 1e-2))
+    kinds = np.asarray(table[TESTED_AS], object)
+    return kinds == GRAIN, kinds == STRIP

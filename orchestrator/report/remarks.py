@@ -9,7 +9,6 @@ import pandas as pd
 from orchestrator.digits import percent
 from orchestrator.fidelity.decision import floor_of
 from orchestrator.fidelity.limits import FROZEN_BED
-from orchestrator.physics.beside import ROW_HOLD
 from orchestrator.physics.velocity import log_law_speed
 from orchestrator.physics.verdict import USABLE
 from orchestrator.report import counted, labels, sheets, single, theory
@@ -20,6 +19,7 @@ from orchestrator.report.subjects import WIND, is_gas, length, place_of_file
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.tables.facts import packs_grains
+from orchestrator.tables.kinds import ROW_HOLD
 
 MOST = 6
 """Remarks up to which those are added that are true of every study of a kind."""

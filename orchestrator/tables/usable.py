@@ -9,7 +9,7 @@ import pandas as pd
 from orchestrator.flow.run import SPEED_HEIGHT
 from orchestrator.grains.threshold import within
 from orchestrator.physics import verdict
-from orchestrator.physics.beside import GOES_ON, ROW_HOLD, beside
+from orchestrator.physics.beside import GOES_ON, TESTED_AS, beside
 from orchestrator.physics.onset import against_law
 from orchestrator.physics.threshold import standing_out
 from orchestrator.physics.velocity import open_water_reynolds
@@ -18,6 +18,7 @@ from orchestrator.study import fields
 from orchestrator.study.methods import METHODS
 from orchestrator.tables.check import Contradictions
 from orchestrator.tables.facts import needs_run, packs_grains
+from orchestrator.tables.kinds import ROW_HOLD, tested_as
 from orchestrator.tables.quoted import OF_PILE, of_rows, quoted
 
 CARRIED_OFF = 0.1
@@ -137,7 +138,7 @@ def with_usable(
     against_law = _against_law(rows, is_pile)
     rows["standing_out"] = standing_out(rows["relative_size"], rows["beta_deg"])
     rows["flow_reynolds"] = _flow_reynolds(rows)
-    measured = beside(rows)
+    measured = beside(rows.assign(**{TESTED_AS: tested_as(rows)}))
     rows = rows.assign(**measured)
     twins = None
     if "fraction" in rows:

@@ -18,6 +18,7 @@ from orchestrator.physics.curves import Air, iversen_white
 from orchestrator.study import fields, scopes, study
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import changed
+from orchestrator.tables.kinds import tested_as
 
 TOOL = Path(__file__).parents[2] / "tools" / "tested.py"
 FLUMES = ("flumes, visual", "flumes, fixed intensity", "flumes, reference transport")
@@ -116,6 +117,8 @@ def test_the_interval_of_a_kind_holds_its_rows_in_flumes() -> None:
 def found(row: dict[str, Any]) -> list[float]:
     """The tested interval of a threshold."""
     table = {name: np.array([value], object) for name, value in row.items()}
+    if "bed" in row:
+        table[beside.TESTED_AS] = np.array(tested_as(table), object)
     return [float(each) for each in beside.tested(table)[:, 0]]
 
 
