@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from orchestrator.calculator import BY_FLUID, LEAVES, OF_FLUID, PARAMETERS
 from orchestrator.errors import InputError
 from orchestrator.physics.fluids import PAPER, TEMPERATURE, numbers_of
-from orchestrator.study.units import first, questions
+from orchestrator.study.units import Remark, hinted, questions
 
 if TYPE_CHECKING:  # this loads numpy
     from orchestrator.calculator.table import Table
@@ -61,7 +61,7 @@ def thresholds_and_questions(
     Raises
     ------
     InputError
-        What is asked first, then what is wrong.
+        With what is asked behind the remedy.
     """
     from orchestrator.calculator.table import thresholds
 
@@ -70,20 +70,21 @@ def thresholds_and_questions(
     fields[f"fluid.{TEMPERATURE}"] = names["temperature"]
     fields["law"] = names["law"]
     fields["criterion"] = names["criterion"]
-    asked: list[str] = []
+    asked: list[Remark] = []
     try:
         points = _of_fluid(points, fluid, temperature)
         if fluid == PAPER and criterion == BY_FLUID:
             criterion = LEAVES  # also where the points have numbers of their own
         asked = questions(_by_field(points), fields, form)
-        return thresholds(points, law, criterion, bed_slope), asked
+        table = thresholds(points, law, criterion, bed_slope)
+        return table, [one.text for one in asked]
     except InputError as error:
         renamed = InputError(
             _renamed(error.what, fields),
             _renamed(error.where, fields),
             _renamed(error.remedy, fields),
         )
-        raise first(asked, renamed, "threshold", fields.values()) from None
+        raise hinted(renamed, asked) from None
 
 
 def _of_fluid(

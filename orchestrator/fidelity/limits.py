@@ -24,7 +24,6 @@ from orchestrator.study import units
 from orchestrator.study.declare import UnfitError
 from orchestrator.study.method import HELD_FROM
 from orchestrator.study.parts import PileBed
-from orchestrator.study.reading import ASKED
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
 
@@ -92,8 +91,7 @@ def check_study(study: Study) -> None:
                 check(scene, group.where)
             except InputError as error:
                 # a number in another unit breaks many rules
-                asked = study.questions
-                raise units.first(asked, error, group.where, ASKED) from None
+                raise units.hinted(error, study.asked) from None
 
 
 def check(scene: Scene, where: str, *, grains: bool = True) -> None:

@@ -8,9 +8,13 @@ import difflib
 import itertools
 import re
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from typing import Annotated, Any
+from dataclasses import dataclass, field
+from hashlib import sha256
+from operator import attrgetter
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 from pydantic import Field, ValidationError
 
@@ -21,12 +25,11 @@ from orchestrator.study.declare import Part, UnfitError
 from orchestrator.study.fields import FIDELITY, PARTS, default_of, table_of
 from orchestrator.study.keys import Table, Tables
 from orchestrator.study.profile import LARGEST_NUMBER
+from orchestrator.study.source import Source, decoded, find, read_bytes
 
 TIME_LIMIT_S = 3600.0
 MOST_BYTES = 2**24
 """Largest study file: one that lists so many scenes is smaller."""
-UNKNOWN = "unknown key"
-MISSING = "is missing"
 ASKED = (
     "grain.diameter",
     "grain.density",
@@ -43,6 +46,8 @@ ASKED = (
 """The fields that are asked about where their numbers are usual in another unit."""
 CONFIRMED = "write units_confirmed = true at the top of the study file"
 """What accepts a bed of an unusual size."""
+Made = TypeVar("Made")
+Model = TypeVar("Model", bound=Part)
 TAGS = ("", "rows", "float", "str")
 """Names of the members of unions, which are no keys."""
 Hint = Callable[[Sequence[str], str], tuple[str, str] | None]
@@ -60,6 +65,71 @@ class Given(Part):
     forces: Table = Field(default={})
     method: Table = Field(default={})
     axes: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(default={})
+
+
+class Inputs(NamedTuple):
+    """A study file as it was read.
+
+    Attributes
+    ----------
+    path
+        The file.
+    text
+        Its text.
+    digest
+        SHA-256 of its bytes.
+    tables
+        The tables in it.
+    """
+
+    path: Path
+    text: str
+    digest: str
+    tables: dict[str, Any]
+
+    def source(
+        self, named: Mapping[str, str | None], tolerance: float | None = None
+    ) -> Source:
+        """Say what a study was read from.
+
+        Parameters
+        ----------
+        named
+            SHA-256 of the files that it names, by their names.
+        tolerance
+            The tolerance that was given in place of the file's.
+
+        Returns
+        -------
+        Source
+            The file and the digests of all.
+        """
+        digests = {**named, self.path.name: self.digest}
+        return Source(str(self.path.absolute()), digests, tolerance)
+
+
+def read(source: str | Path) -> Inputs:
+    """Read a study file by its path, or a preset by its name.
+
+    Parameters
+    ----------
+    source
+        The path or the name.
+
+    Returns
+    -------
+    Inputs
+        The file with its tables.
+
+    Raises
+    ------
+    InputError
+        For a file that is not there or no TOML.
+    """
+    path = find(source)
+    content = read_bytes(path, MOST_BYTES, str(source))
+    text = decoded(content, str(source))
+    return Inputs(path, text, sha256(content).hexdigest(), tables_of(text, str(path)))
 
 
 def tables_of(text: str, where: str) -> dict[str, Any]:
@@ -142,33 +212,121 @@ def at_points(
         yield point, made
 
 
-def check_once(
-    points: dict[Any, tuple[Any, ...]], scene: Any, point: tuple[Any, ...], where: str
-) -> None:
-    """Refuse a scene that the axes have a second time.
+def scenes_at(
+    tables: Mapping[str, Table],
+    axes: Mapping[str, list[Any]],
+    where: str,
+    make: Callable[[Tables], Made],
+    numbers: "Numbers",
+    key: Callable[[Made], Hashable] = attrgetter("id"),
+) -> Iterator[Made]:
+    """Make a scene of each combination of the axes' values.
 
     Parameters
     ----------
-    points
-        The values of the axes by the scenes before, to which this one is added.
-    scene
-        The scene, or its id.
-    point
-        Its values.
+    tables
+        The tables by their names.
+    axes
+        The values by the names of their fields.
     where
         The file, for messages.
+    make
+        Makes the scene of the tables at one point.
+    numbers
+        The numbers that are asked about, to which those of these scenes are added.
+    key
+        Tells scenes apart.
+
+    Yields
+    ------
+    object
+        The scene.
 
     Raises
     ------
     InputError
-        With both values.
+        For a scene that is refused, with the questions on its numbers, and for one that
+        the axes have a second time.
     """
-    same = points.setdefault(scene, point)
-    if same is not point:
-        one = ", ".join(map(str, same))
-        other = ", ".join(map(str, point))
-        what = f"{one} and {other} are one scene"
-        raise InputError(what, f"{where}: axes", "list each value once")
+    points: dict[Hashable, tuple[Any, ...]] = {}
+    for point, made in at_points(tables, axes, where):
+        numbers.add(made)
+        try:
+            scene = make(made)
+        except InputError as error:
+            raise units.hinted(error, numbers.asked) from None
+        same = points.setdefault(key(scene), point)
+        if same is not point:
+            one = ", ".join(map(str, same))
+            other = ", ".join(map(str, point))
+            what = f"{one} and {other} are one scene"
+            raise InputError(what, f"{where}: axes", "list each value once")
+        yield scene
+
+
+@dataclass
+class Numbers:
+    """The numbers in tables of scenes that are asked about, as they are written.
+
+    Attributes
+    ----------
+    sieve
+        Reads the sieve table of a file.
+    """
+
+    sieve: Callable[[str], list[list[float]]] | None = None
+    _points: list[dict[str, float | None]] = field(default_factory=list)
+    _sieves: dict[str, list[float]] = field(default_factory=dict)
+
+    def add(self, tables: Mapping[str, Table]) -> None:
+        """Take note of the numbers of one scene, which may be wrong.
+
+        Parameters
+        ----------
+        tables
+            Its tables by their names.
+        """
+        given = {name: dict(tables.get(name, {})) for name in PARTS}
+        with suppress(InputError):
+            given["fluid"] = fluids.numbers_of(given["fluid"])
+        numbers: dict[str, float | None] = {}
+        for name in ASKED:
+            table, _, key = name.partition(".")
+            value = given[table].get(key, default_of(name))
+            is_usual = _is_number(value) and abs(value) < LARGEST_NUMBER
+            numbers[name] = value if is_usual else None
+        self._points.append(numbers)
+        sizes = given["grain"].get("sizes")
+        if sizes is not None and str(sizes) not in self._sieves:
+            self._sieves[str(sizes)] = self._diameters(sizes)
+
+    def _diameters(self, sizes: Any) -> list[float]:
+        """The diameters of a sieve table, as far as they are numbers."""
+        with suppress(InputError):
+            if isinstance(sizes, str) and self.sieve is not None:
+                sizes = self.sieve(sizes)
+        if not isinstance(sizes, list):
+            return []
+        firsts = [row[0] for row in sizes if isinstance(row, list) and row]
+        return [*filter(_is_number, firsts)]
+
+    @property
+    def asked(self) -> list[units.Remark]:
+        """What is said of the numbers."""
+        values: dict[str, list[float]] = {}
+        for name in ASKED:
+            each = (numbers[name] for numbers in self._points)
+            # what is left open, or follows from a file, is no number
+            values[name] = [value for value in each if value is not None]
+        asked = units.questions(values, {})
+        for diameters in self._sieves.values():
+            asked += units.of_sieve(diameters)
+        return asked
+
+
+def _is_number(value: Any) -> bool:
+    """Whether a value of a study file is a number."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def fluid_of(table: Table, where: str) -> Table:
@@ -195,67 +353,6 @@ def fluid_of(table: Table, where: str) -> Table:
         return fluids.numbers_of(table)
     except InputError as error:
         raise InputError(error.what, f"{where}: {error.where}", error.remedy) from None
-
-
-def values_of(scenes: Sequence[Any]) -> dict[str, list[float]]:
-    """List the values of the fields `ASKED` in some scenes.
-
-    Parameters
-    ----------
-    scenes
-        The scenes.
-
-    Returns
-    -------
-    dict
-        Values by the names of the fields.
-    """
-    values: dict[str, list[float]] = {}
-    for name in ASKED:
-        part, _, field = name.partition(".")
-        each = [getattr(getattr(scene, part), field, None) for scene in scenes]
-        # what is left open is no number, and a bed of one grain has no lee side
-        values[name] = [value for value in each if value is not None]
-    return values
-
-
-def with_questions(refusal: InputError, tables: Tables, where: str) -> InputError:
-    """Put a refusal behind questions on the numbers that it may come from.
-
-    Parameters
-    ----------
-    refusal
-        The refusal of a scene.
-    tables
-        The tables of the scene.
-    where
-        The file, for messages.
-
-    Returns
-    -------
-    InputError
-        The refusal as it is where there is no such question.
-    """
-    if refusal.what in (UNKNOWN, MISSING):
-        return refusal
-    asked = units.questions(_values_in(tables), {})
-    return units.first(asked, refusal, where, ASKED)
-
-
-def _values_in(tables: Mapping[str, Table]) -> dict[str, list[float]]:
-    """The values of the fields `ASKED` in tables of one scene, maybe wrong ones."""
-    given = {name: dict(tables.get(name, {})) for name in PARTS}
-    with suppress(InputError):
-        given["fluid"] = fluids.numbers_of(given["fluid"])
-    values: dict[str, list[float]] = {}
-    for name in ASKED:
-        table, _, field = name.partition(".")
-        value = given[table].get(field, default_of(name))
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        values[name] = []
-        if is_number and abs(value) < LARGEST_NUMBER:
-            values[name].append(value)
-    return values
 
 
 def place_of(where: str, group: int) -> str:
@@ -325,14 +422,14 @@ def explained(
     value = first.get("input")
     place = f"{where}: {name}"
     if first["type"] == "missing":
-        return InputError(MISSING, place, "add it to the file")
+        return InputError("is missing", place, "add it to the file")
     if first["type"] != "extra_forbidden":
         return _not_accepted(value, first["msg"], place)
     known = hint(names, branch)
     if known is not None:
         what, remedy = known
         return InputError(what, place, remedy)
-    return InputError(UNKNOWN, place, _meant(names, value, own, tables))
+    return InputError("unknown key", place, _meant(names, value, own, tables))
 
 
 def _not_accepted(value: Any, message: str, place: str) -> InputError:
@@ -361,8 +458,8 @@ def _meant(
         if key not in tables:
             written[key] = f"{key}, above the first table"
     for table in reversed([*tables]):
-        for field in tables[table].model_fields:
-            written[field] = f"{table}.{field}"
+        for key in tables[table].model_fields:
+            written[key] = f"{table}.{key}"
     if "method" in tables:
         written["fidelity"] = FIDELITY
     if here in tables:

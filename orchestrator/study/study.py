@@ -8,11 +8,10 @@ import itertools
 import math
 import os
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
-from hashlib import sha256
+from functools import cached_property, partial
 from numbers import Real
 from operator import attrgetter
 from pathlib import Path
@@ -33,23 +32,19 @@ from orchestrator.study.parts import Erosion, PileBed, Sizes, percentile
 from orchestrator.study.profile import WITH_X, Files
 from orchestrator.study.reading import (
     CONFIRMED,
-    MISSING,
-    MOST_BYTES,
     TIME_LIMIT_S,
-    UNKNOWN,
     Given,
-    at_points,
-    check_once,
+    Numbers,
     explained,
     fluid_of,
     place_of,
+    read,
+    scenes_at,
     tables_of,
-    values_of,
-    with_questions,
 )
 from orchestrator.study.scene import Scene, roughness_length
 from orchestrator.study.shapes import SHAPES
-from orchestrator.study.source import Source, decoded, find, presets, read_bytes
+from orchestrator.study.source import Source, presets
 
 BED = {"kind": "grain", "roughness": "d/30"}
 """Fields of a bed that a file may leave out."""
@@ -143,10 +138,10 @@ class Study:
         Winds and threshold of `orchestrator erosion`.
     text
         The file itself, and the texts of the files that it names.
-    units_confirmed
-        Whether the file says that the units of its numbers are meant.
     source
         Where the text came from; None if it was no file.
+    asked
+        What is said of numbers that are usual in another unit.
     """
 
     name: str  # the file's, without its ending
@@ -161,8 +156,8 @@ class Study:
     """The file itself, and the texts of the files that it names."""
     source: Source | None = None
     """None if the text came from elsewhere."""
-    units_confirmed: bool = False
-    """Whether numbers that are usual in another unit are meant as they are."""
+    asked: tuple[units.Remark, ...] = ()
+    """What is said of numbers that are usual in another unit; of a preset nothing."""
 
     @property
     def file(self) -> str:
@@ -177,48 +172,10 @@ class Study:
             found.update({scene.id: scene for scene in group.scenes})
         return tuple(found.values())
 
-    @cached_property
+    @property
     def questions(self) -> tuple[str, ...]:
-        """Questions on numbers that are usual in another unit; of a preset none."""
-        asked = units.questions(_values_of(self.scenes), {})
-        for sizes in dict.fromkeys(scene.grain.sizes for scene in self.scenes):
-            if isinstance(sizes, tuple):
-                asked += units.of_sieve([diameter for diameter, _ in sizes])
-        if self.units_confirmed:
-            asked = [one for one in asked if "?" not in one]  # remarks are left
-        if not asked:
-            return ()
-        for preset in presets().values():
-            if self.text == preset.read_text(encoding="utf-8"):
-                return ()
-        return tuple(asked)
-
-
-def _values_of(scenes: Sequence[Scene]) -> dict[str, list[float]]:
-    """The values that are asked about in some scenes."""
-    values = values_of(scenes)
-    # the diameter of a sieve table follows from its rows, the slope of a profile from
-    # its points
-    single = [
-        scene.grain for scene in scenes if not isinstance(scene.grain.sizes, tuple)
-    ]
-    values["grain.diameter"] = [grain.diameter for grain in single]
-    beds = [scene.bed for scene in scenes]
-    given = [bed for bed in beds if not (isinstance(bed, PileBed) and bed.profile)]
-    values["bed.slope_deg"] = [bed.slope_deg for bed in given]
-    return values
-
-
-def _sieve_in(parts: Mapping[str, Table], files: Files, where: str) -> list[float]:
-    """The diameters of a sieve table in the tables of one scene, which may be wrong."""
-    sizes = parts.get("grain", {}).get("sizes")
-    with suppress(InputError):
-        if isinstance(sizes, str):
-            sizes = files.sieve(sizes, where)
-    if not isinstance(sizes, list):
-        return []
-    firsts = [row[0] for row in sizes if isinstance(row, list) and row]
-    return [value for value in firsts if isinstance(value, int | float)]
+        """What is said of numbers that are usual in another unit, in words."""
+        return tuple(one.text for one in self.asked)
 
 
 def load(source: str | Path, tolerance: float | None = None) -> Study:
@@ -241,7 +198,6 @@ def load(source: str | Path, tolerance: float | None = None) -> Study:
     InputError
         With the file, the field and the remedy.
     """
-    path = find(source)
     given: Any = tolerance  # Python gives what it likes
     is_number = isinstance(given, Real) and not isinstance(given, bool)
     if given is not None and not (is_number and 0 < given < 1):
@@ -249,15 +205,12 @@ def load(source: str | Path, tolerance: float | None = None) -> Study:
         raise InputError(
             what, "tolerance", f"0.05 allows tau_c to be 5 % off; or {NO_TOLERANCE}"
         )
-    content = read_bytes(path, MOST_BYTES, str(source))
-    text = decoded(content, str(source))
-    files = Files(path.parent)
+    inputs = read(source)
+    files = Files(inputs.path.parent)
     # a file's name may be bytes that are no text; the page and the tables are text
-    name = os.fsencode(path.stem).decode("utf-8", "replace")
-    study = parse(text, name=name, where=str(path), files=files)
-    digests = {**files.digests, path.name: sha256(content).hexdigest()}
-    origin = Source(str(path.absolute()), digests, tolerance)
-    study = replace(study, source=origin)
+    name = os.fsencode(inputs.path.stem).decode("utf-8", "replace")
+    study = _study(inputs.tables, inputs.text, name, str(inputs.path), files)
+    study = replace(study, source=inputs.source(files.digests, tolerance))
     if tolerance is not None:
         study = replace(study, tolerance=tolerance)
     if study.questions:
@@ -292,17 +245,29 @@ def parse(text: str, *, name: str, where: str, files: Files | None = None) -> St
     InputError
         With the field and the remedy.
     """
-    data = tables_of(text, where)
+    if files is None:
+        files = Files(Path(where).parent)
+    return _study(tables_of(text, where), text, name, where, files)
+
+
+def _study(
+    data: Mapping[str, Any], text: str, name: str, where: str, files: Files
+) -> Study:
+    """The study of the tables of a file."""
     try:
         file = _File.model_validate(data)
     except ValidationError as error:
         raise _explained(error, where) from None
-    if files is None:
-        files = Files(Path(where).parent)
     files.carried = dict(file.profiles)
-    groups = _groups(file, where, files)
-    if not file.units_confirmed:
+    numbers = Numbers(partial(files.sieve, where=where))
+    groups = _groups(file, where, files, numbers)
+    asked = numbers.asked
+    if file.units_confirmed:
+        asked = [one for one in asked if not one.is_question]
+    else:
         _check_profiles(groups)
+    if any(text == path.read_text(encoding="utf-8") for path in presets().values()):
+        asked = []
     return Study(
         name=name,
         title=file.title or name,
@@ -312,7 +277,7 @@ def parse(text: str, *, name: str, where: str, files: Files | None = None) -> St
         cluster=file.cluster,
         erosion=file.erosion,
         text=text + files.added,
-        units_confirmed=file.units_confirmed,
+        asked=tuple(asked),
     )
 
 
@@ -329,7 +294,9 @@ def _check_profiles(groups: Sequence[Group]) -> None:
                 raise InputError(asked, f"{group.where}: bed.profile", remedy)
 
 
-def _groups(file: _File, where: str, files: Files) -> tuple[Group, ...]:
+def _groups(
+    file: _File, where: str, files: Files, numbers: Numbers
+) -> tuple[Group, ...]:
     """The groups of a study with their scenes, the force law of each decided."""
     tables_of = file.group or (_Group(),)
     places = [where]
@@ -346,7 +313,8 @@ def _groups(file: _File, where: str, files: Files) -> tuple[Group, ...]:
         tables = by_name(dict(file))
         for part, table in by_name(dict(group)).items():
             tables[part] |= table
-        listed.append([*_scenes(tables, axes, place, files)])
+        make = partial(make_scene, where=place, files=files)
+        listed.append([*scenes_at(tables, axes, place, make, numbers)])
         own = [
             f"{table}.{key}"
             for table, keys in by_name(dict(group)).items()
@@ -392,32 +360,6 @@ def _axes(file: "_File", table: "_Group", where: str) -> dict[str, list[Any]]:
         raise InputError(what, f"{where}: seeds", "leave out one of the two")
     axes[SEED] = [*range(seeds)]
     return axes
-
-
-def _scenes(
-    tables: Tables, axes: Mapping[str, list[Any]], where: str, files: Files
-) -> Iterator[Scene]:
-    """A scene for each combination of the axes' values.
-
-    Each must be a scene of its own.
-    """
-    points: dict[str, tuple[Any, ...]] = {}
-    for point, made in at_points(tables, axes, where):
-        scene = _scene_at(made, where, files)
-        check_once(points, scene.id, point, where)
-        yield scene
-
-
-def _scene_at(tables: Tables, where: str, files: Files) -> Scene:
-    """A scene; a refusal stands behind questions on numbers in another unit."""
-    try:
-        return make_scene(tables, where, files)
-    except InputError as error:
-        asked = units.of_sieve(_sieve_in(tables, files, where))
-        if asked and error.what not in (UNKNOWN, MISSING):
-            # the diameter and all that depends on it follow from the table
-            raise units.first(asked, error, where, ()) from None
-        raise with_questions(error, tables, where) from None
 
 
 def make_scene(

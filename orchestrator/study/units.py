@@ -6,7 +6,7 @@ is imported here, so that the command line starts at once.
 
 import math
 import re
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from orchestrator.errors import InputError
@@ -63,8 +63,29 @@ class Unit(NamedTuple):
     factor: float  # to the unit of the field
 
 
+class Remark(NamedTuple):
+    """What is said of a number that may not be meant as it stands.
+
+    Attributes
+    ----------
+    text
+        In words.
+    is_question
+        Whether the number may be in another unit: one that is confirmed is not asked
+        about.
+    """
+
+    text: str
+    is_question: bool = True
+
+
+DIAMETER, WIDE = "grain.diameter", 0.1
+"""Diameter from which on it is likelier in millimetres, m."""
+WIDEST_STONE, STONES = 3.0, (1500.0, 5000.0)
+"""Up to this diameter, m, a grain of such a density, kg/m3, may be riprap or a boulder
+in a liquid."""
 UNITS = (
-    Unit("grain.diameter", 0.1, math.inf, "{0:g} m: did you mean {0:g} mm", 1e-3),
+    Unit(DIAMETER, WIDE, math.inf, "{0:g} m: did you mean {0:g} mm", 1e-3),
     Unit("grain.density", 1e-300, 30.0, "{0:g} kg/m3: did you mean {0:g} g/cm3", 1e3),
     Unit(
         "bed.slope_deg", 0.05, 0.55, "{0:g} deg: did you mean {0:g} rad", TO_SI["rad"]
@@ -201,7 +222,7 @@ def questions(
     values: Mapping[str, Sequence[float]],
     names: Mapping[str, str],
     form: str = "{} = {:.4g}",
-) -> list[str]:
+) -> list[Remark]:
     """Questions on numbers that are usual in another unit, or that no fluid has.
 
     Parameters
@@ -216,13 +237,14 @@ def questions(
 
     Returns
     -------
-    list of str
+    list of Remark
         The questions.
 
     Examples
     --------
-    >>> questions({"grain.diameter": [0.25]}, {})
-    ['0.25 m: did you mean 0.25 mm, grain.diameter = 0.00025?']
+    >>> (asked,) = questions({"grain.diameter": [0.25]}, {})
+    >>> asked.text
+    '0.25 m: did you mean 0.25 mm, grain.diameter = 0.00025?'
     """
     asked = []
     for unit in UNITS:
@@ -230,11 +252,31 @@ def questions(
         if unit.low <= largest < unit.high:
             name = names.get(unit.field, unit.field)
             question = unit.question.format(largest)
-            asked.append(f"{question}, {form.format(name, largest * unit.factor)}?")
+            if unit.field == DIAMETER and _may_be_stone(values):
+                stone = f"{largest:g} m is a stone of {1e3 * largest:g} mm"
+                question = f"{stone}: or did you mean {largest:g} mm"
+            right = form.format(name, largest * unit.factor)
+            asked.append(Remark(f"{question}, {right}?"))
     return asked + _of_cohesion(values) + _of_fluid(values, names)
 
 
-def _of_cohesion(values: Mapping[str, Sequence[float]]) -> list[str]:
+def _may_be_stone(values: Mapping[str, Sequence[float]]) -> bool:
+    """Whether the wide grains may be riprap or boulders: stones in a liquid."""
+    names = (DIAMETER, "grain.density", "fluid.density")
+    grains = {*zip(*(values.get(name, ()) for name in names), strict=False)}
+    low, high = STONES
+    return (
+        bool(grains)
+        and all(
+            fluid >= GAS_BELOW and low <= density <= high
+            for diameter, density, fluid in grains
+            if diameter >= WIDE
+        )
+        and max(values[DIAMETER]) <= WIDEST_STONE
+    )
+
+
+def _of_cohesion(values: Mapping[str, Sequence[float]]) -> list[Remark]:
     """A remark on the smallest grain that its cohesion holds, if there is one."""
     names = ("grain.diameter", "fluid.density", "grain.cohesion")
     grains = {*zip(*(values.get(name, ()) for name in names), strict=False)}
@@ -246,12 +288,13 @@ def _of_cohesion(values: Mapping[str, Sequence[float]]) -> list[str]:
     if not held:
         return []
     what = "cohesion, which the force laws leave out, holds grains this small"
-    return [f"{min(held):g} m: {what}; they need a stronger flow"]
+    text = f"{min(held):g} m: {what}; they need a stronger flow"
+    return [Remark(text, is_question=False)]
 
 
 def _of_fluid(
     values: Mapping[str, Sequence[float]], names: Mapping[str, str]
-) -> list[str]:
+) -> list[Remark]:
     """A question on the first fluid with a viscosity that none of its density has."""
     densities = values.get("fluid.density", ())
     pairs = zip(densities, values.get("fluid.viscosity", ()), strict=False)
@@ -264,7 +307,8 @@ def _of_fluid(
             dynamic = f"{viscosity:g} m2/s, or {density * viscosity:.3g} Pa s"
             name = names.get("fluid.kind", "fluid.kind")
             question = f"is it right? {name} names water, seawater, air"
-            return [f"{dynamic}, is unusual for {density:g} kg/m3: {question}"]
+            what = f"{dynamic}, is unusual for {density:g} kg/m3"
+            return [Remark(f"{what}: {question}")]
     return []
 
 
@@ -292,7 +336,7 @@ def of_bed(name: str, length: float, height: float) -> str:
     return f"{name} is {what}: did you mean mm, {meant}?"
 
 
-def of_sieve(diameters: Sequence[float]) -> list[str]:
+def of_sieve(diameters: Sequence[float]) -> list[Remark]:
     """Ask about a sieve table with diameters that no sieve has.
 
     Parameters
@@ -302,48 +346,31 @@ def of_sieve(diameters: Sequence[float]) -> list[str]:
 
     Returns
     -------
-    list of str
+    list of Remark
         One question, or none.
     """
     if not diameters or max(diameters) < WIDEST:
         return []
     sizes = f"{min(diameters):g} to {max(diameters):g}"
-    return [f"grain.sizes are {sizes} m: did you mean mm? Divide the diameters by 1000"]
+    text = f"grain.sizes are {sizes} m: did you mean mm? Divide the diameters by 1000"
+    return [Remark(text)]
 
 
-def first(
-    asked: Sequence[str], refusal: InputError, where: str, names: Container[str]
-) -> InputError:
-    """A refusal behind the questions on the numbers that it may come from.
+def hinted(refusal: InputError, asked: Sequence[Remark]) -> InputError:
+    """Add to a refusal the questions on the numbers that it may come from.
 
     Parameters
     ----------
-    asked
-        The questions.
     refusal
-        Its place is `where` and the field that breaks a rule.
-    where
-        The study file, or the command.
-    names
-        What the fields that are asked about are called. A refusal of one of them stands
-        behind the question on that field alone.
+        The refusal.
+    asked
+        What is said of the numbers.
 
     Returns
     -------
     InputError
-        The refusal as it is where there is no such question.
+        The refusal with the questions behind its remedy.
     """
-    field = refusal.where.removeprefix(where).removeprefix(": ")
-    # the others are remarks
-    kept = [one for one in asked if "?" in one]
-    place = where
-    reason = f"{field}: {refusal.what}".removeprefix(": ")
-    if field in names:
-        kept = [one for one in kept if field in one]
-        place = refusal.where
-        reason = refusal.what
-    if not kept:
-        return refusal
-    if refusal.remedy:
-        reason = f"{reason}; {refusal.remedy}"
-    return InputError("; ".join(kept), place, f"else: {reason}")
+    questions = dict.fromkeys(one.text for one in asked if one.is_question)
+    remedy = "; ".join(filter(None, [refusal.remedy, *questions]))
+    return InputError(refusal.what, refusal.where, remedy)

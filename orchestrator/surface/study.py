@@ -6,10 +6,9 @@ What a grain by grain answer needs is refused here.
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
 
 from pydantic import Field, ValidationError
 
@@ -23,19 +22,16 @@ from orchestrator.study.keys import Table, Tables
 from orchestrator.study.parts import Drag, Fluid
 from orchestrator.study.reading import (
     CONFIRMED,
-    MOST_BYTES,
     TIME_LIMIT_S,
     Given,
-    at_points,
-    check_once,
+    Numbers,
     explained,
     fluid_of,
-    tables_of,
-    values_of,
-    with_questions,
+    read,
+    scenes_at,
 )
 from orchestrator.study.scene import roughness_length
-from orchestrator.study.source import Source, decoded, find, read_bytes
+from orchestrator.study.source import Source, decoded, read_bytes
 from orchestrator.surface.heights import Surface
 from orchestrator.surface.parts import (
     SurfaceBed,
@@ -88,8 +84,8 @@ class SurfaceStudy:
         The wind rose, if one is named.
     time_limit_s
         Wall time after which one run of the solver counts as hung, s.
-    units_confirmed
-        Whether the file says that the units of its numbers are meant.
+    questions
+        What is said of numbers that are usual in another unit.
     source
         What it was read from.
     """
@@ -100,23 +96,13 @@ class SurfaceStudy:
     erosion: SurfaceErosion
     rose: Rose | None
     time_limit_s: float
-    units_confirmed: bool
+    questions: tuple[str, ...]
     source: Source
 
     @property
     def file(self) -> str:
         """Absolute path of the study file."""
         return self.source.file
-
-    @cached_property
-    def questions(self) -> tuple[str, ...]:
-        """Questions on numbers that are usual in another unit."""
-        asked = units.questions(values_of(self.scenes), {})
-        if self.rose and self.rose.question:
-            asked.append(self.rose.question)
-        if self.units_confirmed:
-            asked = [one for one in asked if "?" not in one]  # remarks are left
-        return tuple(asked)
 
 
 def load(source: str | Path) -> SurfaceStudy | None:
@@ -137,36 +123,40 @@ def load(source: str | Path) -> SurfaceStudy | None:
     InputError
         With the file, the field and the remedy.
     """
-    path = find(source)
-    content = read_bytes(path, MOST_BYTES, str(source))
-    where = str(path)
-    tables = tables_of(decoded(content, str(source)), where)
-    bed = tables.get("bed")
+    inputs = read(source)
+    where = str(inputs.path)
+    bed = inputs.tables.get("bed")
     if not isinstance(bed, dict) or bed.get("kind") != KIND:
         return None
     rasterio(f"{where}: bed.kind")  # maps are written at the end of hours of runs
     try:
-        file = _File.model_validate(tables)
+        file = _File.model_validate(inputs.tables)
     except ValidationError as error:
         raise _explained(error, where) from None
-    files = _Files(path.parent, where)
+    files = _Files(inputs.path.parent, where)
     rose = None
     if file.erosion.wind is not None:
         rose = files.rose(file.erosion.wind)
-    scenes = tuple(_scenes(file, files))
+    numbers = Numbers()
+    scenes = tuple(_scenes(file, files, numbers))
     if rose and any(scene.fluid.density >= GAS_BELOW for scene in scenes):
         what = "the fluid is a liquid, and a wind rose is of air"
         raise InputError(what, f"{where}: erosion.wind", "leave it out")
-    digests = {**files.digests, path.name: sha256(content).hexdigest()}
+    asked = numbers.asked
+    if rose and rose.question:
+        asked.append(units.Remark(rose.question))
+    if file.units_confirmed:
+        asked = [one for one in asked if not one.is_question]
+    name = inputs.path.stem
     return SurfaceStudy(
-        name=path.stem,
-        title=file.title or path.stem,
+        name=name,
+        title=file.title or name,
         scenes=scenes,
         erosion=file.erosion,
         rose=rose,
         time_limit_s=file.time_limit,
-        units_confirmed=file.units_confirmed,
-        source=Source(str(path.absolute()), digests),
+        questions=tuple(one.text for one in asked),
+        source=inputs.source(files.digests),
     )
 
 
@@ -197,7 +187,7 @@ class _Files:
         return read_rose(decoded(content, where), path.name, where)
 
 
-def _scenes(file: _File, files: _Files) -> Iterator[SurfaceScene]:
+def _scenes(file: _File, files: _Files, numbers: Numbers) -> Iterator[SurfaceScene]:
     """A scene for each combination of the axes' values."""
     where = files.where
     count = math.prod(map(len, file.axes.values()))
@@ -208,15 +198,12 @@ def _scenes(file: _File, files: _Files) -> Iterator[SurfaceScene]:
     # what is no table stays, and the validation refuses it
     is_whole = isinstance(tables["method"].get("flow"), dict)
     tables["method.flow"] = tables["method"].pop("flow") if is_whole else {}
-    points: dict[SurfaceScene, tuple[Any, ...]] = {}
-    for point, made in at_points(tables, file.axes, where):
-        try:
-            scene = _scene(made, files)
-        except InputError as error:
-            raise with_questions(error, made, where) from None
+    make = partial(_scene, files=files)
+    for scene in scenes_at(
+        tables, file.axes, where, make, numbers, lambda scene: scene
+    ):
         if not file.units_confirmed:
             _check_size(scene.bed, where)
-        check_once(points, scene, point, where)
         yield scene
 
 
