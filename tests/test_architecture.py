@@ -10,6 +10,7 @@ from pathlib import Path
 
 import orchestrator
 from orchestrator.guests import GUESTS
+from orchestrator.solvers import dem
 from orchestrator.study.methods import METHODS
 from orchestrator.study.models import MODELS
 from orchestrator.study.shapes import SHAPES
@@ -140,3 +141,25 @@ def test_methods_models_and_shapes_are_asked_for_facts_and_never_for_their_names
             if found:
                 compared.append(f"{name}:{node.lineno} compares {', '.join(found)}")
     assert compared == []
+
+
+def test_one_module_knows_the_code_that_moves_grains() -> None:
+    code = "orchestrator.solvers.liggghts"
+    knowing = {name for name, other in _arrows() if other == code}
+    # doctor says whether each program is installed
+    assert knowing == {"orchestrator.solvers.dem", "orchestrator.solvers.doctor"}
+
+
+def test_all_that_is_asked_of_the_code_that_moves_grains_is_listed() -> None:
+    asked = set()
+    for path in MODULES.values():
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if not isinstance(node, ast.Attribute):
+                continue
+            if isinstance(node.value, ast.Name) and node.value.id == "ENGINE":
+                asked.add(node.attr)
+    listed = set()
+    for line in (dem.__doc__ or "").split("\n- ")[1:]:
+        listed |= set(re.findall(r"``(\w+)``", line.partition(":")[0]))
+    assert asked == listed
+    assert all(hasattr(dem.ENGINE, name) for name in listed)

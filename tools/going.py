@@ -40,7 +40,7 @@ from orchestrator.report import style
 from orchestrator.runs import case as cases
 from orchestrator.runs import engine
 from orchestrator.runs.case import Case
-from orchestrator.solvers import liggghts
+from orchestrator.solvers.dem import ENGINE
 from orchestrator.study.scene import Scene
 from orchestrator.types import BoolArray, FloatArray
 
@@ -209,7 +209,7 @@ class GoingCase(Case):
 
     def versions(self) -> dict[str, str]:
         """The programs that run the case, with their versions."""
-        return liggghts.programs(self.ranks)
+        return ENGINE.programs(self.ranks)
 
     @property
     def closed_form(self) -> float:
@@ -277,12 +277,12 @@ class GoingCase(Case):
             "ranks": self.ranks,
         }
         write_parameters(directory, numbers)
-        deck.write_numbers(directory / "load_steps.txt", self.flows)
+        ENGINE.write_numbers(directory / "load_steps.txt", self.flows)
         places = packed.places.xyz
         bounds = np.array([places.min(axis=0) - MARGIN, places.max(axis=0) + ROOM])
         bounds[:, 0] = (0.0, self.length)
         bounds[:, 1] = (0.0, packed.width)
-        deck.write_grains(
+        ENGINE.write_grains(
             directory,
             places * d,
             np.where(packed.mobile, 2, 1),
@@ -294,7 +294,7 @@ class GoingCase(Case):
 
     def collect(self, directory: Path) -> None:
         """Check the run."""
-        liggghts.check_log(directory)
+        ENGINE.check_log(directory)
         settling = directory / "settling.csv"
         if deck.read_table(settling)["grains"].nunique() > 1:
             what = "grains were lost before the flow rose"

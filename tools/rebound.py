@@ -18,12 +18,13 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import brentq
 
-from orchestrator.bed import deck, poured
+from orchestrator.bed import poured
 from orchestrator.bed.deck import DENSITY, DIAMETER, GRAVITY
 from orchestrator.bed.line import BedLine
 from orchestrator.bed.poured import PouredBed
 from orchestrator.runs import engine
 from orchestrator.runs.case import templates
+from orchestrator.solvers.dem import ENGINE
 
 RESTITUTIONS = (0.9, 0.55)
 """Of single grains of quartz, and as simulations of sand in bulk take it."""
@@ -145,7 +146,7 @@ def write(
     low, high = centres.min(axis=0) - 3, centres.max(axis=0) + 3
     low[1], high[1] = 0.0, WIDTH
     high[2] += 12
-    deck.write_grains(
+    ENGINE.write_grains(
         directory,
         centres * DIAMETER,
         np.where(bed["fixed"] == 1, 1, 2),

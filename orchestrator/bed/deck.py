@@ -1,9 +1,11 @@
-"""The decks of LIGGGHTS: contact law, protocol, cost, files written and dumps read."""
+"""Decks: grains that are moved in time, their contact law, protocol and cost.
+
+What they are written as is the engine's (`orchestrator.solvers.dem`).
+"""
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,8 @@ from numpy.typing import NDArray
 
 from orchestrator import digits
 from orchestrator.errors import SolverError
+from orchestrator.runs.case import Case
+from orchestrator.solvers.dem import ENGINE
 from orchestrator.study.method import GrainMethod
 from orchestrator.study.parts import Grain, Gusts, extremes
 from orchestrator.types import FloatArray, IntArray
@@ -121,6 +125,20 @@ SLOWED_BY = 700.0
 """Exposed grains of a poured bed that double its load steps: the more are exposed, the
 more often one passes before all have waited. Load steps of 2000 took four times as long
 as those of 100."""
+
+
+class DeckCase(Case):
+    """A case that moves grains in time, by the engine."""
+
+    def versions(self) -> dict[str, str]:
+        """The programs that run the case.
+
+        Returns
+        -------
+        dict of str to str
+            The version of each.
+        """
+        return ENGINE.programs(self.ranks)
 
 
 def protocol(
@@ -292,7 +310,7 @@ def write(
     ranks: int = 1,
     gusts: FloatArray = STEADY,
 ) -> None:
-    """Write the files of a deck into a copy of the template ``liggghts/bed``.
+    """Write the files of a deck into a copy of the engine's template ``bed``.
 
     Parameters
     ----------
@@ -321,7 +339,7 @@ def write(
     bounds = np.array([places.min(axis=0) - margin, places.max(axis=0) + margin])
     if grains.width:
         bounds[:, 1] = (0.0, grains.width * grains.diameter)
-    write_grains(
+    ENGINE.write_grains(
         directory,
         grains.position,
         grains.kind,
@@ -330,109 +348,19 @@ def write(
         bounds,
         present,
     )
-    write_parameters(directory, {**parameters, "width": grains.width, "ranks": ranks})
-    write_numbers(directory / "load_steps.txt", flows)
-    write_numbers(directory / "gusts.txt", gusts)
+    numbers = {**parameters, "width": grains.width, "ranks": ranks}
+    ENGINE.write_parameters(directory, numbers, MEANING)
+    ENGINE.write_numbers(directory / "load_steps.txt", flows)
+    ENGINE.write_numbers(directory / "gusts.txt", gusts)
     pushed = np.flatnonzero(grains.kind >= COUNTED)
     counted = np.flatnonzero(grains.kind == COUNTED)
     for place, axis in enumerate("xz"):
-        _write_sets(directory / f"force.{axis}.txt", pushed, force[:, pushed, place])
+        ENGINE.write_sets(
+            directory / f"force.{axis}.txt", pushed, force[:, pushed, place]
+        )
         # in these units displacement is one in the grain's own diameter
         direction = grains.along[None, counted, place] / grains.sizes[counted]
-        _write_sets(directory / f"along.{axis}.txt", counted, direction)
-
-
-def write_numbers(path: Path, values: FloatArray) -> None:
-    """Write numbers, one a line.
-
-    Parameters
-    ----------
-    path
-        The file.
-    values
-        The numbers.
-    """
-    path.write_text("".join(f"{digits.text(each)}\n" for each in values.tolist()))
-
-
-def _write_sets(path: Path, grains: IntArray, sets: FloatArray) -> None:
-    """Write values of grains as LIGGGHTS reads them: a count, then ids and values."""
-    rows = "".join(f"{number} {digits.FORMAT}\n" for number in (grains + 1).tolist())
-    with path.open("w") as stream:
-        for values in sets.tolist():
-            stream.write(f"{len(values)}\n{rows}" % tuple(values))
-
-
-def write_parameters(
-    directory: Path, values: Mapping[str, float | int | tuple[float, ...]]
-) -> None:
-    """Write ``parameters.liggghts``.
-
-    Parameters
-    ----------
-    directory
-        The directory of the deck.
-    values
-        A number for each variable, a tuple for each index.
-    """
-    lines = []
-    for name, value in values.items():
-        if isinstance(value, tuple):
-            text = f"index {' '.join(map(digits.text, value))}"
-        elif isinstance(value, int):
-            text = f"equal {value}"
-        else:
-            text = f"equal {digits.text(value)}"
-        lines.append(f"variable        {name} {text}  # {MEANING[name]}\n")
-    (directory / "parameters.liggghts").write_text("".join(lines))
-
-
-def write_grains(
-    directory: Path,
-    position: FloatArray,
-    kind: IntArray,
-    diameters: FloatArray,
-    density: float,
-    bounds: FloatArray,
-    order: IntArray,
-) -> None:
-    """Write ``grains.data``, in SI units with nine digits.
-
-    Parameters
-    ----------
-    directory
-        The directory of the deck.
-    position
-        Centres, m, shape (n, 3).
-    kind
-        Grain types, shape (n,).
-    diameters
-        Diameters, m, shape (n,).
-    density
-        Density of every grain, kg/m3.
-    bounds
-        Lower and upper ends of the box, m, shape (2, 3): so far from the grains that
-        rounding loses none.
-    order
-        Numbers of the grains that are written, in their order.
-    """
-    row = "%d %d" + 5 * f" {digits.FORMAT}" + "\n"
-    numbers = order.tolist()
-    kinds = kind[order].tolist()
-    sizes = diameters[order].tolist()
-    centres = position[order].tolist()
-    rows = []
-    for number, of_kind, size, centre in zip(
-        numbers, kinds, sizes, centres, strict=True
-    ):
-        rows.append(row % (number + 1, of_kind, size, density, *centre))
-    box = []
-    for axis, low, high in zip("xyz", *bounds.tolist(), strict=True):
-        box.append(f"{digits.text(low)} {digits.text(high)} {axis}lo {axis}hi\n")
-    head = "grains: id type diameter density x y z\n\n"
-    counts = f"{len(order)} atoms\n4 atom types\n\n"
-    text = f"{head}{counts}{''.join(box)}\nAtoms\n\n{''.join(rows)}"
-    (directory / "grains.data").write_text(text)
+        ENGINE.write_sets(directory / f"along.{axis}.txt", counted, direction)
 
 
 def read_texts(path: Path, rows: int = 1) -> dict[str, NDArray[Any]]:
@@ -487,42 +415,3 @@ def read_table(path: Path, rows: int = 1) -> pd.DataFrame:
     for name, texts in read_texts(path, rows).items():
         columns[name] = np.where(texts == "", "nan", texts).astype(float)
     return pd.DataFrame(columns)
-
-
-def read_dump(path: Path, columns: tuple[str, ...]) -> tuple[IntArray, pd.DataFrame]:
-    """Read a text dump.
-
-    Parameters
-    ----------
-    path
-        The file.
-    columns
-        Names of its columns.
-
-    Returns
-    -------
-    steps
-        The time step of each frame, also of one without a grain.
-    rows
-        A row for each grain of each frame, with its time step in ``step``.
-
-    Raises
-    ------
-    SolverError
-        If the file is missing, cut short or not a dump of these columns.
-    """
-    try:
-        text = path.read_text(encoding="ascii")
-        frames = [frame.split("\n", 8) for frame in text.split("ITEM: TIMESTEP\n")[1:]]
-        steps = np.array([int(frame[0]) for frame in frames])
-        counts = np.array([int(frame[2]) for frame in frames])
-        body = StringIO("".join(frame[8] for frame in frames))
-        names = list(columns)
-        rows = pd.read_csv(body, sep=r"\s+", names=names, header=None, low_memory=False)
-        is_whole = text.endswith("\n") and len(rows) == counts.sum()
-        if not is_whole or rows.isna().any(axis=None):
-            raise ValueError("it is cut short or has NaN")
-    except (OSError, ValueError, IndexError) as error:
-        what = f"the dump cannot be read: {error}"
-        raise SolverError(what, where=str(path), remedy="run the case again") from None
-    return steps, rows.assign(step=np.repeat(steps, counts))

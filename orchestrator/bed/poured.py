@@ -14,12 +14,11 @@ import pandas as pd
 
 from orchestrator import digits
 from orchestrator.bed import deck
-from orchestrator.bed.deck import DENSITY, DIAMETER, GRAVITY, WEIGHT
+from orchestrator.bed.deck import DENSITY, DIAMETER, GRAVITY, WEIGHT, DeckCase
 from orchestrator.bed.line import BedLine
 from orchestrator.bed.packing import APRON, Packing, Places, unshadowed, within
 from orchestrator.errors import InputError, Noisy, SolverError
-from orchestrator.runs.case import Case
-from orchestrator.solvers import liggghts
+from orchestrator.solvers.dem import ENGINE
 from orchestrator.study.parts import LogNormal, Range, Sizes
 from orchestrator.types import BoolArray, FloatArray
 
@@ -106,7 +105,7 @@ def drawn(
 
 
 @dataclass(frozen=True)
-class PouredBed(Case):
+class PouredBed(DeckCase):
     """The run that pours a bed into a mould of a bed line.
 
     All scenes with this bed share it. Lengths are in d.
@@ -141,7 +140,7 @@ class PouredBed(Case):
     width: float = 0.0
 
     kind: ClassVar[str] = "poured"
-    template: ClassVar[str] = "liggghts/poured"
+    template: ClassVar[str] = f"{ENGINE.TEMPLATES}/poured"
     recipe: ClassVar[int] = 6
     results: ClassVar[tuple[str, ...]] = (SETTLING, DUMP)
     derived: ClassVar[tuple[str, ...]] = (BED,)
@@ -172,7 +171,7 @@ class PouredBed(Case):
     @property
     def ranks(self) -> int:
         """Processes that the solver is run with."""
-        return liggghts.ranks(self._count)
+        return ENGINE.ranks(self._count)
 
     def check_size(self) -> None:
         """Refuse a mould that is too short or too large.
@@ -307,10 +306,6 @@ class PouredBed(Case):
             x += wide
         return places
 
-    def versions(self) -> dict[str, str]:
-        """The programs that run the case, with their versions."""
-        return liggghts.programs(self.ranks)
-
     @cached_property
     def grains(self) -> tuple[FloatArray, FloatArray]:
         """Centres of all grains, the fixed first, and their diameters, d."""
@@ -339,14 +334,14 @@ class PouredBed(Case):
             "drag": DRAG,
             "calm": CALM,
         }
-        deck.write_parameters(directory, parameters)
+        ENGINE.write_parameters(directory, parameters, deck.MEANING)
         self._write_cut(directory)
         margin = float(sizes.max()) + 1
         bounds = np.array([centres.min(axis=0) - margin, centres.max(axis=0) + margin])
         if self.width:
             bounds[:, 1] = (0.0, self.width)
         is_floor = np.arange(len(sizes)) < len(self.floor)
-        deck.write_grains(
+        ENGINE.write_grains(
             directory,
             centres * DIAMETER,
             np.where(is_floor, 1, 2),
@@ -365,11 +360,11 @@ class PouredBed(Case):
         raised = (z[:-1] + self.surface / run) * DIAMETER
         cut = {"x0": x[:-1], "x1": x[1:], "z0": raised, "slope": rise / run}
         for name, values in cut.items():
-            deck.write_numbers(directory / f"cut.{name}.txt", values)
+            ENGINE.write_numbers(directory / f"cut.{name}.txt", values)
 
     def collect(self, directory: Path) -> None:
         """See that the bed came to rest, and write its grains to ``bed.csv``."""
-        liggghts.check_log(directory)
+        ENGINE.check_log(directory)
         where = str(directory / SETTLING)
         last = deck.read_table(directory / SETTLING).groupby("stage").last()
         mean_energy = last["ke"] / last["grains"].clip(lower=1)
@@ -383,7 +378,7 @@ class PouredBed(Case):
             what = f"the poured bed does not come to rest: {grain}"
             remedy = "a gentler slope, or a larger grain.friction_angle_deg"
             raise Noisy(what, where, remedy)
-        _, rows = deck.read_dump(directory / DUMP, ("id", "x", "y", "z"))
+        _, rows = ENGINE.read_frames(directory / DUMP, ("id", "x", "y", "z"))
         number = rows["id"].to_numpy(np.int64) - 1
         _, sizes = self.grains
         bed = pd.DataFrame({f"{axis}_over_d": rows[axis] / DIAMETER for axis in "xyz"})

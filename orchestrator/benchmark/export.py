@@ -20,7 +20,7 @@ from orchestrator.grains.pile import Pile
 from orchestrator.plan import Plan
 from orchestrator.runs import case, engine, process
 from orchestrator.runs.workspace import Workspace
-from orchestrator.solvers import liggghts
+from orchestrator.solvers.dem import ENGINE
 from orchestrator.study import fields, study
 from orchestrator.study.criterion import GOES_ON
 from orchestrator.study.profile import Files
@@ -124,7 +124,7 @@ def _export_formulas(root: Path, levels: Collection[int]) -> int:
     asked = study.load("first-look")
     programs = {}
     if 2 in levels and _has_decks():
-        programs["liggghts"] = liggghts.version()
+        programs[ENGINE.PROGRAM] = ENGINE.version()
     listed = problems(asked, plan.make(asked), {}, Path(), _kinds(levels))
     return pack.write(root, listed, (asked.name, asked.text), programs)
 
@@ -136,7 +136,7 @@ def _kinds(levels: Collection[int]) -> list[str]:
 
 def _has_decks() -> bool:
     """Whether our check decks can be run."""
-    return shutil.which(liggghts.PROGRAM) is not None
+    return shutil.which(ENGINE.PROGRAM) is not None
 
 
 def _check_exportable(asked: Study, planned: Plan, where: str) -> None:
@@ -464,18 +464,16 @@ def run_check(
         If it does not come to its end.
     """
     shutil.rmtree(folder, ignore_errors=True)
-    shutil.copytree(case.templates() / "liggghts", folder)
+    shutil.copytree(case.templates() / ENGINE.TEMPLATES, folder)
     deck = f"in.{kind}"
-    command = ["stdbuf", "-o0", "liggghts", "-in", deck, "-nocite", "-log", "none"]
-    for name, value in _variables(kind, given).items():
-        command += ["-var", name, repr(value)]
+    command = ENGINE.command(deck, _variables(kind, given))
     log = folder / "log.check"
     ended = process.run(
         command,
         cwd=folder / "checks",
         log=log,
         limit_s=LIMIT_S,
-        env=liggghts.ENVIRONMENT,
+        env=ENGINE.ENVIRONMENT,
     )
     printed = log.read_text(errors="replace")
     if ended.returncode != 0 or "the check has ended" not in printed:

@@ -14,13 +14,12 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from orchestrator.bed import deck
-from orchestrator.bed.deck import DENSITY, DIAMETER, GRAVITY, WEIGHT
+from orchestrator.bed.deck import DENSITY, DIAMETER, GRAVITY, WEIGHT, DeckCase
 from orchestrator.grains import motion
 from orchestrator.grains.loads import forces
 from orchestrator.runs import process
-from orchestrator.runs.case import Case
 from orchestrator.runs.files import canonical_json
-from orchestrator.solvers import liggghts
+from orchestrator.solvers.dem import ENGINE
 from orchestrator.study.closed_form import closed_form
 from orchestrator.study.parts import Grain
 from orchestrator.study.scene import READ_LATER, Scene
@@ -49,10 +48,10 @@ BLOCK = 512
 """Most cells of a deck."""
 
 
-class GrainCase(Case):
+class GrainCase(DeckCase):
     """A case that runs the deck ``in.bed``."""
 
-    template: ClassVar[str] = "liggghts/bed"
+    template: ClassVar[str] = f"{ENGINE.TEMPLATES}/bed"
     results: ClassVar[tuple[str, ...]] = (
         "settling.csv",
         "samples.csv",
@@ -61,16 +60,6 @@ class GrainCase(Case):
     )
     derived: ClassVar[tuple[str, ...]] = ("load_steps.csv", "motion.csv")
     bulky: ClassVar[tuple[str, ...]] = ("passage.dump", "bed.dump")
-
-    def versions(self) -> dict[str, str]:
-        """The programs that run the case.
-
-        Returns
-        -------
-        dict of str to str
-            The version of each.
-        """
-        return liggghts.programs(self.ranks)
 
     def share(self, directory: Path) -> float:
         """Load steps that have begun over those that there may be.
@@ -165,7 +154,7 @@ class SingleGrainCase(GrainCase):
         directory
             The case, after `Allrun`.
         """
-        liggghts.check_log(directory)
+        ENGINE.check_log(directory)
         grains = self._grains()
         stiffness = self.scenes[0].method.grains.stiffness
         motion.check_rest(directory, grains, WEIGHT, stiffness, all_rest=False)

@@ -18,13 +18,13 @@ from orchestrator.bed.deck import (
     NOISE,
     SETTLE_FLOW,
     GrainTable,
-    read_dump,
     read_table,
     read_texts,
 )
 from orchestrator.bed.packing import across
 from orchestrator.digits import FORMAT
 from orchestrator.errors import Exploded, Noisy, SolverError
+from orchestrator.solvers.dem import ENGINE
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
 SETTLING = "settling.csv"
@@ -524,7 +524,7 @@ def _passage(path: Path, ids: IntArray, samples: pd.DataFrame) -> FloatArray:
 
     The shape is (numbers of a grain, T + 1, N), as in `PASSAGE_COLUMNS` after the id.
     """
-    steps, rows = read_dump(path, PASSAGE_COLUMNS)
+    steps, rows = ENGINE.read_frames(path, PASSAGE_COLUMNS)
     if rows.empty:
         remedy = "a smaller method.grains.time_step, or look for grains that overlap"
         raise Exploded("every counted grain was lost", where=str(path), remedy=remedy)
@@ -544,7 +544,7 @@ def _present(
     listed: BoolArray, directory: Path, ids: IntArray, samples: pd.DataFrame
 ) -> BoolArray:
     """Which grains were there at each sample: listed then, or later in that step."""
-    steps, rows = read_dump(directory / BED, BED_COLUMNS)
+    steps, rows = ENGINE.read_frames(directory / BED, BED_COLUMNS)
     load_step = samples["load_step"].to_numpy(np.int64)
     last = np.append(np.flatnonzero(np.diff(load_step)), len(load_step) - 1)
     if not np.array_equal(steps, samples["step"].to_numpy()[last]):

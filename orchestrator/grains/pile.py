@@ -34,7 +34,7 @@ from orchestrator.grains.motion import Motion
 from orchestrator.grains.threshold import PileThreshold, of_grains, of_pile
 from orchestrator.physics.gusts import gust_stresses
 from orchestrator.runs.case import Case
-from orchestrator.solvers import liggghts
+from orchestrator.solvers.dem import ENGINE
 from orchestrator.study import methods
 from orchestrator.study.criterion import GOES_ON
 from orchestrator.study.methods import ThresholdMethod
@@ -511,7 +511,7 @@ class PileCase(GrainCase):
     @property
     def ranks(self) -> int:
         """Processes that the solver is run with."""
-        return liggghts.ranks(self._size)
+        return ENGINE.ranks(self._size)
 
     @property
     def _size(self) -> int:
@@ -602,7 +602,7 @@ class PileCase(GrainCase):
 
     def collect(self, directory: Path) -> None:
         """Check the run and write what each counted grain did to ``motion.csv``."""
-        liggghts.check_log(directory)
+        ENGINE.check_log(directory)
         scene = self.scene
         loads, worn = self._state(directory.parent)
         grains = table(loads, worn)
@@ -624,7 +624,7 @@ class PileCase(GrainCase):
         left[grains.counted_ids - 1] = np.where(
             moved.level > 0, moved.flow[moved.level], np.inf
         )
-        steps, rows = deck.read_dump(directory / motion.BED, motion.BED_COLUMNS)
+        steps, rows = ENGINE.read_frames(directory / motion.BED, motion.BED_COLUMNS)
         last = rows[rows["step"] == steps[-1]]
         places = np.where((grains.kind == deck.FIXED)[:, None], worn.places, np.nan)
         places[last["id"] - 1] = last[["x", "z"]] / scene.grain.diameter

@@ -12,7 +12,6 @@ import pandas as pd
 from matplotlib import colormaps
 from PIL import Image
 
-from orchestrator.bed.deck import read_dump
 from orchestrator.bed.line import BedLine
 from orchestrator.digits import percent
 from orchestrator.grains import motion
@@ -22,6 +21,7 @@ from orchestrator.report import flows, labels, single
 from orchestrator.report.page import caption, fill
 from orchestrator.report.results import FRACTION, Results, split
 from orchestrator.report.style import Figure
+from orchestrator.solvers.dem import ENGINE
 from orchestrator.study import fields
 from orchestrator.types import FloatArray, IntArray
 
@@ -166,7 +166,9 @@ def _places_by_dem(pile: Pile, cases: Path) -> FloatArray:
     fixed = np.where(packing.mobile[:, None], np.nan, packing.centres)
     places = [packing.centres[None]]
     for run in method.runs:
-        steps, rows = read_dump(cases / run.name / motion.BED, motion.BED_COLUMNS)
+        steps, rows = ENGINE.read_frames(
+            cases / run.name / motion.BED, motion.BED_COLUMNS
+        )
         of_run = np.tile(fixed, (len(steps), 1, 1))
         ends = np.searchsorted(steps, rows["step"])
         of_run[ends, rows["id"] - 1] = rows[["x", "z"]] / d

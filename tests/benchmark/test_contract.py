@@ -21,6 +21,7 @@ from orchestrator.flow.stress import WallStress
 from orchestrator.grains import motion
 from orchestrator.grains.loads import Geometry
 from orchestrator.runs.case import templates
+from orchestrator.solvers.dem import ENGINE
 from orchestrator.study import study
 from tests.benchmark.conftest import NATIVE, ROOT
 from tests.benchmark.rules import (
@@ -144,7 +145,7 @@ def _rerun(case: Path, folder: Path) -> Iterator[Frame]:
             (place / motion.SAMPLES).read_bytes() for place in (folder, case)
         )
         assert again == before
-    steps, rows = deck.read_dump(folder / "every.dump", COLUMNS)
+    steps, rows = ENGINE.read_frames(folder / "every.dump", COLUMNS)
     frames = dict(iter(rows.groupby("step")))
     for step in steps.tolist():
         columns = (frames[step][name].tolist() for name in COLUMNS)

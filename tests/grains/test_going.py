@@ -15,6 +15,7 @@ from scipy.integrate import solve_ivp
 from orchestrator.bed import deck, poured
 from orchestrator.physics import velocity
 from orchestrator.physics.laws import CLIFT_GAUVIN
+from orchestrator.solvers.dem import ENGINE
 from orchestrator.study import study
 from orchestrator.types import FloatArray
 from tests.waiting import HANGS_S
@@ -84,7 +85,7 @@ def test_a_grain_in_a_flow_moves_as_its_equation_of_motion(tmp_path: Path) -> No
         assert along == pytest.approx(exact[2], rel=3e-3)
         assert height == pytest.approx(exact[1], abs=5e-3 * D)
     steps = deck.read_table(case / "going.csv")
-    _, gone = deck.read_dump(case / "gone.dump", ("id", "way"))
+    _, gone = ENGINE.read_frames(case / "gone.dump", ("id", "way"))
     way = mean.sol(looks["time"].iloc[-1] * UNIT)[0] - gust.y[0, -1]
     assert steps["went_on"].tolist() == [1]
     assert gone["id"].tolist() == [2]
@@ -107,7 +108,7 @@ def test_at_the_zero_level_the_drags_add_up_to_the_stress(tmp_path: Path) -> Non
     bounds = np.array([[0, 0, -2.0], [side, side, 10.0]]) * D
     every = np.arange(len(places))
     sizes = np.full(len(places), D)
-    deck.write_grains(case, places * D, kind, sizes, GRAIN, bounds, every)
+    ENGINE.write_grains(case, places * D, kind, sizes, GRAIN, bounds, every)
     parameters = case / "parameters.liggghts"
     text = parameters.read_text().replace("balance equal 0", "balance equal 1")
     parameters.write_text(text.replace("longest equal 10.0", "longest equal 1.0"))
