@@ -1,1 +1,1 @@
-"""The flow over the pile: its mesh, its OpenFOAM case, and the stress on the bed."""
+"""Flow models, the flow runs by OpenFOAM that some need, and the stress on the bed."""

@@ -219,7 +219,7 @@ class WornFlow(Case):
         return replace(self.geometry.flow, line=line)
 
 
-Flow = FlowCase | WornFlow
+FlowRun = FlowCase | WornFlow
 
 
 def rounds(scene: Scene) -> int:
@@ -239,7 +239,7 @@ def rounds(scene: Scene) -> int:
     return ceil(max(scene.threshold.fractions) / update - 1e-9) if update else 1
 
 
-def goal_part(scene: Scene, flow: Flow | None) -> float:
+def goal_part(scene: Scene, flow: FlowRun | None) -> float:
     """The part of the counted grains that has moved when the round of a flow ends.
 
     The last round goes on a little beyond the largest fraction that is asked for, whose
@@ -267,7 +267,7 @@ def goal_part(scene: Scene, flow: Flow | None) -> float:
     return round(part, 9)
 
 
-def goal(geometry: Geometry, flow: Flow | None) -> int:
+def goal(geometry: Geometry, flow: FlowRun | None) -> int:
     """Count the grains that have moved when the round of a flow ends.
 
     Parameters
@@ -285,7 +285,7 @@ def goal(geometry: Geometry, flow: Flow | None) -> int:
     return ceil(goal_part(geometry.scene, flow) * geometry.packing.count - 1e-9)
 
 
-def grains(geometry: Geometry, flow: Flow, cases: Path) -> Worn:
+def grains(geometry: Geometry, flow: FlowRun, cases: Path) -> Worn:
     """Find the grains as they were when the round of a flow began.
 
     Parameters
@@ -307,7 +307,7 @@ def grains(geometry: Geometry, flow: Flow, cases: Path) -> Worn:
     return Worn.whole(geometry.packing)
 
 
-def line(geometry: Geometry, flow: Flow, cases: Path) -> BedLine:
+def line(geometry: Geometry, flow: FlowRun, cases: Path) -> BedLine:
     """Find the bed line of the round of a flow.
 
     Parameters
@@ -329,7 +329,7 @@ def line(geometry: Geometry, flow: Flow, cases: Path) -> BedLine:
     return geometry.line
 
 
-def _loads(geometry: Geometry, flow: Flow, cases: Path) -> Loads:
+def _loads(geometry: Geometry, flow: FlowRun, cases: Path) -> Loads:
     """The grains in the round of a flow."""
     stress = WallStress.from_csv(cases / flow.name / WALL_STRESS)
     if not isinstance(flow, WornFlow):
@@ -338,7 +338,7 @@ def _loads(geometry: Geometry, flow: Flow, cases: Path) -> Loads:
     return geometry.under(stress, *worn)
 
 
-def peeled(geometry: Geometry, flow: Flow, cases: Path) -> Worn:
+def peeled(geometry: Geometry, flow: FlowRun, cases: Path) -> Worn:
     """Find the grains at the end of a round in which they leave by peeling.
 
     Parameters
@@ -883,7 +883,7 @@ class Peeling(Method):
 
     def last(self, cases: Path) -> Worn:
         """The grains of a bed that changes, when the last round has ended."""
-        flow: Flow = self.geometry.flow
+        flow: FlowRun = self.geometry.flow
         runs = self.cases
         if runs:
             flow = runs[-1]
@@ -1011,7 +1011,7 @@ class Pile(Geometry):
         return self.method.runs[-1]
 
     @property
-    def flows(self) -> tuple[Flow, ...]:
+    def flows(self) -> tuple[FlowRun, ...]:
         """The runs of the flow, one after another on a bed that changes."""
         worn = (run for run in self.method.cases if isinstance(run, WornFlow))
         return (*self.model.cases, *worn)

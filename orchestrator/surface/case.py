@@ -16,13 +16,13 @@ from orchestrator.flow.stress import Diagnostic
 from orchestrator.surface import mesh
 from orchestrator.surface.heights import Surface
 from orchestrator.surface.mesh import COARSE, Columns, Level, Sizes
-from orchestrator.surface.stress import SurfaceStress, own_diagnostics
+from orchestrator.surface.stress import SurfaceStress
 from orchestrator.types import FloatArray
 
 RESIDUAL = 1e-4
 """Residual of p at which the mean stress on a hill is within 0.1 % of where it ends."""
 RESIDUAL_OF_K = 3e-3
-"""The same of k."""
+"""Residual of k that ends the iterations with it."""
 MOST_ITERATIONS = 400
 """Iterations at which a flow is taken for one that cycles; others need 100 to 280."""
 ITERATIONS = 120
@@ -262,7 +262,15 @@ class SurfaceFlowCase(OpenFoamCase):
         self, stress: SurfaceStress, ustar0: float, directory: Path
     ) -> dict[str, Diagnostic]:
         """Collect the heights of the first cells, the reversed flow and the mesh."""
-        return own_diagnostics(stress, self.mesh)
+        over = stress.z_e_m / (self.first_cell / 2)
+        reversed_area = stress.area_m2[stress.tau_along < 0].sum()
+        return {
+            "least_z_e_over_nominal": Diagnostic(float(over.min()), sound_from=0.7),
+            "most_z_e_over_nominal": Diagnostic(float(over.max()), sound_to=1.5),
+            "reversed_area_m2": Diagnostic(float(reversed_area)),
+            "cells": Diagnostic(self.mesh.cells),
+            "shortest_cell_m": Diagnostic(float(np.diff(self.mesh.x).min())),
+        }
 
     def velocity(self, directory: Path) -> FloatArray:
         """Read the velocity in the cells, in the axes of the wind.

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from orchestrator.flow.stress import Diagnostic, Stress
+from orchestrator.flow.stress import Stress
 from orchestrator.surface.mesh import Columns
 from orchestrator.types import FloatArray
 
@@ -138,29 +138,3 @@ def faces_of(mesh: Columns) -> tuple[FloatArray, FloatArray, FloatArray]:
     vectors = triangles.sum(axis=0)
     normals = vectors / np.linalg.norm(vectors, axis=1)[:, None]
     return middles, normals, areas
-
-
-def own_diagnostics(stress: SurfaceStress, mesh: Columns) -> dict[str, Diagnostic]:
-    """Collect the diagnostics of a flow over a surface that not every flow has.
-
-    Parameters
-    ----------
-    stress
-        The stress on the bed.
-    mesh
-        The mesh.
-
-    Returns
-    -------
-    dict of str to Diagnostic
-        Each by its name.
-    """
-    over = stress.z_e_m / (mesh.first_cell / 2)
-    reversed_area = stress.area_m2[stress.tau_along < 0].sum()
-    return {
-        "least_z_e_over_nominal": Diagnostic(float(over.min()), sound_from=0.7),
-        "most_z_e_over_nominal": Diagnostic(float(over.max()), sound_to=1.5),
-        "reversed_area_m2": Diagnostic(float(reversed_area)),
-        "cells": Diagnostic(mesh.cells),
-        "shortest_cell_m": Diagnostic(float(np.diff(mesh.x).min())),
-    }
