@@ -68,7 +68,7 @@ TOPS = {"boundary layer": "layer", "open water": "open", "closed channel": "clos
 
 
 @dataclass(frozen=True)
-class FlowCase(OpenFoamCase):
+class FlowCase(OpenFoamCase[WallStress]):
     """Steady turbulent flow over a bed line, in a boundary layer or in a channel.
 
     The flow's u*/u*_0 depends on the shape, on z0/h, on the mesh, and hardly on U_e and

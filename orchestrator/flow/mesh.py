@@ -103,6 +103,27 @@ class Piece(NamedTuple):
         sum_over_first = float(expm1(self.cells * log(self.ratio)))
         return length * (self.ratio - 1) / sum_over_first
 
+    def ends(self, length: float) -> FloatArray:
+        """Ends of the cells.
+
+        Parameters
+        ----------
+        length
+            Length of all cells together.
+
+        Returns
+        -------
+        FloatArray
+            Their distances from the start of the first cell, in the same unit.
+
+        Examples
+        --------
+        >>> Piece(3, 2.0).ends(7.0).tolist()
+        [1.0, 3.0, 7.0]
+        """
+        over_first = np.cumsum(self.ratio ** np.arange(self.cells))
+        return np.asarray(over_first * length / over_first[-1])
+
     def reversed(self) -> "Piece":
         """The same cells, seen from their other end.
 
@@ -232,9 +253,9 @@ def along(line: BedLine, slope_deg: float, cells_per_face: int, growth: float) -
     lengths = np.diff(line.x)
     inner = _pieces(lengths[1:-1], sizes[1:-2], sizes[2:-1])
     far = growth_far(growth, cells_per_face)
-    upstream = _away(lengths[0], inner[0].first_cell(lengths[1]), far)
+    upstream = growing(lengths[0], inner[0].first_cell(lengths[1]), far)
     last_cell = inner[-1].reversed().first_cell(lengths[-2])
-    downstream = _away(lengths[-1], last_cell, far)
+    downstream = growing(lengths[-1], last_cell, far)
     return Grid(line, (upstream.reversed(), *inner, downstream))
 
 
@@ -353,10 +374,50 @@ def _count(length: float, shorter: float, longer: float) -> int:
     return max(whole_up(count), 1)
 
 
-def _away(length: float, first: float, growth: float) -> Piece:
-    """Cells that begin with `first` and grow until they fill a length."""
-    cells = whole_up(log(1 + length * (growth - 1) / first) / log(growth))
+def growing(length: float, first: float, growth: float) -> Piece:
+    """Cells that begin with one and grow until they fill a length.
+
+    Parameters
+    ----------
+    length
+        The length.
+    first
+        Length of the first cell, in the same unit.
+    growth
+        Ratio of neighbouring cells, at most.
+
+    Returns
+    -------
+    Piece
+        The cells.
+    """
+    cells = cells_in(length, first, growth)
     return Piece(cells, max(float(ratio_of(cells, first, length)), 1.0))
+
+
+def cells_in(length: float, first: float, growth: float) -> int:
+    """Count the cells that fill a length if they begin with one and grow.
+
+    Parameters
+    ----------
+    length
+        The length.
+    first
+        Length of the first cell, in the same unit.
+    growth
+        Ratio of neighbouring cells, at most.
+
+    Returns
+    -------
+    int
+        How many there are.
+
+    Examples
+    --------
+    >>> cells_in(7.0, 1.0, 2.0), cells_in(6.0, 1.0, 2.0)
+    (3, 3)
+    """
+    return max(whole_up(log(1 + length * (growth - 1) / first) / log(growth)), 1)
 
 
 def made_by_gmsh(directory: Path) -> "meshio.Mesh":

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib.metadata import version as installed
 from math import sqrt
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar, Generic, TypeVar
 
 import numpy as np
 
@@ -27,6 +27,8 @@ SPEED_HEIGHT = 10.0
 """Height above the flat bed at which U_e is given, h."""
 C_MU = 0.09
 """Coefficient of k-epsilon: omega = epsilon/(C_mu k)."""
+OnBed = TypeVar("OnBed", bound=Stress)
+"""Stress on a bed line or on a surface."""
 _FIELDS = ("U", "epsilon", "k", "nut", "omega", "p", "phi", "wallShearStress")
 """Fields of the last iteration; epsilon or omega, as the turbulence model has it."""
 
@@ -87,7 +89,7 @@ class Approach:
         start_from(fields / "omega", frequency / sqrt(C_MU))
 
 
-class OpenFoamCase(Case):
+class OpenFoamCase(Case, Generic[OnBed]):
     """Steady turbulent flow over a bed, from one direction, on one mesh."""
 
     template: ClassVar[str] = "openfoam/flow"
@@ -115,7 +117,7 @@ class OpenFoamCase(Case):
         """Expected number of iterations."""
 
     @abstractmethod
-    def stress(self, directory: Path) -> tuple[Stress, float]:
+    def stress(self, directory: Path) -> tuple[OnBed, float]:
         """Read the stress on the bed.
 
         Parameters
@@ -138,7 +140,7 @@ class OpenFoamCase(Case):
 
     @abstractmethod
     def own_diagnostics(
-        self, stress: Any, ustar0: float, directory: Path
+        self, stress: OnBed, ustar0: float, directory: Path
     ) -> dict[str, Diagnostic]:
         """Collect the diagnostics that not every flow has.
 

@@ -108,7 +108,7 @@ def _cells(form: Sizes, height: float, cell: float, level: Level) -> int:
 
 
 @dataclass(frozen=True)
-class SurfaceFlowCase(OpenFoamCase):
+class SurfaceFlowCase(OpenFoamCase[SurfaceStress]):
     """Steady turbulent flow of a boundary layer over a surface from one direction.
 
     The flow's u*/u*_0 depends on the shape, on the direction, on z0/h and on the mesh,

@@ -17,7 +17,7 @@ import numpy as np
 
 from orchestrator import digits
 from orchestrator.flow.foam import patch_types, write_faces
-from orchestrator.flow.mesh import ratio_of
+from orchestrator.flow.mesh import cells_in, growing, ratio_of
 from orchestrator.types import FloatArray, IntArray
 
 Heights = Callable[[FloatArray, FloatArray], FloatArray]
@@ -137,24 +137,10 @@ def axis(
     count = digits.whole_up((end - start) / cell)
     even = np.linspace(start, end, count + 1)
     cell = (end - start) / count
-    ahead = start - _outwards(cell, before, growth)[::-1]
-    after = end + _outwards(cell, behind, growth)
-    return np.concatenate([ahead, even, after])
-
-
-def _outwards(cell: float, length: float, growth: float) -> FloatArray:
-    """Ends of cells that grow from a cell of the given length, which they follow, m."""
-    first = cell * growth
-    count = _count(first, length, growth)
-    ratio = max(float(ratio_of(count, first, length)), 1.0)
-    ends = np.cumsum(ratio ** np.arange(count))
-    return np.asarray(ends * length / ends[-1])
-
-
-def _count(first: float, length: float, growth: float) -> int:
-    """How many cells fill a length if they grow from the first one."""
-    cells = np.log(1 + length * (growth - 1) / first) / np.log(growth)
-    return max(digits.whole_up(float(cells)), 1)
+    # the first cell outside is longer already
+    ahead = growing(before, cell * growth, growth).ends(before)
+    after = growing(behind, cell * growth, growth).ends(behind)
+    return np.concatenate([start - ahead[::-1], even, end + after])
 
 
 def grid_lines(
@@ -203,7 +189,7 @@ def rows(height: float, first_cell: float, level: Level) -> int:
     int
         The number.
     """
-    return _count(first_cell, LID * height, level.growth)
+    return cells_in(LID * height, first_cell, level.growth)
 
 
 @dataclass(frozen=True, eq=False)

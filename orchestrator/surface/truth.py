@@ -149,8 +149,7 @@ def _lines_of(section: FlowCase) -> FloatArray:
     lines = [np.array(grid.line.x[:1])]
     ends = zip(grid.line.x[:-1], grid.line.x[1:], strict=True)
     for (start, end), piece in zip(ends, grid.pieces, strict=False):
-        lengths = np.cumsum(piece.ratio ** np.arange(piece.cells))
-        lines.append(start + (end - start) * lengths / lengths[-1])
+        lines.append(start + piece.ends(end - start))
     return np.concatenate(lines)
 
 

@@ -1,6 +1,7 @@
 """What a flow over a bed line and one over a surface share, without a solver."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from orchestrator.types import FloatArray
 from tests.flow.conftest import PILE
 from tests.surface.test_case import flow, hill
 
-RUNS: dict[str, OpenFoamCase] = {"pile": PILE, "hill": flow(hill())}
+RUNS: dict[str, OpenFoamCase[Any]] = {"pile": PILE, "hill": flow(hill())}
 
 
 @pytest.mark.parametrize("name", RUNS)
