@@ -7,7 +7,7 @@ stress has its peaks.
 
 import threading
 from dataclasses import dataclass, replace
-from math import expm1, inf, log, radians, tan
+from math import inf, log, radians, tan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -75,34 +75,6 @@ class Piece(NamedTuple):
     cells: int
     ratio: float
 
-    def first_cell(self, length: float) -> float:
-        """Length of the first cell.
-
-        Parameters
-        ----------
-        length
-            Length of all cells together.
-
-        Returns
-        -------
-        float
-            The length, in the same unit.
-
-        Examples
-        --------
-        >>> round(Piece(3, 2.0).first_cell(7.0), 9)
-        1.0
-        >>> round(Piece(3, 0.5).first_cell(7.0), 9)
-        4.0
-        """
-        if self.ratio < 1:
-            last = Piece(self.cells, 1 / self.ratio).first_cell(length)
-            return last * self.ratio ** (1 - self.cells)
-        if self.ratio == 1:
-            return length / self.cells
-        sum_over_first = float(expm1(self.cells * log(self.ratio)))
-        return length * (self.ratio - 1) / sum_over_first
-
     def ends(self, length: float) -> FloatArray:
         """Ends of the cells.
 
@@ -158,13 +130,11 @@ class Grid:
     @property
     def shortest(self) -> tuple[float, float, float]:
         """Length of the shortest cell and the two ends of its piece, m."""
-        lengths = np.diff(self.line.x).tolist()
         cells = []
-        for piece, length in zip(self.pieces, lengths, strict=True):
-            growing = Piece(piece.cells, max(piece.ratio, 1 / piece.ratio))
-            cells.append(growing.first_cell(length))
+        for piece, length in zip(self.pieces, np.diff(self.line.x), strict=True):
+            cells.append(np.diff(piece.ends(length), prepend=0.0).min())
         at = int(np.argmin(cells))
-        return cells[at], self.line.x[at], self.line.x[at + 1]
+        return float(cells[at]), self.line.x[at], self.line.x[at + 1]
 
     def write(self, path: Path) -> None:
         """Write the bed line and the cells along it as `mesh.geo` includes them.
@@ -253,8 +223,9 @@ def along(line: BedLine, slope_deg: float, cells_per_face: int, growth: float) -
     lengths = np.diff(line.x)
     inner = _pieces(lengths[1:-1], sizes[1:-2], sizes[2:-1])
     far = growth_far(growth, cells_per_face)
-    upstream = growing(lengths[0], inner[0].first_cell(lengths[1]), far)
-    last_cell = inner[-1].reversed().first_cell(lengths[-2])
+    first_cell = inner[0].ends(lengths[1])[0]
+    upstream = growing(lengths[0], first_cell, far)
+    last_cell = inner[-1].reversed().ends(lengths[-2])[0]
     downstream = growing(lengths[-1], last_cell, far)
     return Grid(line, (upstream.reversed(), *inner, downstream))
 
