@@ -14,7 +14,7 @@ from unittest.mock import patch
 import numpy as np
 import pandas as pd
 
-from orchestrator.lab.validate import FOLDER, hoppers
+from orchestrator.lab.validate import FOLDER, measured
 from orchestrator.physics import saltation
 from orchestrator.physics.laws import SphereDrag
 from orchestrator.types import FloatArray
@@ -41,7 +41,7 @@ def main() -> pd.DataFrame:
     """Model over measurement of each row, by drag law."""
     rows = pd.read_csv(FOLDER / "cessation.csv")
     rows = rows[rows["set"] == SET].sort_values("d_m", ignore_index=True)
-    grains = hoppers(rows, RATIO)
+    grains = measured(rows, RATIO)
     table = rows[["source", "d_m", "shields"]].copy()
     table["clift_gauvin"] = saltation.thresholds(grains).cessation / rows["shields"]
     for column, level in LEVELS.items():

@@ -17,6 +17,7 @@ from matplotlib.patches import Arc, Circle
 
 import orchestrator
 from orchestrator.physics import saltation
+from orchestrator.physics.grain import Grain
 from orchestrator.report import style
 from orchestrator.types import FloatArray
 
@@ -201,7 +202,7 @@ def way(galileo: float, ratio: float, theta: float, gust: float) -> FloatArray:
     The steps are those of `saltation.fate` in vacuum, 200 to a hop.
     """
     bed = saltation.BEADS
-    grains = saltation.Grains(galileo, ratio)
+    grains = Grain.of_numbers(galileo, ratio)
     flow = saltation._Flow(grains, np.array([theta]), saltation.Gust(gust, 10.0), bed)
     speed = np.sqrt(2 * saltation.EXCESS * flow.trapped)
     angle = np.radians(saltation.LAUNCH_DEG)
@@ -226,8 +227,8 @@ def way(galileo: float, ratio: float, theta: float, gust: float) -> FloatArray:
 def hops() -> Canvas:
     """A grain that leaves its pocket in a gust: trapped again in water, going on in air."""
     canvas, panels = drawing(2.1, 2)
-    air = saltation.Grains.of(diameter=2.5e-4, density=2650.0, **AIR)
-    water = saltation.Grains.of(diameter=2.5e-4, density=2650.0, **WATER)
+    air = Grain(diameter=[2.5e-4], density=2650.0, **AIR)
+    water = Grain(diameter=[2.5e-4], density=2650.0, **WATER)
     for axes, name, each in zip(panels, ("water", "air"), (water, air), strict=True):
         path = way(float(each.galileo[0]), float(each.density_ratio[0]), THETA, PEAK)
         axes.plot(*path.T, color=ANSWER)

@@ -33,14 +33,15 @@ from orchestrator.bed.poured import BED, LAYER, PouredBed
 from orchestrator.errors import SolverError
 from orchestrator.grains.loads import Geometry
 from orchestrator.physics import saltation
-from orchestrator.physics.constants import GRAVITY
-from orchestrator.physics.curves import Air, iversen_white, soulsby_whitehouse
-from orchestrator.physics.laws import SAND_GRAIN
+from orchestrator.physics.constants import SAND_GRAIN
+from orchestrator.physics.curves import iversen_white, soulsby_whitehouse
+from orchestrator.physics.grain import Grain
 from orchestrator.report import style
 from orchestrator.runs import case as cases
 from orchestrator.runs import engine
 from orchestrator.runs.case import Case
 from orchestrator.solvers.dem import ENGINE
+from orchestrator.study.closed_form import single_grain
 from orchestrator.study.scene import Scene
 from orchestrator.types import BoolArray, FloatArray
 
@@ -215,15 +216,7 @@ class GoingCase(Case):
     def closed_form(self) -> float:
         """Shields number at which one grain goes on by the closed form."""
         scene = self.scene
-        fluid = scene.fluid
-        grains = saltation.Grains.of(
-            scene.grain.diameter,
-            density=scene.grain.density,
-            fluid_density=fluid.density,
-            viscosity=fluid.viscosity,
-            roughness=scene.bed.roughness,
-            gravity=fluid.gravity,
-        )
+        grains = single_grain(scene).flat
         found = saltation.under_gust(grains, scene.gust, self.gust_time)
         return float(found[0])
 
@@ -237,8 +230,7 @@ class GoingCase(Case):
     def flows(self) -> FloatArray:
         """Friction velocity of each load step, m/s."""
         scene = self.scene
-        excess = scene.grain.density / scene.fluid.density - 1
-        unit = math.sqrt(excess * scene.fluid.gravity * scene.grain.diameter)
+        unit = float(single_grain(scene).unit_ustar)
         first = math.sqrt(FIRST * self.closed_form) * unit
         rise = 1 + scene.method.grains.load_increment
         steps = digits.whole_up(math.log(LAST / FIRST) / 2 / math.log(rise))
@@ -424,15 +416,14 @@ def run(case: GoingCase, directory: Path) -> pd.DataFrame:
     steps = pd.read_csv(directory / case.name / GOING, comment="#")
     scene = case.scene
     d = scene.grain.diameter
-    excess = (scene.grain.density - scene.fluid.density) * scene.fluid.gravity * d
+    grain = single_grain(scene)
     exposed = case.packing(directory).count
     return pd.DataFrame(
         {
             "seed": scene.bed.seed,
-            "galileo": np.sqrt(excess * d**2 / scene.fluid.density)
-            / scene.fluid.viscosity,
-            "density_ratio": scene.grain.density / scene.fluid.density,
-            "shields": scene.fluid.density * steps["flow"] ** 2 / excess,
+            "galileo": float(grain.galileo),
+            "density_ratio": float(grain.density_ratio),
+            "shields": grain.shields(steps["flow"]),
             "closed_form": case.closed_form,
             "exposed": exposed,
             "moved": steps["moved"],
@@ -472,13 +463,15 @@ def measured(name: str) -> float:
     given = SETS[name]
     d = np.array(given["diameter"])
     fluid = given["fluid"]
-    excess = 2650.0 / fluid["density"] - 1
+    grain = Grain(
+        diameter=d,
+        density=2650.0,
+        fluid_density=fluid["density"],
+        viscosity=fluid["viscosity"],
+    )
     if fluid is AIR:
-        air = Air(2650.0, fluid["density"], fluid["viscosity"])
-        ustar = iversen_white(d, air)
-        return float(ustar**2 / (excess * GRAVITY * d))
-    dstar = d * (excess * GRAVITY / fluid["viscosity"] ** 2) ** (1 / 3)
-    return float(soulsby_whitehouse(dstar))
+        return float(grain.shields(iversen_white(grain)))
+    return float(soulsby_whitehouse(grain.dimensionless_diameter))
 
 
 def draw(table: pd.DataFrame) -> Canvas:

@@ -8,18 +8,20 @@ slope, the last of them fastest.
 
 import numpy as np
 
+from orchestrator.physics.grain import Grain
 from orchestrator.physics.saltation import (
     DENSITY_NODES,
     GALILEO_NODES,
     SLOPE_NODES_DEG,
-    Grains,
     thresholds,
     weakest_thresholds,
 )
 
 if __name__ == "__main__":
-    nodes = np.meshgrid(GALILEO_NODES, DENSITY_NODES, SLOPE_NODES_DEG, indexing="ij")
-    grains = Grains(*nodes)
+    galileo, density_ratio, slope_deg = np.meshgrid(
+        GALILEO_NODES, DENSITY_NODES, SLOPE_NODES_DEG, indexing="ij"
+    )
+    grains = Grain.of_numbers(galileo, density_ratio, slope_deg=slope_deg).flat
     found = thresholds(grains)
     at_most = weakest_thresholds(grains)
     columns = (found.steady, found.cessation, at_most.steady, at_most.cessation)

@@ -23,7 +23,7 @@ from orchestrator.lab.validate import (
     INTENSITY,
     MODELS,
     going_on,
-    hoppers,
+    measured,
     single,
 )
 from orchestrator.physics import saltation
@@ -40,7 +40,6 @@ from orchestrator.physics.beside import (
     NUMBERS_OF_STRIPS,
     OF_STRIPS,
 )
-from orchestrator.physics.constants import GRAVITY
 from orchestrator.physics.laws import DEFAULT, LAWS
 from orchestrator.physics.threshold import PAPER
 from orchestrator.study import fields as columns
@@ -126,15 +125,12 @@ def of_grains() -> pd.DataFrame:
     widest of those of its ends and of its middle.
     """
     beds = pd.read_csv(FOLDER / "beds.csv").rename(columns={"shields": "measured"})
-    excess = (beds["rho_sol_kg_m3"] / beds["rho_f_kg_m3"] - 1) * GRAVITY
-    galileo = np.sqrt(excess * beds["d_m"] ** 3) / beds["nu_m2_s"]
-    beds = beds.assign(
-        galileo=galileo, density_ratio=beds["rho_sol_kg_m3"] / beds["rho_f_kg_m3"]
-    )
+    grains = measured(beds)
+    beds = beds.assign(galileo=grains.galileo, density_ratio=grains.density_ratio)
     made: list[Row] = []
     for name, span in RATIOS.items():
         ratios = sorted({name, *span})
-        hops = {each: saltation.hops(hoppers(beds, each)) for each in ratios}
+        hops = {each: saltation.hops(measured(beds, each)) for each in ratios}
         further = {
             each: going_on(beds, GUST, leaves=False, ratio=each) for each in ratios
         }

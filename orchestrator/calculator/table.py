@@ -4,7 +4,6 @@ import itertools
 import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -24,14 +23,14 @@ from orchestrator.errors import InputError
 from orchestrator.physics import verdict
 from orchestrator.physics.beside import beside, measured_level_ustar
 from orchestrator.physics.constants import GAS_BELOW, GRAIN_COLUMNS
-from orchestrator.physics.laws import DEFAULT, LAWS, Exposure, law
+from orchestrator.physics.grain import Grain
+from orchestrator.physics.laws import DEFAULT, LAWS, law
 from orchestrator.physics.onset import Onset, of_grains
 from orchestrator.physics.reported import in_units
 from orchestrator.physics.threshold import (
     AUTO,
     LAWS_OF,
     PAPER,
-    SingleGrain,
     Threshold,
     default_laws,
     regime,
@@ -146,11 +145,12 @@ def _of_all_laws(
     Beside them is what the law of each row has against it.
     """
     inputs = {each.column: grains[name] for name, each in PARAMETERS.items()}
-    level = {**inputs, "alpha_deg": np.zeros(len(grains["diameter"]))}
-    by_law = {name: of_grains(inputs, name, criterion) for name in LAWS}
+    grain = Grain.of_table(inputs)
+    level = grain.changed(slope_deg=0.0)
+    by_law = {name: of_grains(grain, name, criterion) for name in LAWS}
     in_steady_flow = {name: at.leaving for name, at in by_law.items()}
     regimes = regime(in_steady_flow["low"], in_steady_flow["high"]).astype(object)
-    picked = _picked(asked, regimes, in_steady_flow[DEFAULT], grains)
+    picked = _picked(asked, regimes, in_steady_flow[DEFAULT], grain)
     blocks = []
     for name, at in by_law.items():
         block = _block(at, inputs)
@@ -266,20 +266,13 @@ def _criterion(points: Mapping[str, Any], asked: str) -> str:
 
 
 def _picked(
-    asked: str, regimes: NDArray[Any], by_default: Threshold, grains: Table
+    asked: str, regimes: NDArray[Any], by_default: Threshold, grain: Grain
 ) -> list[tuple[str, ...]]:
     """The laws that answer each point."""
     if asked == PAPER:
         return [LAWS_OF[regime] for regime in regimes]
     if asked == AUTO:
-        exposure = Exposure(
-            diameter=grains["diameter"],
-            roughness=grains["roughness"],
-            fluid_density=grains["fluid_density"],
-            viscosity=grains["viscosity"],
-            lift_coefficient=grains["lift_coefficient"],
-        )
-        names = default_laws(by_default.friction_velocity, exposure)
+        names = default_laws(by_default.friction_velocity, grain)
         return [(name,) for name in np.broadcast_to(names, len(regimes)).tolist()]
     return [(asked,)] * len(regimes)
 
@@ -299,8 +292,9 @@ def _grains(points: Mapping[str, Any]) -> Table:
         grains[name] = np.array(column, float)
     for index in np.flatnonzero(~_is_ordinary(grains)):
         point = {name: column[index] for name, column in given.items()}
-        for name, value in asdict(_as_scene(point)).items():
-            grains[name][index] = value
+        grain = _as_scene(point)
+        for name in GRAIN_COLUMNS:
+            grains[name][index] = getattr(grain, name)
     return grains
 
 
@@ -315,7 +309,7 @@ def _is_ordinary(grains: Table) -> NDArray[np.bool_]:
     return np.asarray(is_ordinary)
 
 
-def _as_scene(point: Mapping[str, Any]) -> SingleGrain:
+def _as_scene(point: Mapping[str, Any]) -> Grain:
     """The grain of a point as its scene has it; an `InputError` if it is no scene."""
     # most points need none of these modules, which load slowly
     from orchestrator.fidelity import limits

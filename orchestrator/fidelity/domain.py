@@ -24,7 +24,7 @@ from orchestrator.fidelity.classes import (
     scene_class,
 )
 from orchestrator.fidelity.fidelities import FIDELITIES
-from orchestrator.study.closed_form import outer_roughness
+from orchestrator.study.closed_form import outer_roughness, single_grain
 from orchestrator.study.criterion import GOES_ON, LEAVES
 from orchestrator.study.fields import FIELDS, SEED
 from orchestrator.study.fields import Quantity as Field
@@ -197,9 +197,7 @@ def _criterion(scene: Scene) -> Iterator[str]:
 
 
 def _galileo(scene: Scene) -> Iterator[float]:
-    fluid = scene.fluid
-    excess = (scene.grain.density / fluid.density - 1) * fluid.gravity
-    yield math.sqrt(excess * scene.grain.diameter**3) / fluid.viscosity
+    yield float(single_grain(scene).galileo)
 
 
 OBSTACLES = ("bed.obstacles",)

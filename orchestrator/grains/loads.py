@@ -30,7 +30,8 @@ from orchestrator.grains.peeling import (
 )
 from orchestrator.grains.sheltering import Shelter
 from orchestrator.physics import threshold
-from orchestrator.physics.laws import LAWS, Exposure
+from orchestrator.physics.grain import Grain
+from orchestrator.physics.laws import LAWS
 from orchestrator.physics.threshold import LIFT_OFF, check_known, root, thresholds_of
 from orchestrator.runs.files import state_of
 from orchestrator.study import methods
@@ -136,13 +137,11 @@ def forces(
     """
     law = LAWS[scene.forces.law]
     grain = single_grain(scene)
-    exposure = grain.exposure
     diameters = grain.diameter * np.asarray(sizes, float)
     heights = np.asarray(grain.roughness if gaps is None else gaps, float)
 
-    def exposed(ustar: ArrayLike) -> Exposure:
-        gap = heights - level(ustar)
-        return Exposure(**{**exposure.fields, "diameter": diameters, "gap": gap})
+    def exposed(ustar: ArrayLike) -> Grain:
+        return grain.changed(diameter=diameters, gap=heights - level(ustar))
 
     def drag(ustar: ArrayLike) -> FloatArray:
         return law.drag(ustar, exposed(ustar))
@@ -176,10 +175,8 @@ def on_slopes(scene: Scene, slopes_deg: FloatArray) -> FloatArray:
         itself, the limiting slope among them.
     """
     slopes, place = np.unique(np.round(slopes_deg, 9), return_inverse=True)
-    grain = single_grain(scene)
-    grains = [replace(grain, slope_deg=slope) for slope in slopes.tolist()]
-    found = thresholds_of(scene.forces.law, grains)
-    peaks = np.array([each.friction_velocity for each in found], float)
+    grains = single_grain(scene).changed(slope_deg=slopes)
+    peaks = thresholds_of(scene.forces.law, grains).friction_velocity
     check_known(peaks, scene.forces.law)
     speeds = peaks / np.sqrt(scene.gust)
     is_loose = speeds < LOOSE * float(closed_form(scene).friction_velocity)
@@ -814,14 +811,14 @@ class Loads:
         packed = self.geometry.packing
         sizes = packed.sizes[packed.windward]
         found, can_hop = hopping_on(scene, self._slopes_deg, sizes)
-        excess = (scene.grain.density / scene.fluid.density - 1) * scene.fluid.gravity
         endless = int(np.count_nonzero(can_hop & np.isnan(found)))
         if endless:
             what = f"from which flow on {endless} grains go on is not known: {NO_END}"
             where = f"scene {scene.id}: threshold.criterion"
             raise InputError(what, where, 'choose "leaves"')
         shields = np.where(can_hop, found, 0.0)
-        ustar = np.sqrt(shields * excess * scene.grain.diameter * sizes)
+        grain = single_grain(scene)
+        ustar = grain.changed(diameter=grain.diameter * sizes).ustar_at(shields)
         # the loads have the scene's own gusts already
         over = np.where(can_hop, np.sqrt(peak_of(scene) / scene.gust), 1.0)
         return self._undisturbed(ustar), over

@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 from orchestrator.bed.packing import Packing
 from orchestrator.grains import sheltering
 from orchestrator.grains.peeling import FINE_TABLE, RANGE, Force, ForceTable
-from orchestrator.physics.laws import CLIFT_GAUVIN, LAWS, Exposure
-from orchestrator.physics.threshold import weight
+from orchestrator.physics.grain import Grain
+from orchestrator.physics.laws import CLIFT_GAUVIN, LAWS
 from orchestrator.study.fidelities import Fields
 from orchestrator.types import FloatArray
 
@@ -60,8 +60,8 @@ def sphere(fields: Fields, galileo: float, *, clear: bool) -> float:
         level = _balanced_level(packing, gaps, galileo)
     gap = gaps[0] if "forces.exposure" in fields else ROUGHNESS
 
-    def around(ustar: ArrayLike) -> Exposure:
-        return Exposure(
+    def around(ustar: ArrayLike) -> Grain:
+        return Grain(
             diameter=1.0,
             roughness=ROUGHNESS,
             fluid_density=1.0,
@@ -117,7 +117,7 @@ def _balanced_level(
     def drag(ustar: FloatArray, sizes: FloatArray, above: FloatArray) -> FloatArray:
         return LAW.drag(
             ustar,
-            Exposure(
+            Grain(
                 diameter=sizes,
                 roughness=ROUGHNESS,
                 fluid_density=1.0,
@@ -169,17 +169,12 @@ def speed_of(density: float, tangent: float) -> float:
     0.379
     """
     # the roughness does not matter to a drag at a given speed
-    at = Exposure(
-        diameter=DIAMETER_M,
-        roughness=1e-4,
-        fluid_density=WATER_DENSITY,
-        viscosity=WATER_VISCOSITY,
-    )
-    submerged = weight(
+    at = Grain(
         diameter=DIAMETER_M,
         density=density,
         fluid_density=WATER_DENSITY,
+        viscosity=WATER_VISCOSITY,
     )
     speeds = np.geomspace(0.01, 1.0, 2001)
     drags = CLIFT_GAUVIN.force(speeds, at)
-    return float(np.interp(submerged * tangent, drags, speeds))
+    return float(np.interp(at.weight * tangent, drags, speeds))

@@ -17,6 +17,7 @@ from orchestrator.bed.packing import Packing, Places
 from orchestrator.grains import peeling, threshold
 from orchestrator.grains.loads import Geometry
 from orchestrator.grains.threshold import EQUAL_MOBILITY
+from orchestrator.study.closed_form import single_grain
 from orchestrator.study.fidelities import Fields
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import changed
@@ -98,13 +99,12 @@ class Strips:
             The strips.
         """
         scene = self.scenes[0]
-        d = scene.grain.diameter
-        excess = scene.grain.density / scene.fluid.density - 1
-        viscosity = float(np.sqrt(excess * scene.fluid.gravity * d**3) / galileo)
+        grain = single_grain(scene)
+        viscosity = float(grain.viscosity * grain.galileo / galileo)
         changes = {
             **fields,
             "fluid.viscosity": viscosity,
-            "grain.cohesion": bond * scene.weight / d,
+            "grain.cohesion": bond * scene.weight / scene.grain.diameter,
         }
         return [Geometry(changed(each, changes), self.cases) for each in self.scenes]
 
@@ -157,11 +157,7 @@ class Strips:
         )
         bond = bed.scene.bond
         ustar = peeling.pivots(places, packed.sizes, loading, loads.tables, bond)
-        grain = bed.scene.grain
-        fluid = bed.scene.fluid
-        excess = (grain.density - fluid.density) * fluid.gravity
-        unit = excess * grain.diameter / fluid.density
-        shields = ustar[packed.windward] ** 2 / unit
+        shields = single_grain(bed.scene).shields(ustar[packed.windward])
         return Counted(shields, packed.sizes[packed.windward], bed.is_free)
 
     def shields(

@@ -21,12 +21,13 @@ from orchestrator.flow.stress import WallStress, bubble
 from orchestrator.lab.sphere import speed_of, sphere
 from orchestrator.lab.strips import PERCENTILES, ROUGH, Strips
 from orchestrator.physics import saltation
-from orchestrator.physics.constants import GAS_BELOW, GRAVITY, LIFT_COEFFICIENT
+from orchestrator.physics.constants import GAS_BELOW
+from orchestrator.physics.grain import Grain
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import CLIFT_GAUVIN, LAWS
 from orchestrator.physics.measured import kirchner_pivot
 from orchestrator.physics.onset import Criteria, Onset, of_grains
-from orchestrator.physics.threshold import LAWS_OF, PAPER, weight
+from orchestrator.physics.threshold import LAWS_OF, PAPER
 from orchestrator.report import style
 from orchestrator.report.card import Card, Number, Worth
 from orchestrator.report.page import Section
@@ -45,8 +46,6 @@ INTENSITY = 0.4
 """Intensity of the wall stress under gusts: standard deviation over mean."""
 EVENTS = 100
 """Of so many events the largest moves a grain."""
-GIVEN = ("d_m", "rho_sol_kg_m3", "rho_f_kg_m3", "nu_m2_s", "cohesion_n_m")
-"""Columns of measured beds that those of a grain are, too."""
 FREE = 5000.0
 """Particle Reynolds number of the spheres whose drag was measured, about."""
 ENOUGH = 1.5
@@ -164,16 +163,8 @@ def single(
     Onset
         Thresholds of leaving the pocket, of shape (rows,).
     """
-    table = {
-        **{name: beds[name] for name in GIVEN},
-        # a bed that falls with the flow has a positive slope in the table
-        "alpha_deg": -np.degrees(np.arctan(beds["slope"])),
-        "beta_deg": beta_deg,
-        "z0_m": beds["d_m"] / ratio,
-        "alpha_s": LIFT_COEFFICIENT,
-        "g_m_s2": GRAVITY,
-    }
-    return of_grains(table, law)
+    grain = measured(beds, ratio).changed(entrainment_angle_deg=beta_deg)
+    return of_grains(grain, law)
 
 
 def over_hump(stress: WallStress) -> pd.DataFrame:
@@ -233,15 +224,15 @@ def going_on(
     FloatArray
         Shields numbers of the mean flow, of shape (rows,).
     """
-    grains = hoppers(beds, ratio)
+    grains = measured(beds, ratio)
     if not leaves:
         return saltation.tabulated(grains).initiation(gust)
     steady = single(beds, "bridged-gravel", 60, ratio).shields
     return Criteria(steady, grains, gust).shields
 
 
-def hoppers(beds: pd.DataFrame, ratio: float = 30) -> saltation.Grains:
-    """Make the grains of measured beds as they hop.
+def measured(beds: pd.DataFrame, ratio: float = 30) -> Grain:
+    """Make the grains of measured beds.
 
     Parameters
     ----------
@@ -252,18 +243,21 @@ def hoppers(beds: pd.DataFrame, ratio: float = 30) -> saltation.Grains:
 
     Returns
     -------
-    Grains
-        The grains; in a liquid the surface of the flow falls with the bed.
+    Grain
+        The grains, of shape (rows,); in a liquid the surface of the flow falls with the
+        bed.
     """
-    slope = np.arctan(beds["slope"])
+    slope = np.arctan(beds["slope"].to_numpy(float))
     is_liquid = beds["rho_f_kg_m3"] >= GAS_BELOW
-    return saltation.Grains.of(
-        beds["d_m"],
+    return Grain(
+        diameter=beds["d_m"],
         density=beds["rho_sol_kg_m3"],
         fluid_density=beds["rho_f_kg_m3"],
         viscosity=beds["nu_m2_s"],
+        # a bed that falls with the flow has a positive slope in the table
         slope_deg=-np.degrees(slope),
         roughness=beds["d_m"] / ratio,
+        cohesion=beds["cohesion_n_m"],
         fall=np.where(is_liquid, np.sin(slope), 0.0),
     )
 
@@ -336,7 +330,7 @@ def compared(
         }
     )
     ends = pd.read_csv(FOLDER / "cessation.csv").rename(columns={"shields": "measured"})
-    ceases = saltation.tabulated(hoppers(ends)).cessation
+    ceases = saltation.tabulated(measured(ends)).cessation
     without_gusts: dict[str, _Answers] = {}
     rows = []
     for model in MODELS:
@@ -375,17 +369,11 @@ def compared(
 def _measured_beds() -> pd.DataFrame:
     """The measured beds, with Galileo number and pull of a contact over the weight."""
     beds = pd.read_csv(FOLDER / "beds.csv").rename(columns={"shields": "measured"})
-    excess = beds["rho_sol_kg_m3"] / beds["rho_f_kg_m3"] - 1
-    velocity = np.sqrt(excess * GRAVITY * beds["d_m"] ** 3)
-    submerged = weight(
-        diameter=beds["d_m"],
-        density=beds["rho_sol_kg_m3"],
-        fluid_density=beds["rho_f_kg_m3"],
-    )
+    grains = measured(beds)
     return beds.assign(
-        galileo=velocity / beds["nu_m2_s"],
+        galileo=grains.galileo,
         sure=READ,
-        bond=beds["cohesion_n_m"] * beds["d_m"] / submerged,
+        bond=grains.cohesion * grains.diameter / grains.weight,
     )
 
 

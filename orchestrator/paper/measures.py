@@ -21,7 +21,8 @@ from orchestrator.paper.evidence import (
     parts,
 )
 from orchestrator.physics import curves
-from orchestrator.physics.laws import LAWS, Exposure
+from orchestrator.physics.grain import Grain
+from orchestrator.physics.laws import LAWS
 from orchestrator.study.method import HELD_FROM
 from orchestrator.types import FloatArray, IntArray
 
@@ -148,7 +149,7 @@ def constant(evidence: Evidence) -> Comparisons:
     for (beta, z0), series in parts(flat, "beta_deg", "z0_over_d"):
         if len(series) < 2:
             continue
-        unit = Exposure(
+        unit = Grain(
             diameter=1.0,
             roughness=z0,
             fluid_density=1.0,
@@ -604,7 +605,7 @@ def _within_drag_law(name: str, table: pd.DataFrame) -> Comparisons:
     high = table[(table["force_law"] == "high") & table["reynolds"].notna()]
     if high.empty:
         return
-    unit = Exposure(
+    unit = Grain(
         diameter=1.0,
         roughness=high["z0_over_d"].to_numpy(float),
         fluid_density=1.0,

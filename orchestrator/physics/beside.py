@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.physics.constants import GAS_BELOW, LIFT_COEFFICIENT
-from orchestrator.physics.curves import Air, shao_lu, soulsby_whitehouse
+from orchestrator.physics.curves import shao_lu, soulsby_whitehouse
+from orchestrator.physics.grain import Grain
 from orchestrator.physics.measured import VISUAL
-from orchestrator.physics.threshold import weight
 from orchestrator.types import BoolArray, FloatArray
 
 FIELD = (0.0110, 0.0126, 0.0129)
@@ -90,13 +90,12 @@ def beside(table: Any) -> dict[str, FloatArray]:
         The columns `MEASURED` and `TESTED`, each of shape (n,).
     """
     reynolds = np.asarray(table["reynolds"], float)
-    density = np.asarray(table["rho_sol_kg_m3"], float)
-    fluid_density = np.asarray(table["rho_f_kg_m3"], float)
-    is_gas = fluid_density < GAS_BELOW
-    curve = _curve(table)
+    grain = _grain(table)
+    is_gas = grain.fluid_density < GAS_BELOW
+    curve = _curve(grain)
     rows = np.where(is_gas, _of_field(reynolds).T, _of_flumes(reynolds).T)
     # of other grains nothing was measured, whatever a curve says
-    is_alike = _is_alike(density / fluid_density, is_gas)
+    is_alike = _is_alike(grain.density_ratio, is_gas)
     curve = np.where(is_alike, curve, np.nan)
     rows = np.where(is_alike, rows, np.array(NO_ROWS)[:, None])
     held = tested(table)
@@ -106,18 +105,22 @@ def beside(table: Any) -> dict[str, FloatArray]:
     return dict(zip((*MEASURED, *TESTED), [curve, *rows, *held], strict=True))
 
 
-def _curve(table: Any) -> FloatArray:
+def _grain(table: Any) -> Grain:
+    """The grains of a table in their fluids."""
+    return Grain(
+        diameter=table["d_m"],
+        density=table["rho_sol_kg_m3"],
+        fluid_density=table["rho_f_kg_m3"],
+        viscosity=table["nu_m2_s"],
+        gravity=table["g_m_s2"],
+    )
+
+
+def _curve(grain: Grain) -> FloatArray:
     """Shields number of each grain by the published curve of its medium."""
-    diameter = np.asarray(table["d_m"], float)
-    density = np.asarray(table["rho_sol_kg_m3"], float)
-    fluid_density = np.asarray(table["rho_f_kg_m3"], float)
-    viscosity = np.asarray(table["nu_m2_s"], float)
-    gravity = np.asarray(table["g_m_s2"], float)
-    excess = (density / fluid_density - 1) * gravity
-    air = Air(density, fluid_density, viscosity, gravity)
-    in_gas = shao_lu(diameter, air) ** 2 / (excess * diameter)
-    in_liquid = soulsby_whitehouse(diameter * (excess / viscosity**2) ** (1 / 3))
-    return np.where(fluid_density < GAS_BELOW, in_gas, in_liquid)
+    in_gas = grain.shields(shao_lu(grain))
+    in_liquid = soulsby_whitehouse(grain.dimensionless_diameter)
+    return np.where(grain.fluid_density < GAS_BELOW, in_gas, in_liquid)
 
 
 def measured_level_ustar(table: Any) -> FloatArray:
@@ -134,14 +137,11 @@ def measured_level_ustar(table: Any) -> FloatArray:
         Friction velocity, m/s: in a liquid that of the median of the flumes where they
         have rows, else that of the curve. NaN where nothing was measured.
     """
-    density = np.asarray(table["rho_f_kg_m3"], float)
+    grain = _grain(table)
     median = np.asarray(table["measured_median"], float)
-    has_rows = (density >= GAS_BELOW) & np.isfinite(median)
+    has_rows = (grain.fluid_density >= GAS_BELOW) & np.isfinite(median)
     theta = np.where(has_rows, median, np.asarray(table["measured_curve"], float))
-    excess = np.asarray(table["rho_sol_kg_m3"], float) - density
-    of_weight = excess * np.asarray(table["g_m_s2"], float)
-    of_weight = of_weight * np.asarray(table["d_m"], float)
-    return np.asarray(np.sqrt(theta * of_weight / density))
+    return grain.ustar_at(theta)
 
 
 def _is_alike(density_ratio: FloatArray, is_gas: BoolArray) -> BoolArray:
@@ -314,29 +314,18 @@ def _interval(row: Mapping[str, str]) -> Interval:
 
 def _columns(table: Any) -> dict[str, NDArray[Any]]:
     """What tested intervals are told apart by, of some thresholds."""
-    diameter = np.asarray(table["d_m"], float)
-    density = np.asarray(table["rho_sol_kg_m3"], float)
-    fluid_density = np.asarray(table["rho_f_kg_m3"], float)
+    grain = _grain(table)
     cohesion = np.asarray(table["cohesion_n_m"], float)
-    pull_over_weight = (
-        cohesion
-        * diameter
-        / weight(
-            diameter=diameter,
-            density=density,
-            fluid_density=fluid_density,
-            gravity=np.asarray(table["g_m_s2"], float),
-        )
-    )
+    pull_over_weight = cohesion * grain.diameter / grain.weight
     columns: dict[str, NDArray[Any]] = {
-        "medium": np.where(fluid_density < GAS_BELOW, GAS, LIQUID),
+        "medium": np.where(grain.fluid_density < GAS_BELOW, GAS, LIQUID),
         "force_law": np.asarray(table["force_law"], object),
-        "criterion": np.full(len(diameter), LEAVES, object),
+        "criterion": np.full(grain.shape, LEAVES, object),
         "reynolds": np.asarray(table["reynolds"], float),
-        "density_ratio": density / fluid_density,
+        "density_ratio": grain.density_ratio,
         "alpha_deg": np.asarray(table["alpha_deg"], float),
         "beta_deg": np.asarray(table["beta_deg"], float),
-        "d_over_z0": diameter / np.asarray(table["z0_m"], float),
+        "d_over_z0": grain.diameter / np.asarray(table["z0_m"], float),
         "cohesion_n_m": np.where(pull_over_weight < LIKE, 0.0, cohesion),
     }
     if "criterion" in table:

@@ -13,6 +13,8 @@ GAS_BELOW = 100.0
 """Density that tells gases from liquids, kg/m3: Venus has 65 at its ground."""
 LIFT_COEFFICIENT = 1.615
 """Saffman's 6.46 for the radius, over 4 for the squared diameter."""
+SAND_GRAIN = 30.0
+"""Nikuradse's equivalent sand-grain roughness over z0."""
 GRAIN_COLUMNS = {
     "diameter": "d_m",
     "roughness": "z0_m",
@@ -25,4 +27,4 @@ GRAIN_COLUMNS = {
     "gravity": "g_m_s2",
     "cohesion": "cohesion_n_m",
 }
-"""Columns of tables with the quantities of `SingleGrain`, by its attributes."""
+"""Columns of tables with the quantities of `Grain`, by its attributes."""

@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from orchestrator.physics.constants import GRAVITY
+from orchestrator.physics.grain import Grain
 from orchestrator.types import FloatArray
 
 Formula = Callable[[FloatArray], FloatArray]
@@ -217,143 +217,84 @@ WATER = (
 """Curves fitted to grains in liquids."""
 
 
-@dataclass(frozen=True)
-class Air:
-    """The grains and the gas that a curve for air is drawn for.
-
-    Attributes
-    ----------
-    density
-        Density of the grains, kg/m3.
-    fluid_density
-        Density of the gas, kg/m3.
-    viscosity
-        Kinematic viscosity of the gas, m2/s.
-    gravity
-        Acceleration of gravity, m/s2.
-    """
-
-    density: float | FloatArray
-    fluid_density: float | FloatArray
-    viscosity: float | FloatArray
-    gravity: float | FloatArray = GRAVITY
-
-    def shields_diagram(
-        self,
-        d: FloatArray,
-        ustar: FloatArray,
-    ) -> tuple[FloatArray, FloatArray]:
-        """Place thresholds in the Shields diagram.
-
-        Parameters
-        ----------
-        d
-            Diameters, m.
-        ustar
-            Threshold friction velocities, m/s, of the shape of the diameters.
-
-        Returns
-        -------
-        reynolds, theta
-            Re* and theta_c, of the same shape.
-
-        Examples
-        --------
-        >>> sand = Air(density=2650.0, fluid_density=1.2, viscosity=1.5e-5)
-        >>> reynolds, theta = sand.shields_diagram(np.array(3e-4), np.array(0.3))
-        >>> print(f"{reynolds:.3g} {theta:.3g}")
-        6 0.0139
-        """
-        excess = (self.density - self.fluid_density) * self.gravity * d
-        reynolds = ustar * d / self.viscosity
-        theta = self.fluid_density * ustar**2 / excess
-        return reynolds, theta
-
-
-def bagnold(diameter: FloatArray, air: Air) -> FloatArray:
+def bagnold(grain: Grain) -> FloatArray:
     """Threshold friction velocity of Bagnold (1941), with A = 0.1.
 
     Parameters
     ----------
-    diameter
-        Diameters of the grains, m, an array of any shape.
-    air
-        The grains and the gas.
+    grain
+        The grains in their gas.
 
     Returns
     -------
     FloatArray
-        Threshold friction velocity, m/s, of the same shape.
+        Threshold friction velocity, m/s, of the shape of the grains.
 
     Examples
     --------
-    >>> sand = Air(density=2650.0, fluid_density=1.2, viscosity=1.5e-5)
-    >>> print(bagnold(np.array([3e-4]), sand).round(4))
+    >>> air = {"fluid_density": 1.2, "viscosity": 1.5e-5}
+    >>> print(bagnold(Grain(diameter=[3e-4], density=2650.0, **air)).round(4))
     [0.2549]
     """
-    excess = air.density / air.fluid_density - 1
-    return 0.1 * np.sqrt(excess * air.gravity * diameter)
+    return np.asarray(0.1 * grain.unit_ustar)
 
 
-def shao_lu(diameter: FloatArray, air: Air) -> FloatArray:
+def shao_lu(grain: Grain) -> FloatArray:
     """Threshold friction velocity of Shao and Lu (2000), with a cohesion of 3e-4 N/m.
 
     Parameters
     ----------
-    diameter
-        Diameters of the grains, m, an array of any shape.
-    air
-        The grains and the gas.
+    grain
+        The grains in their gas.
 
     Returns
     -------
     FloatArray
-        Threshold friction velocity, m/s, of the same shape.
+        Threshold friction velocity, m/s, of the shape of the grains.
 
     Examples
     --------
-    >>> sand = Air(density=2650.0, fluid_density=1.2, viscosity=1.5e-5)
-    >>> print(shao_lu(np.array([5e-5, 3e-4]), sand).round(4))
+    >>> air = {"fluid_density": 1.2, "viscosity": 1.5e-5}
+    >>> print(shao_lu(Grain(diameter=[5e-5, 3e-4], density=2650.0, **air)).round(4))
     [0.2735 0.3003]
     """
-    ratio = air.density / air.fluid_density
-    cohesion = 3e-4 / (air.fluid_density * diameter)
-    return np.sqrt(0.0123 * (ratio * air.gravity * diameter + cohesion))
+    cohesion = 3e-4 / (grain.fluid_density * grain.diameter)
+    of_weight = grain.density_ratio * grain.gravity * grain.diameter
+    return np.asarray(np.sqrt(0.0123 * (of_weight + cohesion)))
 
 
 ITERATIONS = 200
 """Steps of the fixed-point iteration of `iversen_white`."""
 
 
-def iversen_white(diameter: FloatArray, air: Air) -> FloatArray:
+def iversen_white(grain: Grain) -> FloatArray:
     """Threshold friction velocity of Iversen and White (1982), implicit in Re*.
 
     The root is found by fixed-point iteration over Re* = u* d/nu.
 
     Parameters
     ----------
-    diameter
-        Diameters of the grains, m, an array of any shape.
-    air
-        The grains and the gas.
+    grain
+        The grains in their gas.
 
     Returns
     -------
     FloatArray
-        Threshold friction velocity, m/s, of the same shape.
+        Threshold friction velocity, m/s, of the shape of the grains.
 
     Examples
     --------
-    >>> sand = Air(density=2650.0, fluid_density=1.2, viscosity=1.5e-5)
-    >>> print(iversen_white(np.array([5e-5, 3e-4]), sand).round(4))
+    >>> air = {"fluid_density": 1.2, "viscosity": 1.5e-5}
+    >>> sand = Grain(diameter=[5e-5, 3e-4], density=2650.0, **air)
+    >>> print(iversen_white(sand).round(4))
     [0.2183 0.2941]
     """
-    ratio = air.density / air.fluid_density
-    cohesion = 1 + 6e-7 / (air.density * air.gravity * diameter**2.5)
-    scale = np.sqrt(ratio * air.gravity * diameter * cohesion)
+    diameter = grain.diameter
+    cohesion = 1 + 6e-7 / (grain.density * grain.gravity * diameter**2.5)
+    scale = np.sqrt(grain.density_ratio * grain.gravity * diameter * cohesion)
     ustar = 0.12 * scale
     for _ in range(ITERATIONS):
-        reynolds = np.maximum(ustar * diameter / air.viscosity, 0.03)
+        reynolds = np.maximum(grain.reynolds(ustar), 0.03)
         # each branch is bounded to its own range: 1.928 Re^0.092 > 1 for Re > 0.001
         slow_reynolds = np.minimum(reynolds, 10)
         fast_reynolds = np.maximum(reynolds, 10)
@@ -363,7 +304,7 @@ def iversen_white(diameter: FloatArray, air: Air) -> FloatArray:
     return ustar
 
 
-AIR: dict[str, Callable[[FloatArray, Air], FloatArray]] = {
+AIR: dict[str, Callable[[Grain], FloatArray]] = {
     "Bagnold 1941": bagnold,
     "Shao & Lu 2000": shao_lu,
     "Iversen & White 1982": iversen_white,

@@ -15,157 +15,17 @@ from numpy.typing import ArrayLike
 
 from orchestrator.errors import InputError
 from orchestrator.physics import velocity
-from orchestrator.physics.constants import LIFT_COEFFICIENT
-from orchestrator.types import BoolArray, FloatArray, IntArray
+from orchestrator.physics.constants import SAND_GRAIN
+from orchestrator.physics.grain import Grain
+from orchestrator.types import BoolArray, FloatArray
 
 _EQUATIONS = "Eqs. 2 and 4 of the paper"
 MODEL = f"a model of this program: {_EQUATIONS} on a stress that is carried together"
 """Source of the laws that this program adds to those of the paper."""
-SAND_GRAIN = 30.0
-"""Nikuradse's equivalent sand-grain roughness over z0."""
 SUBLAYER = 5.0
 """Thickness of the viscous sublayer, wall units."""
 SMOOTH_END = 1.25
 """Largest speed over that above a smooth wall; it is at most 1.2 for z0 = d/1000."""
-
-
-@dataclass(frozen=True, init=False, eq=False)
-class Exposure:
-    """An exposed grain and the fluid around it; the fields broadcast together.
-
-    Parameters
-    ----------
-    diameter
-        Diameter of the grain, m.
-    roughness
-        Roughness length z0 of the bed, m.
-    fluid_density
-        Density of the fluid, kg/m3.
-    viscosity
-        Kinematic viscosity of the fluid, m2/s.
-    lift_coefficient
-        Coefficient alpha_s of Eqs. 2 and 4; laws with a lift of their own ignore it.
-    gap
-        Height of the grain's lowest point over the level at which the flow begins, m,
-        by default z0; laws that do not `protrude` ignore it.
-
-    Examples
-    --------
-    >>> sand = Exposure(
-    ...     diameter=1e-3, roughness=1e-3 / 30, fluid_density=1000.0, viscosity=1e-6
-    ... )
-    >>> print(sand.reynolds([0.01, 0.02]))
-    [10. 20.]
-    """
-
-    diameter: FloatArray
-    roughness: FloatArray
-    fluid_density: FloatArray
-    viscosity: FloatArray
-    lift_coefficient: FloatArray
-    gap: FloatArray
-
-    def __init__(
-        self,
-        *,
-        diameter: ArrayLike,
-        roughness: ArrayLike,
-        fluid_density: ArrayLike,
-        viscosity: ArrayLike,
-        lift_coefficient: ArrayLike = LIFT_COEFFICIENT,
-        gap: ArrayLike | None = None,
-    ) -> None:
-        if gap is None:
-            gap = roughness
-        given = {
-            "diameter": diameter,
-            "roughness": roughness,
-            "fluid_density": fluid_density,
-            "viscosity": viscosity,
-            "lift_coefficient": lift_coefficient,
-            "gap": gap,
-        }
-        for name, value in given.items():
-            # the dataclass is frozen
-            object.__setattr__(self, name, np.asarray(value, float))
-
-    @property
-    def fields(self) -> dict[str, FloatArray]:
-        """The six fields by the constructor's parameters."""
-        return {
-            "diameter": self.diameter,
-            "roughness": self.roughness,
-            "fluid_density": self.fluid_density,
-            "viscosity": self.viscosity,
-            "lift_coefficient": self.lift_coefficient,
-            "gap": self.gap,
-        }
-
-    @property
-    def ratio(self) -> FloatArray:
-        """Roughness length over diameter, z0/d."""
-        return np.asarray(self.roughness / self.diameter)
-
-    def at(self, places: IntArray | slice) -> "Exposure":
-        """Take some of the grains.
-
-        Parameters
-        ----------
-        places
-            Their places in the fields, which are arrays of one shape (n,).
-
-        Returns
-        -------
-        Exposure
-            The grains at these places.
-        """
-        return Exposure(**{name: each[places] for name, each in self.fields.items()})
-
-    def zeros(self, ustar: ArrayLike) -> FloatArray:
-        """Make zeros of the shape of a force on the grain.
-
-        Parameters
-        ----------
-        ustar
-            Friction velocity, m/s.
-
-        Returns
-        -------
-        FloatArray
-            Zeros of the shape that the fields and the friction velocity broadcast to.
-        """
-        shapes = [field.shape for field in self.fields.values()]
-        return np.zeros(np.broadcast_shapes(np.shape(ustar), *shapes))
-
-    def reynolds(self, ustar: ArrayLike) -> FloatArray:
-        """Compute the friction Reynolds number Re* = ustar d/nu.
-
-        Parameters
-        ----------
-        ustar
-            Friction velocity, m/s.
-
-        Returns
-        -------
-        FloatArray
-            Friction Reynolds number, of the broadcast shape.
-        """
-        return np.asarray(np.asarray(ustar, float) * self.diameter / self.viscosity)
-
-    def ustar(self, reynolds: ArrayLike) -> FloatArray:
-        """Compute the friction velocity of a friction Reynolds number.
-
-        Parameters
-        ----------
-        reynolds
-            Friction Reynolds number Re*.
-
-        Returns
-        -------
-        FloatArray
-            Friction velocity, m/s, of the broadcast shape.
-        """
-        return np.asarray(np.asarray(reynolds, float) * self.viscosity / self.diameter)
 
 
 @dataclass(frozen=True)
@@ -184,7 +44,7 @@ class SphereDrag:
 
     Examples
     --------
-    >>> sand = Exposure(
+    >>> sand = Grain(
     ...     diameter=1e-3, roughness=1e-3 / 30, fluid_density=1000.0, viscosity=1e-6
     ... )
     >>> print(f"{SCHILLER_NAUMANN.force(np.array(0.1), sand):.3e}")
@@ -195,7 +55,7 @@ class SphereDrag:
     factor: Callable[[FloatArray], FloatArray]
     highest: float
 
-    def force(self, speed: FloatArray, at: Exposure) -> FloatArray:
+    def force(self, speed: FloatArray, at: Grain) -> FloatArray:
         """Compute the drag of a stream: 3 pi rho nu d V factor.
 
         Parameters
@@ -326,7 +186,7 @@ class ForceLaw(ABC):
     """Drag along the bed and lift normal to it, as functions of u*.
 
     All methods are vectorised: the friction velocity `ustar` (m/s, >= 0) and the fields
-    of the exposure `at` broadcast, and the results have the broadcast shape. Whether a
+    of the grain `at` broadcast, and the results have the broadcast shape. Whether a
     law is `in_interval` is a keyword of its class, which no subclass inherits.
 
     Attributes
@@ -353,7 +213,7 @@ class ForceLaw(ABC):
 
     Examples
     --------
-    >>> sand = Exposure(
+    >>> sand = Grain(
     ...     diameter=1e-3, roughness=1e-3 / 30, fluid_density=1000.0, viscosity=1e-6
     ... )
     >>> print(f"{LAWS['bridged'].drag(0.02, sand):.3e}")
@@ -375,7 +235,7 @@ class ForceLaw(ABC):
         cls.in_interval = in_interval
 
     @abstractmethod
-    def speed(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
+    def speed(self, ustar: ArrayLike, at: Grain) -> FloatArray:
         """Compute the speed of the flow that the drag is computed with.
 
         Parameters
@@ -392,7 +252,7 @@ class ForceLaw(ABC):
         """
 
     @abstractmethod
-    def drag(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
+    def drag(self, ustar: ArrayLike, at: Grain) -> FloatArray:
         """Compute the drag in the direction of the flow.
 
         Parameters
@@ -409,7 +269,7 @@ class ForceLaw(ABC):
         """
 
     @abstractmethod
-    def lift(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
+    def lift(self, ustar: ArrayLike, at: Grain) -> FloatArray:
         """Compute the lift away from the bed.
 
         Parameters
@@ -425,7 +285,7 @@ class ForceLaw(ABC):
             Lift, N.
         """
 
-    def particle_reynolds(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
+    def particle_reynolds(self, ustar: ArrayLike, at: Grain) -> FloatArray:
         """Compute the particle Reynolds number V d/nu.
 
         Parameters
@@ -443,7 +303,7 @@ class ForceLaw(ABC):
         speed = self.speed(ustar, at)
         return np.asarray(speed * at.diameter / at.viscosity)
 
-    def speed_over_smooth(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
+    def speed_over_smooth(self, ustar: ArrayLike, at: Grain) -> FloatArray:
         """Compare the speed of the flow with that above a smooth wall.
 
         A smooth wall bounds the speed over a bed that is far smoother than its grains
@@ -466,18 +326,11 @@ class ForceLaw(ABC):
         with np.errstate(all="ignore"):
             above_sublayer = np.maximum(ustar, at.ustar(SUBLAYER))
             wall = velocity.smooth_wall_roughness(above_sublayer, at.viscosity)
-            smooth = Exposure(
-                diameter=at.diameter,
-                roughness=at.roughness + wall,
-                fluid_density=at.fluid_density,
-                viscosity=at.viscosity,
-                lift_coefficient=at.lift_coefficient,
-                gap=at.gap,
-            )
+            smooth = at.changed(roughness=at.roughness + wall)
             over = self.speed(ustar, at) / self.speed(ustar, smooth)
         return np.asarray(np.where(reynolds < SUBLAYER, 1.0, over))
 
-    def ranges(self, ustar: ArrayLike, at: Exposure) -> tuple[Validity, ...]:
+    def ranges(self, ustar: ArrayLike, at: Grain) -> tuple[Validity, ...]:
         """List the ranges that the law holds in; a law with more of them adds its own.
 
         Parameters
@@ -502,7 +355,7 @@ class ForceLaw(ABC):
             Validity("speed over that above a smooth wall", over, 0.0, SMOOTH_END),
         )
 
-    def valid(self, ustar: ArrayLike, at: Exposure) -> BoolArray:
+    def valid(self, ustar: ArrayLike, at: Grain) -> BoolArray:
         """Say whether the law holds: in its range of Re* and in all its other ranges.
 
         Parameters
@@ -543,7 +396,7 @@ class DragAndSaffman(ForceLaw):
         cls.drag_end = cls.sphere.highest
 
     @abstractmethod
-    def around(self, ustar: ArrayLike, at: Exposure) -> tuple[FloatArray, FloatArray]:
+    def around(self, ustar: ArrayLike, at: Grain) -> tuple[FloatArray, FloatArray]:
         """Compute speed and shear of the flow around the grain.
 
         Parameters
@@ -559,16 +412,16 @@ class DragAndSaffman(ForceLaw):
             Mean speed, m/s, and mean shear, 1/s.
         """
 
-    def speed(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
+    def speed(self, ustar: ArrayLike, at: Grain) -> FloatArray:
         """Mean speed of the flow around the grain, m/s."""
         speed, _ = self.around(ustar, at)
         return speed
 
-    def drag(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
+    def drag(self, ustar: ArrayLike, at: Grain) -> FloatArray:
         """Drag of the sphere at the speed of the flow around it, N."""
         return self.sphere.force(self.speed(ustar, at), at)
 
-    def lift(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
+    def lift(self, ustar: ArrayLike, at: Grain) -> FloatArray:
         """Saffman's lift, N: alpha_s rho sqrt(nu) d^2 V sqrt(du/dz).
 
         Eq. 4 prints the root of ``(du/dz)/ustar``; its dimension needs
@@ -590,7 +443,7 @@ class Low(DragAndSaffman, in_interval=True):
     protrudes = True
     sphere = STOKES
 
-    def around(self, ustar: ArrayLike, at: Exposure) -> tuple[FloatArray, FloatArray]:
+    def around(self, ustar: ArrayLike, at: Grain) -> tuple[FloatArray, FloatArray]:
         """Mean speed from z0 to z0 + d, and ustar^2/nu."""
         shear = np.asarray(np.square(ustar) / at.viscosity)
         speed = shear * velocity.viscous_length(at.diameter, at.gap)
@@ -610,7 +463,7 @@ class High(DragAndSaffman, in_interval=True):
     protrudes = True
     sphere = SCHILLER_NAUMANN
 
-    def around(self, ustar: ArrayLike, at: Exposure) -> tuple[FloatArray, FloatArray]:
+    def around(self, ustar: ArrayLike, at: Grain) -> tuple[FloatArray, FloatArray]:
         """Mean speed and shear from z0 to z0 + d."""
         speed = velocity.rough_speed(at.diameter, at.roughness, at.gap)
         shear = velocity.rough_gradient(at.diameter, at.roughness, at.gap)
@@ -632,7 +485,7 @@ class Bridged(DragAndSaffman, in_interval=True):
     protrudes = True
     sphere = SCHILLER_NAUMANN
 
-    def around(self, ustar: ArrayLike, at: Exposure) -> tuple[FloatArray, FloatArray]:
+    def around(self, ustar: ArrayLike, at: Grain) -> tuple[FloatArray, FloatArray]:
         """Mean speed and shear over the height of the grain."""
         u = np.asarray(ustar, float)
         viscous_length = velocity.viscous_length(at.diameter, at.gap)
@@ -678,7 +531,7 @@ class Profile(DragAndSaffman, in_interval=True):
     )
     sphere = SCHILLER_NAUMANN
 
-    def around(self, ustar: ArrayLike, at: Exposure) -> tuple[FloatArray, FloatArray]:
+    def around(self, ustar: ArrayLike, at: Grain) -> tuple[FloatArray, FloatArray]:
         """Mean speed and shear from z0 to z0 + d."""
         # a mean over no height at all is the limit of that over little
         height = np.maximum(at.reynolds(ustar), 1e-100)
@@ -688,7 +541,7 @@ class Profile(DragAndSaffman, in_interval=True):
         unit_shear = np.square(ustar) / at.viscosity
         return np.multiply(ustar, speed), np.asarray(unit_shear * shear)
 
-    def ranges(self, ustar: ArrayLike, at: Exposure) -> tuple[Validity, ...]:
+    def ranges(self, ustar: ArrayLike, at: Grain) -> tuple[Validity, ...]:
         """The ranges of every law, and that of the correlation of the shift."""
         roughness = SAND_GRAIN * at.ratio * at.reynolds(ustar)
         of_shift = "roughness ks u*/nu (Cebeci and Chang)"

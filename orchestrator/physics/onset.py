@@ -5,7 +5,6 @@ gust and hops on after it; one that cannot hop goes on where the mean stress tur
 over its neighbours.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -15,9 +14,8 @@ from numpy.typing import ArrayLike
 
 from orchestrator.physics import saltation
 from orchestrator.physics.beside import GOES_ON, LEAVES
-from orchestrator.physics.constants import GRAIN_COLUMNS
-from orchestrator.physics.laws import LAWS, Exposure
-from orchestrator.physics.shields import ustar_of
+from orchestrator.physics.grain import Grain
+from orchestrator.physics.laws import LAWS
 from orchestrator.physics.threshold import Threshold, threshold, why_not
 from orchestrator.physics.verdict import Reason
 from orchestrator.types import BoolArray, FloatArray
@@ -38,7 +36,7 @@ class Criteria:
     """
 
     steady: FloatArray
-    hoppers: saltation.Grains
+    hoppers: Grain
     peak: ArrayLike = saltation.PEAK
 
     @cached_property
@@ -128,8 +126,8 @@ class Onset:
         The forces at the threshold, in the gust if there is one, N.
     valid
         Whether the law holds where the grain leaves, and the threshold is known.
-    table
-        The columns of the grains.
+    grain
+        The grains.
     """
 
     law: str
@@ -141,7 +139,7 @@ class Onset:
     drag: FloatArray
     lift: FloatArray
     valid: BoolArray
-    table: Any
+    grain: Grain
 
     def reasons(self) -> list[list[Reason]]:
         """List what the law has against each threshold.
@@ -152,11 +150,11 @@ class Onset:
             The reasons of each grain; none without a threshold, which is beyond no
             range.
         """
-        return against_law(self.law, self.table, self.leaving.friction_velocity)
+        return against_law(self.law, self.grain, self.leaving.friction_velocity)
 
 
 def of_grains(
-    table: Any,
+    grain: Grain,
     law: str,
     criterion: str = LEAVES,
     gust: ArrayLike = np.nan,
@@ -165,8 +163,8 @@ def of_grains(
 
     Parameters
     ----------
-    table
-        A table, or a mapping, with the columns `GRAIN_COLUMNS` of n grains.
+    grain
+        The grains, of shape (n,).
     law
         Name of the force law.
     criterion
@@ -184,26 +182,20 @@ def of_grains(
 
     Examples
     --------
-    >>> sand = {"d_m": [1e-3], "rho_sol_kg_m3": 2650.0, "cohesion_n_m": 0.0}
-    >>> water = {"rho_f_kg_m3": 1000.0, "nu_m2_s": 1e-6, "g_m_s2": 9.81}
-    >>> bed = {"z0_m": 1e-3 / 30, "alpha_deg": 0.0, "beta_deg": 60.0, "alpha_s": 1.6}
+    >>> sand = Grain(
+    ...     diameter=[1e-3],
+    ...     density=2650.0,
+    ...     fluid_density=1000.0,
+    ...     viscosity=1e-6,
+    ...     entrainment_angle_deg=60.0,
+    ... )
     >>> for criterion in (LEAVES, GOES_ON):
-    ...     at = of_grains({**sand, **water, **bed}, "bridged", criterion)
+    ...     at = of_grains(sand, "bridged", criterion)
     ...     print(at.shields.round(4), at.valid)
     [0.0242] [ True]
     [0.0327] [ True]
     """
-    grains = _columns(table)
-    exposure = _exposure(grains)
-    leaving = threshold(
-        LAWS[law],
-        exposure,
-        density=grains["density"],
-        slope_deg=grains["slope_deg"],
-        entrainment_angle_deg=grains["entrainment_angle_deg"],
-        gravity=grains["gravity"],
-        cohesion=grains["cohesion"],
-    )
+    leaving = threshold(LAWS[law], grain)
     has_gust = np.isfinite(np.asarray(gust, float))
     # the mean flow has less than the stress that is needed
     peak = np.where(has_gust, gust, 1.0)
@@ -213,9 +205,9 @@ def of_grains(
     valid = leaving.valid
     if criterion == GOES_ON:
         peak = np.where(has_gust, gust, saltation.PEAK)
-        criteria = Criteria(leaving.shields, hoppers(table), peak)
+        criteria = Criteria(leaving.shields, grain, peak)
         shields = criteria.shields
-        ustar = ustar_of(shields, table)
+        ustar = grain.ustar_at(shields)
         peak = np.where(criteria.can_hop, peak, 1.0)
         valid = valid & (~criteria.can_hop | np.isfinite(criteria.goes_on))
     with np.errstate(invalid="ignore"):
@@ -226,16 +218,16 @@ def of_grains(
             criteria=criteria,
             friction_velocity=ustar,
             shields=shields,
-            reynolds=exposure.reynolds(ustar),
-            drag=LAWS[law].drag(in_gust, exposure),
-            lift=LAWS[law].lift(in_gust, exposure),
+            reynolds=grain.reynolds(ustar),
+            drag=LAWS[law].drag(in_gust, grain),
+            lift=LAWS[law].lift(in_gust, grain),
             valid=valid,
-            table=table,
+            grain=grain,
         )
 
 
 def against_law(
-    name: str, table: Any, ustar: FloatArray, lifts: bool = True
+    name: str, grain: Grain, ustar: FloatArray, lifts: bool = True
 ) -> list[list[Reason]]:
     """List what a force law has against friction velocities at which grains leave.
 
@@ -243,8 +235,8 @@ def against_law(
     ----------
     name
         Name of the law.
-    table
-        A table, or a mapping, with the columns `GRAIN_COLUMNS` of n grains.
+    grain
+        The grains, of shape (n,).
     ustar
         Friction velocities, m/s, shape (n,).
     lifts
@@ -257,15 +249,10 @@ def against_law(
         The reasons of each grain. There are none without a friction velocity.
     """
     law = LAWS[name]
-    grains = _columns(table)
-    exposure = _exposure(grains)
-    weights = {}
-    if lifts:
-        weights = {key: grains[key] for key in ("density", "slope_deg", "gravity")}
-    texts = why_not(law, ustar, exposure, **weights)
+    texts = why_not(law, ustar, grain, lifts=lifts)
     further = np.zeros(len(ustar), bool)
     if law.goes_on:
-        further = LAWS[law.goes_on].valid(ustar, exposure)
+        further = LAWS[law.goes_on].valid(ustar, grain)
     remedy = f'choose forces.law = "{law.goes_on}"'
     found = []
     for place, of_grain in enumerate(texts):
@@ -273,46 +260,3 @@ def against_law(
         is_known = np.isfinite(ustar[place])
         found.append([Reason("law", each, helps) for each in of_grain if is_known])
     return found
-
-
-def hoppers(table: Any) -> saltation.Grains:
-    """Make the grains of a table as they hop over their beds.
-
-    Parameters
-    ----------
-    table
-        A table, or a mapping, with the columns `GRAIN_COLUMNS` of n grains; each lies
-        among its like.
-
-    Returns
-    -------
-    Grains
-        The n grains.
-    """
-    grains = _columns(table)
-    return saltation.Grains.of(
-        grains["diameter"],
-        density=grains["density"],
-        fluid_density=grains["fluid_density"],
-        viscosity=grains["viscosity"],
-        slope_deg=grains["slope_deg"],
-        roughness=grains["roughness"],
-        gravity=grains["gravity"],
-    )
-
-
-def _columns(table: Any) -> dict[str, FloatArray]:
-    """The quantities of grains by the names of `GRAIN_COLUMNS`, each of shape (n,)."""
-    given = [np.asarray(table[column], float) for column in GRAIN_COLUMNS.values()]
-    return dict(zip(GRAIN_COLUMNS, np.broadcast_arrays(*given), strict=True))
-
-
-def _exposure(grains: Mapping[str, FloatArray]) -> Exposure:
-    """Grains and the fluids around them, as the force laws take them."""
-    return Exposure(
-        diameter=grains["diameter"],
-        roughness=grains["roughness"],
-        fluid_density=grains["fluid_density"],
-        viscosity=grains["viscosity"],
-        lift_coefficient=grains["lift_coefficient"],
-    )

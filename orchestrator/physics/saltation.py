@@ -9,7 +9,8 @@ rebounds with less energy than it needs to leave a pocket is trapped.
 All quantities are in units of the diameter d, of ``g' = (1 - rho_f/rho_sol) g`` and of
 the mass of the grain. A grain is then its Galileo number Ga = sqrt((s - 1) g d^3)/nu
 and its density ratio s = rho_sol/rho_f. The friction velocity is ``sqrt(s theta)``
-with the Shields number theta, the viscosity ``sqrt(s)/Ga``.
+with the Shields number theta, the viscosity ``sqrt(s)/Ga``. All grains are of shape
+(n,).
 """
 
 import itertools
@@ -17,15 +18,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from orchestrator.physics import velocity
-from orchestrator.physics.constants import GRAVITY
+from orchestrator.physics.constants import SAND_GRAIN
+from orchestrator.physics.grain import Grain
 from orchestrator.physics.gusts import peak_over_mean
-from orchestrator.physics.laws import CLIFT_GAUVIN, SAND_GRAIN
+from orchestrator.physics.laws import CLIFT_GAUVIN
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
 ADDED_MASS = 0.5
@@ -202,138 +204,6 @@ the rebound.
 """
 
 
-@dataclass(frozen=True, init=False, eq=False)
-class Grains:
-    """Grains, their fluid and their bed, without dimensions.
-
-    Parameters
-    ----------
-    galileo
-        Galileo number sqrt((s - 1) g d^3)/nu.
-    density_ratio
-        Density of the grain over that of the fluid, s.
-    slope_deg
-        Slope of the bed, degrees, positive where the flow goes up it.
-    roughness
-        Roughness length of the bed over the diameter, z0/d.
-    fall
-        Fall of the surface of an open uniform flow, the sine of its slope. The flow's
-        own weight drives it then, and its depth is ``theta (s - 1)/fall`` diameters. It
-        is 0 in a flow that is much deeper than a grain.
-    relative_size
-        Diameter of the grain over that of the grains of its bed.
-
-    Examples
-    --------
-    >>> sand = Grains.of(2e-4, density=2650.0, fluid_density=1.2, viscosity=1.5e-5)
-    >>> print(sand.galileo.round(2), sand.density_ratio.round(1))
-    [27.75] [2208.3]
-    """
-
-    galileo: FloatArray
-    density_ratio: FloatArray
-    slope_deg: FloatArray
-    roughness: FloatArray
-    fall: FloatArray
-    relative_size: FloatArray
-
-    def __init__(
-        self,
-        galileo: ArrayLike,
-        density_ratio: ArrayLike,
-        slope_deg: ArrayLike = 0.0,
-        roughness: ArrayLike = 1 / SAND_GRAIN,
-        fall: ArrayLike = 0.0,
-        relative_size: ArrayLike = 1.0,
-    ) -> None:
-        numbers = {
-            "galileo": galileo,
-            "density_ratio": density_ratio,
-            "slope_deg": slope_deg,
-            "roughness": roughness,
-            "fall": fall,
-            "relative_size": relative_size,
-        }
-        given = np.broadcast_arrays(*numbers.values())
-        flat = [np.ravel(array).astype(float) for array in given]
-        for name, array in zip(numbers, flat, strict=True):
-            # the dataclass is frozen
-            object.__setattr__(self, name, array)
-
-    @classmethod
-    def of(
-        cls,
-        diameter: ArrayLike,
-        *,
-        density: ArrayLike,
-        fluid_density: ArrayLike,
-        viscosity: ArrayLike,
-        slope_deg: ArrayLike = 0.0,
-        roughness: ArrayLike | None = None,
-        gravity: ArrayLike = GRAVITY,
-        fall: ArrayLike = 0.0,
-        relative_size: ArrayLike = 1.0,
-    ) -> Self:
-        """Make the numbers of grains of given sizes.
-
-        Parameters
-        ----------
-        diameter
-            Diameter of the grain, m.
-        density, fluid_density
-            Densities of the grain and of the fluid, kg/m3.
-        viscosity
-            Kinematic viscosity of the fluid, m2/s.
-        slope_deg
-            Slope of the bed, degrees.
-        roughness
-            Roughness length of the bed, m; by default d/30.
-        gravity
-            Acceleration of gravity, m/s2.
-        fall
-            Fall of the surface of an open uniform flow, as in `Grains`.
-        relative_size
-            Diameter of the grain over that of the grains of its bed.
-
-        Returns
-        -------
-        Grains
-            Their numbers, of the broadcast shape, raveled.
-        """
-        d = np.asarray(diameter, float)
-        ratio = np.asarray(density, float) / np.asarray(fluid_density, float)
-        excess = (ratio - 1) * np.asarray(gravity, float)
-        galileo = np.sqrt(excess * d**3) / np.asarray(viscosity, float)
-        z0 = d / SAND_GRAIN if roughness is None else np.asarray(roughness, float)
-        return cls(galileo, ratio, slope_deg, z0 / d, fall, relative_size)
-
-    def __len__(self) -> int:
-        """Number of grains."""
-        return len(self.galileo)
-
-    def at(self, places: IntArray | BoolArray) -> "Grains":
-        """Pick some of the grains.
-
-        Parameters
-        ----------
-        places
-            Their places, or a mask.
-
-        Returns
-        -------
-        Grains
-            These grains.
-        """
-        return Grains(
-            self.galileo[places],
-            self.density_ratio[places],
-            self.slope_deg[places],
-            self.roughness[places],
-            self.fall[places],
-            self.relative_size[places],
-        )
-
-
 class Gust(NamedTuple):
     """A gust: the stress of the flow is larger for a time, then that of the mean flow.
 
@@ -378,7 +248,7 @@ class _Flow:
 
     def __init__(
         self,
-        grains: Grains,
+        grains: Grain,
         shields: FloatArray,
         gust: "Gust",
         rebound: Rebound,
@@ -396,7 +266,7 @@ class _Flow:
         self.normal = np.cos(slope) * inertia
         # Stokes' drag over mass and relative speed
         self.stokes = 18 * self.viscosity / (s + ADDED_MASS)
-        self.sand_grain = SAND_GRAIN * grains.roughness
+        self.sand_grain = SAND_GRAIN * grains.ratio
         with np.errstate(divide="ignore"):
             depth = shields * (s - 1) / np.maximum(grains.fall, 0)
         # gravity without buoyancy, over that of a grain under water
@@ -510,7 +380,7 @@ class _Motion(NamedTuple):
 
 
 def fate(
-    grains: Grains,
+    grains: Grain,
     shields: ArrayLike,
     *,
     speed: ArrayLike | None = None,
@@ -549,7 +419,7 @@ def fate(
 
     Examples
     --------
-    >>> sand = Grains(127.0, 2.65)  # 1 mm in water
+    >>> sand = Grain.of_numbers(127.0, 2.65)  # 1 mm in water
     >>> print(fate(sand, 0.01), fate(sand, 0.1))
     [0] [1]
     """
@@ -721,7 +591,7 @@ class Thresholds:
         return np.asarray(np.maximum(self.steady / np.asarray(peak), self.cessation))
 
 
-def settling(grains: Grains) -> FloatArray:
+def settling(grains: Grain) -> FloatArray:
     """Compute the speed at which grains settle in their fluid at rest.
 
     The drag is that of Clift and Gauvin, on a level bed's normal.
@@ -738,7 +608,7 @@ def settling(grains: Grains) -> FloatArray:
 
     Examples
     --------
-    >>> sand = Grains([5.3, 127.0, 38.8], [2.65, 2.65, 2208.0])
+    >>> sand = Grain.of_numbers([5.3, 127.0, 38.8], [2.65, 2.65, 2208.0])
     >>> print(settling(sand).round(2))
     [ 0.41  1.98 38.66]
     """
@@ -756,7 +626,7 @@ def settling(grains: Grains) -> FloatArray:
     return np.asarray(np.exp((low + high) / 2))
 
 
-def hops(grains: Grains) -> BoolArray:
+def hops(grains: Grain) -> BoolArray:
     """Say which grains can hop over their bed.
 
     A sphere that meets a wall in a viscous fluid does not rebound where the Stokes
@@ -779,7 +649,8 @@ def hops(grains: Grains) -> BoolArray:
     --------
     0.2 and 1 mm in water, and 0.05 mm in air:
 
-    >>> print(hops(Grains([11.4, 127.0, 3.47], [2.65, 2.65, 2208.0])))
+    >>> sand = Grain.of_numbers([11.4, 127.0, 3.47], [2.65, 2.65, 2208.0])
+    >>> print(hops(sand))
     [False  True  True]
     """
     viscosity = np.sqrt(grains.density_ratio) / grains.galileo
@@ -850,7 +721,7 @@ GRAZING_DEG = 20.0
 
 
 def thresholds(
-    grains: Grains,
+    grains: Grain,
     *,
     rebound: Rebound = BEADS,
     steps: int = STEPS,
@@ -873,15 +744,17 @@ def thresholds(
 
     Examples
     --------
-    >>> sand = Grains([127.0, 38.8], [2.65, 2208.0])  # 1 mm in water, 0.25 mm in air
+    1 mm in water, and 0.25 mm in air:
+
+    >>> sand = Grain.of_numbers([127.0, 38.8], [2.65, 2208.0])
     >>> print(thresholds(sand).cessation.round(4))
     [0.0327 0.0057]
     """
 
-    def from_pocket(part: Grains, shields: FloatArray) -> IntArray:
+    def from_pocket(part: Grain, shields: FloatArray) -> IntArray:
         return fate(part, shields, rebound=rebound, steps=steps)
 
-    def from_motion(part: Grains, shields: FloatArray) -> IntArray:
+    def from_motion(part: Grain, shields: FloatArray) -> IntArray:
         return fate(
             part,
             shields,
@@ -895,7 +768,7 @@ def thresholds(
 
 
 def under_gust(
-    grains: Grains,
+    grains: Grain,
     peak: float,
     duration: float,
 ) -> FloatArray:
@@ -917,7 +790,7 @@ def under_gust(
 
     Examples
     --------
-    >>> sand = Grains(38.8, 2208.0)  # 0.25 mm in air
+    >>> sand = Grain.of_numbers(38.8, 2208.0)  # 0.25 mm in air
     >>> print(under_gust(sand, peak=2.28, duration=10.0).round(3))
     [0.015]
     """
@@ -925,19 +798,19 @@ def under_gust(
     return least(grains, lambda g, theta: fate(g, theta, gust=gust))
 
 
-def _fast(grains: Grains, shields: FloatArray) -> FloatArray:
+def _fast(grains: Grain, shields: FloatArray) -> FloatArray:
     """Speed of the fluid at a height of `FAST`, sqrt(g' d)."""
     unit = np.sqrt(shields) * grains.galileo
     profile = velocity.law_of_the_wall(
         FAST * unit,
-        SAND_GRAIN * grains.roughness * unit,
+        SAND_GRAIN * grains.ratio * unit,
     )
     return np.asarray(np.sqrt(grains.density_ratio * shields) * profile)
 
 
 def least(
-    grains: Grains,
-    become: Callable[[Grains, FloatArray], IntArray],
+    grains: Grain,
+    become: Callable[[Grain, FloatArray], IntArray],
 ) -> FloatArray:
     """Find the least Shields number at which each grain goes on, by bisection.
 
@@ -957,7 +830,7 @@ def least(
 
     Examples
     --------
-    >>> print(least(Grains(127.0, 2.65), fate).round(4))  # 1 mm in water
+    >>> print(least(Grain.of_numbers(127.0, 2.65), fate).round(4))  # 1 mm in water
     [0.0327]
     """
     count = len(grains)
@@ -991,7 +864,7 @@ SLOPE_NODES_DEG = np.linspace(-30.0, 30.0, 13)
 """Nodes of the table."""
 
 
-def tabulated(grains: Grains, *, at_most: bool = False) -> Thresholds:
+def tabulated(grains: Grain, *, at_most: bool = False) -> Thresholds:
     """Find the thresholds of grains from the table, or by `thresholds` where it ends.
 
     The thresholds are interpolated linearly: their logarithms over the logarithms of
@@ -1011,7 +884,9 @@ def tabulated(grains: Grains, *, at_most: bool = False) -> Thresholds:
 
     Examples
     --------
-    >>> sand = Grains([127.0, 38.8], [2.65, 2208.0])  # 1 mm in water, 0.25 mm in air
+    1 mm in water, and 0.25 mm in air:
+
+    >>> sand = Grain.of_numbers([127.0, 38.8], [2.65, 2208.0])
     >>> print(tabulated(sand).steady.round(3))
     [0.033 0.028]
     """
@@ -1031,7 +906,7 @@ _AXES = (np.log(GALILEO_NODES), np.log(DENSITY_NODES), SLOPE_NODES_DEG)
 """Axes of the table, in which it is linear."""
 
 
-def _points(grains: Grains) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _points(grains: Grain) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The places of grains on the axes of the table; NaN where there is none."""
     with np.errstate(divide="ignore", invalid="ignore"):
         galileo = np.log(grains.galileo)
@@ -1039,7 +914,7 @@ def _points(grains: Grains) -> tuple[FloatArray, FloatArray, FloatArray]:
     return galileo, density, grains.slope_deg
 
 
-def is_tabulated(grains: Grains) -> BoolArray:
+def is_tabulated(grains: Grain) -> BoolArray:
     """Tell whether the table holds each grain: its bed, its flow and its place.
 
     Parameters
@@ -1054,10 +929,10 @@ def is_tabulated(grains: Grains) -> BoolArray:
 
     Examples
     --------
-    >>> print(is_tabulated(Grains([38.8, 38.8], 2208.0, roughness=[1 / 30, 0.1])))
+    >>> print(is_tabulated(Grain.of_numbers(38.8, 2208.0, ratio=[1 / 30, 0.1])))
     [ True False]
     """
-    is_inside = np.isclose(grains.roughness * SAND_GRAIN, 1, rtol=1e-6, atol=0)
+    is_inside = np.isclose(grains.ratio * SAND_GRAIN, 1, rtol=1e-6, atol=0)
     is_inside &= (grains.fall <= 0) & (grains.relative_size == 1)
     for nodes, point in zip(_AXES, _points(grains), strict=True):
         is_inside &= (point >= nodes[0]) & (point <= nodes[-1])
@@ -1086,7 +961,7 @@ class _Cell(NamedTuple):
         return self.part if end else 1 - self.part
 
 
-def _interpolated(table: FloatArray, grains: Grains) -> FloatArray:
+def _interpolated(table: FloatArray, grains: Grain) -> FloatArray:
     """Thresholds of grains that a part of the table holds, of shape (2, n)."""
     galileo, density, slope = map(_Cell.of, _AXES, _points(grains))
     at_slopes = []
@@ -1135,7 +1010,7 @@ def weakest(density_ratio: FloatArray) -> FloatArray:
     return np.where(density_ratio < LIQUID_BELOW, 0.25, 0.55)
 
 
-def weakest_thresholds(grains: Grains) -> Thresholds:
+def weakest_thresholds(grains: Grain) -> Thresholds:
     """Find the thresholds of grains whose rebounds are those of `weakest`.
 
     Parameters
@@ -1150,7 +1025,9 @@ def weakest_thresholds(grains: Grains) -> Thresholds:
 
     Examples
     --------
-    >>> sand = Grains([127.0, 38.8], [2.65, 2208.0])  # 1 mm in water, 0.25 mm in air
+    1 mm in water, and 0.25 mm in air:
+
+    >>> sand = Grain.of_numbers([127.0, 38.8], [2.65, 2208.0])
     >>> print(weakest_thresholds(sand).cessation.round(3))
     [0.054 0.009]
     """
@@ -1164,17 +1041,17 @@ def weakest_thresholds(grains: Grains) -> Thresholds:
     return found
 
 
-def _beyond_table(grains: Grains, at_most: bool) -> Thresholds:
+def _beyond_table(grains: Grain, at_most: bool) -> Thresholds:
     """The thresholds of grains that the table does not hold, of alike ones once."""
-    fields = (
+    numbers = (
         grains.galileo,
         grains.density_ratio,
         grains.slope_deg,
-        grains.roughness,
+        grains.ratio,
         grains.fall,
         grains.relative_size,
     )
-    rows = [*zip(*(values.tolist() for values in fields), strict=True)]
+    rows = [*zip(*(values.tolist() for values in numbers), strict=True)]
     unlike: dict[tuple[float, ...], int] = {}
     places = [unlike.setdefault(row, len(unlike)) for row in rows]
     found = _of_unlike(tuple(unlike), at_most)
@@ -1184,7 +1061,15 @@ def _beyond_table(grains: Grains, at_most: bool) -> Thresholds:
 @lru_cache(maxsize=64)  # tables, cards and pictures ask for the same grains
 def _of_unlike(rows: tuple[tuple[float, ...], ...], at_most: bool) -> Thresholds:
     """The same of grains by the numbers of each."""
-    grains = Grains(*np.array(rows).T)
+    galileo, density_ratio, slope_deg, ratio, fall, relative_size = np.array(rows).T
+    grains = Grain.of_numbers(
+        galileo,
+        density_ratio,
+        slope_deg=slope_deg,
+        ratio=ratio,
+        fall=fall,
+        relative_size=relative_size,
+    )
     return weakest_thresholds(grains) if at_most else thresholds(grains)
 
 

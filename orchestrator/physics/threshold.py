@@ -1,18 +1,18 @@
 """The threshold of motion of one exposed grain that rolls over its neighbour."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from orchestrator.errors import InputError
-from orchestrator.physics.constants import GRAIN_COLUMNS, GRAVITY, LIFT_COEFFICIENT
+from orchestrator.physics.constants import LIFT_COEFFICIENT
+from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import (
     DEFAULT,
     LAWS,
-    Exposure,
     ForceLaw,
     Validity,
     reasons,
@@ -71,6 +71,30 @@ class Threshold:
     lift: FloatArray
     valid: BoolArray
 
+    @classmethod
+    def together(
+        cls, found: Sequence["Threshold"], shape: tuple[int, ...]
+    ) -> "Threshold":
+        """Put thresholds of one grain each into one of a shape.
+
+        Parameters
+        ----------
+        found
+            The thresholds, each of shape ().
+        shape
+            The shape.
+
+        Returns
+        -------
+        Threshold
+            All of them.
+        """
+        arrays = {}
+        for each in fields(cls):
+            values = np.array([getattr(one, each.name) for one in found])
+            arrays[each.name] = values.reshape(shape)
+        return cls(**arrays)
+
     def grain(self, index: int) -> "Threshold":
         """Pick one grain of a list.
 
@@ -92,39 +116,6 @@ class Threshold:
             lift=self.lift[index],
             valid=self.valid[index],
         )
-
-
-def weight(
-    *,
-    diameter: ArrayLike,
-    density: ArrayLike,
-    fluid_density: ArrayLike,
-    gravity: ArrayLike = GRAVITY,
-) -> FloatArray:
-    """Compute the submerged weight W of a grain.
-
-    Parameters
-    ----------
-    diameter
-        Diameter of the grain, m.
-    density, fluid_density
-        Densities of the grain and of the fluid, kg/m3.
-    gravity
-        Acceleration of gravity, m/s2.
-
-    Returns
-    -------
-    FloatArray
-        Submerged weight, N, of the broadcast shape.
-
-    Examples
-    --------
-    >>> print(f"{weight(diameter=1e-3, density=2650.0, fluid_density=1000.0):.3e}")
-    8.475e-06
-    """
-    excess = np.asarray(density, float) - np.asarray(fluid_density, float)
-    volume = np.pi / 6 * np.asarray(diameter, float) ** 3
-    return np.asarray(volume * excess * np.asarray(gravity, float))
 
 
 def pivot_resistance(
@@ -305,17 +296,8 @@ def check_known(ustar: FloatArray, law: str) -> None:
         raise InputError(what, "forces.law", "choose another law")
 
 
-def threshold(
-    law: ForceLaw,
-    exposure: Exposure,
-    *,
-    density: ArrayLike,
-    slope_deg: ArrayLike,
-    entrainment_angle_deg: ArrayLike,
-    gravity: ArrayLike = GRAVITY,
-    cohesion: ArrayLike = 0.0,
-) -> Threshold:
-    """Find the threshold of one grain on its two neighbours under a force law.
+def threshold(law: ForceLaw, grain: Grain) -> Threshold:
+    """Find the threshold of each grain on its two neighbours under a force law.
 
     Solves ``f_d sin(beta) + f_l cos(beta) = W cos(alpha - beta) + F_a sin(2 beta)``,
     the third of Eqs. 1 with the pull F_a = cohesion x d of the contact that opens, for
@@ -325,87 +307,64 @@ def threshold(
     ----------
     law
         The force law.
-    exposure
-        The grain and the fluid.
-    density
-        Density of the grain, kg/m3.
-    slope_deg
-        Slope alpha of the bed, degrees, positive where the flow goes up it.
-    entrainment_angle_deg
-        Entrainment angle beta, degrees.
-    gravity
-        Acceleration of gravity, m/s2.
-    cohesion
-        Pull of a contact over the diameter, N/m.
+    grain
+        The grains.
 
     Returns
     -------
     Threshold
-        The threshold, of the broadcast shape. Where the resistance is not positive the
-        friction velocity is 0, where no flow moves the grain infinite, where it is not
-        known NaN. Only a friction velocity above 0 is valid.
+        The threshold, of the shape of the grains. Where the resistance is not positive
+        the friction velocity is 0, where no flow moves the grain infinite, where it is
+        not known NaN. Only a friction velocity above 0 is valid.
 
     Examples
     --------
-    >>> sand = Exposure(
-    ...     diameter=1e-3, roughness=1e-3 / 30, fluid_density=1000.0, viscosity=1e-6
+    >>> sand = Grain(
+    ...     diameter=1e-3,
+    ...     density=2650.0,
+    ...     fluid_density=1000.0,
+    ...     viscosity=1e-6,
+    ...     slope_deg=[0.0, 15.0],
+    ...     entrainment_angle_deg=60.0,
     ... )
-    >>> angles = {"slope_deg": [0.0, 15.0], "entrainment_angle_deg": 60.0}
-    >>> found = threshold(LAWS["bridged"], sand, density=2650.0, **angles)
-    >>> print(found.shields.round(4))
+    >>> print(threshold(LAWS["bridged"], sand).shields.round(4))
     [0.0242 0.0346]
     """
-    beta = np.radians(np.asarray(entrainment_angle_deg, float))
-    submerged = weight(
-        diameter=exposure.diameter,
-        density=density,
-        fluid_density=exposure.fluid_density,
-        gravity=gravity,
-    )
-    of_weight = submerged * pivot_resistance(slope_deg, entrainment_angle_deg)
-    pull = np.asarray(cohesion, float) * exposure.diameter
-    ustar = _least(law, exposure, beta, of_weight + pull * np.sin(2 * beta))
+    ustar = _least(law, grain.flat).reshape(grain.shape)
     # where no flow moves the grain the forces are those of an infinite one: NaN
     with np.errstate(invalid="ignore"):
-        lift = law.lift(ustar, exposure)
-        rolls = _lift_range(lift, submerged, slope_deg).holds
-        stress_area = exposure.fluid_density * (ustar * exposure.diameter) ** 2
+        lift = law.lift(ustar, grain)
+        rolls = _lift_range(lift, grain).holds
         return Threshold(
             friction_velocity=ustar,
-            reynolds=exposure.reynolds(ustar),
-            shields=np.asarray(stress_area * np.pi / 6 / submerged),
-            drag=law.drag(ustar, exposure),
+            reynolds=grain.reynolds(ustar),
+            shields=grain.shields(ustar),
+            drag=law.drag(ustar, grain),
             lift=lift,
-            valid=law.valid(ustar, exposure) & rolls & (ustar > 0),
+            valid=law.valid(ustar, grain) & rolls & (ustar > 0),
         )
 
 
-def _least(
-    law: ForceLaw, exposure: Exposure, beta: FloatArray, held: FloatArray
-) -> FloatArray:
-    """The least friction velocity of the pivot, m/s, for moments over d/2 (N)."""
-    given = np.broadcast_arrays(*exposure.fields.values(), beta, held)
-    *fields, angle, moment = [np.ravel(array).astype(float) for array in given]
-    grains = Exposure(**dict(zip(exposure.fields, fields, strict=True)))
+def _least(law: ForceLaw, grains: Grain) -> FloatArray:
+    """The least friction velocity of the pivot, m/s, shape (n,)."""
+    beta = np.radians(grains.entrainment_angle_deg)
+    of_weight = grains.weight * pivot_resistance(
+        grains.slope_deg, grains.entrainment_angle_deg
+    )
+    held = of_weight + grains.cohesion * grains.diameter * np.sin(2 * beta)
 
     def excess(ustar: FloatArray, places: IntArray) -> FloatArray:
+        """Moment over d/2 less that which holds, N."""
         at = grains.at(places)
-        drag = law.drag(ustar, at) * np.sin(angle[places])
-        lift = law.lift(ustar, at) * np.cos(angle[places])
-        return np.asarray(drag + lift - moment[places])
+        drag = law.drag(ustar, at) * np.sin(beta[places])
+        lift = law.lift(ustar, at) * np.cos(beta[places])
+        return np.asarray(drag + lift - held[places])
 
-    found = least_ustar(excess, grains.ustar(1.0))
-    return np.asarray(found.reshape(given[0].shape))
+    return least_ustar(excess, grains.ustar(1.0))
 
 
 def why_not(
-    law: ForceLaw,
-    ustar: FloatArray,
-    exposure: Exposure,
-    *,
-    density: ArrayLike | None = None,
-    slope_deg: ArrayLike = 0.0,
-    gravity: ArrayLike = GRAVITY,
+    law: ForceLaw, ustar: FloatArray, grain: Grain, *, lifts: bool = True
 ) -> list[list[str]]:
     """Say why thresholds of some grains do not hold under a law.
 
@@ -415,15 +374,10 @@ def why_not(
         The force law.
     ustar
         Threshold friction velocities, m/s, of shape (n,) or ().
-    exposure
-        The grains and the fluid.
-    density
-        Density of the grains, kg/m3. Without it the weight, and with it a lift-off, is
-        left out.
-    slope_deg
-        Slope of the bed, degrees, positive where the flow goes up it.
-    gravity
-        Acceleration of gravity, m/s2.
+    grain
+        The grains.
+    lifts
+        Whether a lift that carries a grain off before it rolls is a reason.
 
     Returns
     -------
@@ -432,32 +386,21 @@ def why_not(
 
     Examples
     --------
-    >>> sand = Exposure(
-    ...     diameter=1e-3, roughness=1e-3 / 30, fluid_density=1000.0, viscosity=1e-6
+    >>> sand = Grain(
+    ...     diameter=1e-3, density=2650.0, fluid_density=1000.0, viscosity=1e-6
     ... )
     >>> why_not(LAWS["low"], np.array([0.002, 0.02]), sand)
     [[], ['Re* 20 is not below 3']]
     """
-    ranges = list(law.ranges(ustar, exposure))
-    if density is not None:
-        submerged = weight(
-            diameter=exposure.diameter,
-            density=density,
-            fluid_density=exposure.fluid_density,
-            gravity=gravity,
-        )
-        lift = law.lift(ustar, exposure)
-        ranges.append(_lift_range(lift, submerged, slope_deg))
+    ranges = list(law.ranges(ustar, grain))
+    if lifts:
+        ranges.append(_lift_range(law.lift(ustar, grain), grain))
     return reasons(ranges, np.size(ustar))
 
 
-def _lift_range(
-    lift: FloatArray,
-    submerged: FloatArray,
-    slope_deg: ArrayLike,
-) -> Validity:
+def _lift_range(lift: FloatArray, grain: Grain) -> Validity:
     """Range of the pivot: a greater lift carries the grain off before it can roll."""
-    normal = submerged * np.cos(np.radians(np.asarray(slope_deg, float)))
+    normal = grain.weight * np.cos(np.radians(grain.slope_deg))
     with np.errstate(divide="ignore", invalid="ignore"):
         over = np.asarray(lift / normal)
     quantity = "lift over the weight normal to the bed"
@@ -504,7 +447,7 @@ def shields_at(
     >>> print(shields_at(LAWS["bridged"], [1.0, 10.0, 100.0], **pocket).round(4))
     [0.0507 0.0253 0.0334]
     """
-    unit = Exposure(
+    unit = Grain(
         diameter=1.0,
         roughness=roughness_ratio,
         fluid_density=1.0,
@@ -519,14 +462,14 @@ def shields_at(
     return np.asarray(resistance * ustar**2 / (of_drag + of_lift))
 
 
-def default_laws(ustar: ArrayLike, exposure: Exposure) -> NDArray[np.str_]:
+def default_laws(ustar: ArrayLike, grain: Grain) -> NDArray[np.str_]:
     """Choose the law that answers a grain for which none is asked.
 
     Parameters
     ----------
     ustar
         Friction velocity of its threshold under the law `DEFAULT`, m/s.
-    exposure
+    grain
         The grain and its fluid.
 
     Returns
@@ -539,13 +482,13 @@ def default_laws(ustar: ArrayLike, exposure: Exposure) -> NDArray[np.str_]:
     Examples
     --------
     >>> water = {"fluid_density": 1000.0, "viscosity": 1e-6}
-    >>> sizes = Exposure(diameter=[1e-3, 3e-2], roughness=[1e-3 / 30, 1e-3], **water)
+    >>> sizes = Grain(diameter=[1e-3, 3e-2], **water)
     >>> default_laws([0.018, 0.25], sizes).tolist()
     ['bridged', 'bridged-gravel']
     """
     default = LAWS[DEFAULT]
     with np.errstate(invalid="ignore"):  # no flow moves the grain: its u* is infinite
-        reynolds = default.particle_reynolds(ustar, exposure)
+        reynolds = default.particle_reynolds(ustar, grain)
     has_ended = reynolds >= default.drag_end
     return np.where(has_ended, default.goes_on, default.name)
 
@@ -569,9 +512,9 @@ def regime(low: Threshold, high: Threshold) -> NDArray[np.str_]:
     Examples
     --------
     >>> water = {"fluid_density": 1000.0, "viscosity": 1e-6}
-    >>> sand = Exposure(diameter=[5e-5, 1e-3], roughness=[5e-6, 1e-4], **water)
-    >>> pocket = {"density": 2650.0, "slope_deg": 0.0, "entrainment_angle_deg": 60.0}
-    >>> print(regime(*(threshold(LAWS[n], sand, **pocket) for n in ("low", "high"))))
+    >>> pocket = {"density": 2650.0, "entrainment_angle_deg": 60.0}
+    >>> sand = Grain(diameter=[5e-5, 1e-3], roughness=[5e-6, 1e-4], **pocket, **water)
+    >>> print(regime(*(threshold(LAWS[name], sand) for name in ("low", "high"))))
     ['low' 'transition']
     """
     _, low_end = LAWS["low"].reynolds
@@ -581,83 +524,11 @@ def regime(low: Threshold, high: Threshold) -> NDArray[np.str_]:
     return np.select([is_low, is_high], ["low", "high"], "transition")
 
 
-@dataclass(frozen=True, kw_only=True)
-class SingleGrain:
-    """All quantities that the closed form depends on.
-
-    Attributes
-    ----------
-    diameter, roughness
-        Diameter of the grain and roughness length of the bed, m.
-    fluid_density, viscosity
-        Density, kg/m3, and kinematic viscosity, m2/s, of the fluid.
-    lift_coefficient
-        Coefficient alpha_s of Eqs. 2 and 4.
-    density
-        Density of the grain, kg/m3.
-    slope_deg, entrainment_angle_deg
-        Slope of the bed and entrainment angle, degrees.
-    gravity
-        Acceleration of gravity, m/s2.
-    cohesion
-        Pull of a contact over the diameter, N/m.
-    """
-
-    diameter: float
-    roughness: float
-    fluid_density: float
-    viscosity: float
-    lift_coefficient: float
-    density: float
-    slope_deg: float
-    entrainment_angle_deg: float
-    gravity: float
-    cohesion: float = 0.0
-
-    @classmethod
-    def of_row(cls, row: Mapping[Any, Any]) -> "SingleGrain":
-        """Make the grain of a row of a table.
-
-        Parameters
-        ----------
-        row
-            A row with the columns `GRAIN_COLUMNS`.
-
-        Returns
-        -------
-        SingleGrain
-            The grain.
-
-        Examples
-        --------
-        >>> sand = {"d_m": 1e-3, "rho_sol_kg_m3": 2650.0, "cohesion_n_m": 0.0}
-        >>> water = {"rho_f_kg_m3": 1000.0, "nu_m2_s": 1e-6, "g_m_s2": 9.81}
-        >>> bed = {"z0_m": 1e-4, "alpha_deg": 0.0, "beta_deg": 60.0, "alpha_s": 1.6}
-        >>> SingleGrain.of_row({**sand, **water, **bed}).density
-        2650.0
-        """
-        numbers = {}
-        for name, column in GRAIN_COLUMNS.items():
-            numbers[name] = float(row[column])
-        return cls(**numbers)
-
-    @property
-    def exposure(self) -> Exposure:
-        """The grain and the fluid around it, as the force laws take them."""
-        return Exposure(
-            diameter=self.diameter,
-            roughness=self.roughness,
-            fluid_density=self.fluid_density,
-            viscosity=self.viscosity,
-            lift_coefficient=self.lift_coefficient,
-        )
+_ANSWERS: dict[tuple[str, tuple[float, ...]], Threshold] = {}
+"""Thresholds that were found, by the name of the law and the row of the grain."""
 
 
-_ANSWERS: dict[tuple[str, SingleGrain], Threshold] = {}
-"""Thresholds that were found, by the name of the law and the grain."""
-
-
-def thresholds_of(name: str, grains: Sequence[SingleGrain]) -> list[Threshold]:
+def thresholds_of(name: str, grain: Grain) -> Threshold:
     """Find the thresholds of grains under a force law, each once.
 
     Many grains at once take a hundredth of the time that they take one by one.
@@ -666,39 +537,42 @@ def thresholds_of(name: str, grains: Sequence[SingleGrain]) -> list[Threshold]:
     ----------
     name
         Name of the force law.
-    grains
+    grain
         The grains.
 
     Returns
     -------
-    list of Threshold
-        Their thresholds, each of shape ().
+    Threshold
+        Their thresholds, of the shape of the grains.
 
     Examples
     --------
-    >>> water = {"fluid_density": 1000.0, "viscosity": 1e-6}
-    >>> bed = {"roughness": 1e-4, "slope_deg": 0.0, "entrainment_angle_deg": 60.0}
-    >>> sand = {"diameter": 1e-3, "density": 2650.0, "lift_coefficient": 1.615}
-    >>> grain = SingleGrain(**sand, **bed, **water, gravity=9.81)
-    >>> print(thresholds_of("bridged", [grain])[0].shields.round(4))
-    0.0418
+    >>> sand = Grain(
+    ...     diameter=1e-3,
+    ...     density=2650.0,
+    ...     fluid_density=1000.0,
+    ...     viscosity=1e-6,
+    ...     entrainment_angle_deg=60.0,
+    ... )
+    >>> print(thresholds_of("bridged", sand).shields.round(4))
+    0.0242
     """
-    keys = [(name, grain) for grain in grains]
+    keys = [(name, row) for row in grain.rows]
     new = [key for key in dict.fromkeys(keys) if key not in _ANSWERS]
     if new:
-        found = _threshold_of_all(name, [grain for _, grain in new])
+        found = threshold(LAWS[name], Grain.of_rows([row for _, row in new]))
         for place, key in enumerate(new):
             _ANSWERS[key] = found.grain(place)
-    return [_ANSWERS[key] for key in keys]
+    return Threshold.together([_ANSWERS[key] for key in keys], grain.shape)
 
 
-def usual_law(grain: SingleGrain) -> str:
+def usual_law(grain: Grain) -> str:
     """Choose the force law that answers a grain for which none is asked.
 
     Parameters
     ----------
     grain
-        The grain.
+        The grain, of shape ().
 
     Returns
     -------
@@ -708,13 +582,12 @@ def usual_law(grain: SingleGrain) -> str:
     Examples
     --------
     >>> water = {"fluid_density": 1000.0, "viscosity": 1e-6}
-    >>> bed = {"roughness": 1e-4, "slope_deg": 0.0, "entrainment_angle_deg": 60.0}
-    >>> sand = {"diameter": 1e-3, "density": 2650.0, "lift_coefficient": 1.615}
-    >>> usual_law(SingleGrain(**sand, **bed, **water, gravity=9.81))
+    >>> pocket = {"density": 2650.0, "entrainment_angle_deg": 60.0}
+    >>> usual_law(Grain(diameter=1e-3, **pocket, **water))
     'bridged'
     """
-    (at,) = thresholds_of(DEFAULT, [grain])
-    return str(default_laws(at.friction_velocity, grain.exposure))
+    at = thresholds_of(DEFAULT, grain)
+    return str(default_laws(at.friction_velocity, grain))
 
 
 def forget() -> None:
@@ -725,26 +598,3 @@ def forget() -> None:
     >>> forget()
     """
     _ANSWERS.clear()
-
-
-def _threshold_of_all(name: str, grains: Sequence[SingleGrain]) -> Threshold:
-    """The thresholds of n grains under a force law, of shape (n,)."""
-    numbers: dict[str, FloatArray] = {}
-    for field in GRAIN_COLUMNS:
-        numbers[field] = np.array([getattr(grain, field) for grain in grains], float)
-    exposure = Exposure(
-        diameter=numbers["diameter"],
-        roughness=numbers["roughness"],
-        fluid_density=numbers["fluid_density"],
-        viscosity=numbers["viscosity"],
-        lift_coefficient=numbers["lift_coefficient"],
-    )
-    return threshold(
-        LAWS[name],
-        exposure,
-        density=numbers["density"],
-        slope_deg=numbers["slope_deg"],
-        entrainment_angle_deg=numbers["entrainment_angle_deg"],
-        gravity=numbers["gravity"],
-        cohesion=numbers["cohesion"],
-    )

@@ -10,6 +10,7 @@ from typing import Any, Literal, NamedTuple
 from orchestrator.physics import saltation
 from orchestrator.physics.beside import GOES_ON, LIKE, MOST_COHESION
 from orchestrator.physics.constants import GAS_BELOW
+from orchestrator.physics.grain import Grain
 from orchestrator.physics.velocity import LAMINAR_BELOW, laminar
 
 Word = Literal[
@@ -207,10 +208,8 @@ def is_measured(row: Mapping[Any, Any]) -> bool:
         return bool(row["tested_low"] <= theta * over**2 <= row["tested_high"])
     if not has_rows:
         return False
-    excess = row["rho_sol_kg_m3"] - row["rho_f_kg_m3"]
-    weight = excess * row["g_m_s2"] * row["d_m"]
     ends = (row["measured_low"], row["measured_high"], row["measured_curve"])
-    level = row["rho_f_kg_m3"] * computed**2 / weight
+    level = float(Grain.of_table(row).shields(computed))
     return bool(min(ends) <= level <= max(ends))
 
 

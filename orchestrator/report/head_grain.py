@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
 from orchestrator.physics import saltation
-from orchestrator.physics.curves import Air, shao_lu, soulsby_whitehouse
-from orchestrator.physics.onset import hoppers
+from orchestrator.physics.curves import shao_lu, soulsby_whitehouse
+from orchestrator.physics.grain import Grain
 from orchestrator.report import answers, single
 from orchestrator.report.drawing import (
     ANSWER,
@@ -56,7 +56,8 @@ def of_grain(row: pd.Series) -> Head:
     )
 
     here = _other_sizes(row, 61)
-    if row["criterion"] == GOES_ON and not saltation.is_tabulated(hoppers(here)).all():
+    is_tabulated = saltation.is_tabulated(Grain.of_table(here))
+    if row["criterion"] == GOES_ON and not is_tabulated.all():
         # each size takes a tenth of a second
         here = _other_sizes(row, FEW)
     d = here["d_m"].to_numpy()
@@ -202,12 +203,7 @@ def _told_by(rows: pd.DataFrame, ustar: Any, told: Quantity) -> list[float]:
 
 def _curve(row: pd.Series, d: Any) -> Any:
     """Friction velocity of a published curve for grains of some sizes (m), m/s."""
-    density = float(row["rho_f_kg_m3"])
-    solid = float(row["rho_sol_kg_m3"])
-    nu = float(row["nu_m2_s"])
-    g = float(row["g_m_s2"])
-    if is_gas(density):
-        return shao_lu(d, Air(solid, density, nu, g))
-    excess = (solid / density - 1) * g
-    theta = soulsby_whitehouse(d * (excess / nu**2) ** (1 / 3))
-    return np.sqrt(theta * excess * d)
+    grain = Grain.of_table(row).changed(diameter=d)
+    if is_gas(float(row["rho_f_kg_m3"])):
+        return shao_lu(grain)
+    return grain.ustar_at(soulsby_whitehouse(grain.dimensionless_diameter))

@@ -8,6 +8,7 @@ import pandas as pd
 from matplotlib.figure import Figure as Canvas
 
 from orchestrator.digits import percent
+from orchestrator.physics.grain import Grain
 from orchestrator.report import answers, single
 from orchestrator.report.drawing import (
     ANSWER,
@@ -152,9 +153,7 @@ def _stresses_of_sizes(row: pd.Series, results: Results) -> _Sizes:
     classes = results.joined("size_class")
     here = classes[classes["fraction"] == row["fraction"]]
     here = here[here["scene_id"] == row["scene_id"]].sort_values("size_over_d")
-    density = float(row["rho_f_kg_m3"])
-    excess = (float(row["rho_sol_kg_m3"]) - density) * float(row["g_m_s2"])
-    weight = excess * float(row["d_m"]) * here["size_over_d"].to_numpy(float)
+    weight = Grain.of_table(row).layer_weight * here["size_over_d"].to_numpy(float)
     names = []
     for size, count in zip(here["size_over_d"], here["count"], strict=True):
         grains = f"{count:.0f} grains" if count != 1 else "1 grain"
@@ -166,7 +165,7 @@ def _stresses_of_sizes(row: pd.Series, results: Results) -> _Sizes:
         high=weight * here["shields_own_high"].to_numpy(float),
         few=here["few"].to_numpy(bool),
         measured=[answers.measured_of_size(row, size) for size in here["size_over_d"]],
-        together=density * float(row["ustar0_m_s"]) ** 2,
+        together=float(row["rho_f_kg_m3"]) * float(row["ustar0_m_s"]) ** 2,
     )
 
 

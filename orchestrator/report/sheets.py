@@ -10,6 +10,7 @@ import pandas as pd
 from orchestrator.digits import percent
 from orchestrator.fidelity.fidelities import FIDELITIES, LOCAL, OWN_NUMBERS
 from orchestrator.grains.threshold import STEP
+from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import LAWS
 from orchestrator.report import counted, labels, single
 from orchestrator.report.results import Results, measured_hills, split
@@ -460,8 +461,7 @@ def sizes(results: Results) -> Sheet | None:
 def _with_stresses(rows: pd.DataFrame) -> pd.DataFrame:
     """Rows of sizes with their diameters, mm, and stresses, Pa and over that of d50."""
     size = rows["size_over_d"]
-    weight = (rows["rho_sol_kg_m3"] - rows["rho_f_kg_m3"]) * rows["g_m_s2"]
-    weight = weight * rows["d_m"] * size
+    weight = Grain.of_table(rows).layer_weight * size
     stresses = {"size": 1e3 * size * rows["d_m"]}
     for column in ("hiding", "hiding_wilcock_crowe"):
         stresses[column] = rows[column] * size

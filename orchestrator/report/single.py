@@ -11,6 +11,7 @@ from typing import Any
 from orchestrator.digits import percent
 from orchestrator.physics import verdict
 from orchestrator.physics.beside import FIELD, GOES_ON, LEVEL_DEG
+from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.report.card import Card, Number, Worth, decimals
@@ -394,11 +395,10 @@ def _field(row: Row, told: Quantity, ustar: float) -> str:
     if not row["measured_rows"] > 0:
         return "No field site is near: those have sand of 0.40 to 0.53 mm in air."
     computed = float(row["level_ustar_m_s"])
-    density = float(row["rho_f_kg_m3"])
-    excess = (float(row["rho_sol_kg_m3"]) - density) * float(row["g_m_s2"])
+    grain = Grain.of_table(row)
     ends = []
     for theta in (row["measured_low"], row["measured_high"]):
-        of_grain = math.sqrt(float(theta) * excess * float(row["d_m"]) / density)
+        of_grain = float(grain.ustar_at(theta))
         there = of_grain
         if not is_level(row):
             there = ustar * of_grain / computed

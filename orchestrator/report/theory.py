@@ -15,10 +15,10 @@ import pandas as pd
 
 from orchestrator.physics import curves, saltation
 from orchestrator.physics.constants import GRAIN_COLUMNS
-from orchestrator.physics.curves import Air
-from orchestrator.physics.laws import LAWS, Exposure
+from orchestrator.physics.grain import Grain
+from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import BUFFINGTON_MONTGOMERY, MEASURED_SOURCE
-from orchestrator.physics.onset import hoppers, of_grains
+from orchestrator.physics.onset import of_grains
 from orchestrator.physics.threshold import (
     LAWS_OF,
     shields_at,
@@ -265,7 +265,7 @@ class Line:
             Whether it holds, shape (n,).
         """
         # in units of d, nu and rho_f the friction velocity is Re*
-        unit = Exposure(
+        unit = Grain(
             diameter=1.0,
             roughness=self.bed.roughness_ratio,
             fluid_density=1.0,
@@ -384,10 +384,11 @@ def going_on(rows: pd.DataFrame) -> list[Going]:
         ends = group["d_m"].min() / BESIDE, group["d_m"].max() * BESIDE
         d = np.geomspace(*ends, SIZES)
         here = pd.DataFrame([first] * SIZES).assign(d_m=d, z0_m=first["z0_over_d"] * d)
-        here = here[saltation.is_tabulated(hoppers(here))]
+        here = here[saltation.is_tabulated(Grain.of_table(here))]
         if here.empty:
             continue
-        at = of_grains(here, str(first["force_law"]), GOES_ON, first["gust"])
+        grains = Grain.of_table(here)
+        at = of_grains(grains, str(first["force_law"]), GOES_ON, first["gust"])
         bed = Bed._make(first[BED].tolist())
         line = Line(str(first["force_law"]), bed, np.inf, 0.0)
         within = ""
@@ -440,7 +441,7 @@ def span(scenes: pd.DataFrame) -> tuple[float, float]:
     """
     found = []
     for law, of_law in scenes.groupby("force_law"):
-        found.append(of_grains(of_law, str(law)).reynolds)
+        found.append(of_grains(Grain.of_table(of_law), str(law)).reynolds)
     reynolds = np.concatenate([*found, np.empty(0)])
     reynolds = reynolds[np.isfinite(reynolds) & (reynolds > 0)]
     return float(reynolds.min(initial=np.inf)), float(reynolds.max(initial=0.0))
@@ -485,17 +486,17 @@ def air_lines(
     if scenes.empty:
         return {}
     item = scenes.iloc[int(scenes["nu_m2_s"].argmin())]
-    air = Air(
-        item["rho_sol_kg_m3"], item["rho_f_kg_m3"], item["nu_m2_s"], item["g_m_s2"]
-    )
+    columns = ("rho_sol_kg_m3", "rho_f_kg_m3", "nu_m2_s", "g_m_s2")
+    of_air = tuple(float(item[column]) for column in columns)
     first = min(SWEEP_M[0], scenes["d_m"].min())
     last = max(SWEEP_M[1], scenes["d_m"].max())
-    d = np.geomspace(first, last, POINTS)
+    sizes = _sizes_in_air(of_air, first, last)
     factor = curves.slope_factor_on_ustar(np.asarray(slope), item["phi_deg"])
     listed = {}
     for name in curves.AIR:
-        ustar = factor * _ustar(name, air, first, last)
-        x, y = air.shields_diagram(d, ustar)
+        ustar = factor * _ustar(name, of_air, first, last)
+        x = sizes.reynolds(ustar)
+        y = sizes.shields(ustar)
         if name == "Bagnold 1941":
             y = y[x >= BAGNOLD_FROM]
             x = x[x >= BAGNOLD_FROM]
@@ -503,11 +504,25 @@ def air_lines(
     return listed
 
 
+def _sizes_in_air(of_air: tuple[float, ...], first: float, last: float) -> Grain:
+    """Grains between two diameters, m, by densities, viscosity and gravity."""
+    density, fluid_density, viscosity, gravity = of_air
+    return Grain(
+        diameter=np.geomspace(first, last, POINTS),
+        density=density,
+        fluid_density=fluid_density,
+        viscosity=viscosity,
+        gravity=gravity,
+    )
+
+
 # one of the curves is found by iteration, for each panel and slope of a figure anew
 @cache
-def _ustar(name: str, air: Air, first: float, last: float) -> FloatArray:
+def _ustar(
+    name: str, of_air: tuple[float, ...], first: float, last: float
+) -> FloatArray:
     """Threshold friction velocity of a curve for air over diameters (m), m/s."""
-    return curves.AIR[name](np.geomspace(first, last, POINTS), air)
+    return curves.AIR[name](_sizes_in_air(of_air, first, last))
 
 
 @lru_cache(maxsize=1)

@@ -7,7 +7,7 @@ Arya, EPA/600/S3-85/059).
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import log
 from pathlib import Path
 from typing import NamedTuple
@@ -265,8 +265,8 @@ def solved(scene: Scene, threshold: float | None, cases: Path) -> Surface:
     assert isinstance(bed, PileBed)
     faces = _faces(bed, of_scene(scene).line, of_scene(scene).stress(cases))
     if threshold is None:
-        level = replace(single_grain(scene), slope_deg=0.0)
-        (own,) = thresholds_of(scene.forces.law, [level])
+        level = single_grain(scene).changed(slope_deg=0.0)
+        own = thresholds_of(scene.forces.law, level)
         threshold = float(own.friction_velocity)
     over_wind = float(log_law_ustar(1.0, WIND_HEIGHT, scene.solve_roughness))
     name = " and a ".join(map(str, scene.obstacles)) or "no obstacle"

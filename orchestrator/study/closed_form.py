@@ -11,13 +11,13 @@ from dataclasses import replace
 from typing import cast
 
 from orchestrator.physics import velocity
+from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import DEFAULT
 from orchestrator.physics.threshold import (
     AUTO,
     LAWS_OF,
     PAPER,
     Regime,
-    SingleGrain,
     Threshold,
     regime,
     thresholds_of,
@@ -26,7 +26,7 @@ from orchestrator.physics.threshold import (
 from orchestrator.study.scene import CELLS_OVER_Z0, Scene
 
 
-def single_grain(scene: Scene) -> SingleGrain:
+def single_grain(scene: Scene) -> Grain:
     """Make the single grain of a scene.
 
     Parameters
@@ -36,15 +36,15 @@ def single_grain(scene: Scene) -> SingleGrain:
 
     Returns
     -------
-    SingleGrain
-        The grain; its entrainment angle is that of the pocket that it lies in.
+    Grain
+        The grain, of shape (); its entrainment angle is that of its pocket.
     """
     grain = scene.grain
     bed = scene.bed
     fluid = scene.fluid
     # at a contact of two sizes the pull is that of their harmonic mean
     cohesion = grain.cohesion * 2 / (1 + bed.relative_size)
-    return SingleGrain(
+    return Grain(
         diameter=grain.diameter,
         roughness=bed.roughness,
         fluid_density=fluid.density,
@@ -55,6 +55,7 @@ def single_grain(scene: Scene) -> SingleGrain:
         entrainment_angle_deg=scene.pocket_angle_deg,
         gravity=fluid.gravity,
         cohesion=cohesion,
+        relative_size=bed.relative_size,
     )
 
 
@@ -78,7 +79,7 @@ def closed_form(scene: Scene, name: str | None = None) -> Threshold:
     """
     grain = single_grain(scene)
     law = name or _law_of(scene, grain)
-    (at,) = thresholds_of(law, [grain])
+    at = thresholds_of(law, grain)
     if scene.gust == 1:
         return at
     root = scene.gust**0.5
@@ -149,7 +150,7 @@ def law_holds(scene: Scene) -> bool:
     return bool(closed_form(scene).valid)
 
 
-def _law_of(scene: Scene, grain: SingleGrain) -> str:
+def _law_of(scene: Scene, grain: Grain) -> str:
     """The force law of a scene and its grain; one that holds if none is asked for."""
     if scene.forces.law != AUTO:
         return scene.forces.law
@@ -175,7 +176,7 @@ def resolved(scenes: Sequence[Scene]) -> Iterator[tuple[Scene, ...]]:
     # many thresholds at once take a hundredth of the time that they take one after
     # another
     grains = {scene.id: single_grain(scene) for scene in scenes}
-    asked: dict[str, list[SingleGrain]] = {"low": [], "high": []}
+    asked: dict[str, list[Grain]] = {"low": [], "high": []}
     for scene in scenes:
         grain = grains[scene.id]
         # the tables have the regime of each scene, whatever its law
@@ -185,7 +186,7 @@ def resolved(scenes: Sequence[Scene]) -> Iterator[tuple[Scene, ...]]:
         if name != PAPER:
             asked.setdefault(name, []).append(grain)
     for name, of_law in asked.items():
-        thresholds_of(name, of_law)
+        thresholds_of(name, Grain.together(of_law))
     for scene in scenes:
         laws: tuple[str, ...] = (scene.forces.law,)
         if scene.forces.law == AUTO:

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orchestrator.physics import saltation
+from orchestrator.physics.grain import Grain
 from orchestrator.physics.onset import Criteria
-from orchestrator.study.closed_form import closed_form
+from orchestrator.study.closed_form import closed_form, single_grain
 from orchestrator.study.parts import GrainBed
 from orchestrator.study.question import why_not_going_on
 from orchestrator.study.scene import Scene
@@ -73,7 +74,7 @@ def hoppers(
     scene: Scene,
     slopes_deg: ArrayLike,
     sizes: ArrayLike = 1.0,
-) -> saltation.Grains:
+) -> Grain:
     """Make the grains of a scene as they hop over its bed.
 
     Parameters
@@ -87,23 +88,18 @@ def hoppers(
 
     Returns
     -------
-    Grains
+    Grain
         The grains, of the broadcast shape, raveled. A bed of many grains is of those of
         the scene's diameter, its median.
     """
-    grain = scene.grain
-    fluid = scene.fluid
+    grain = single_grain(scene)
     over = np.asarray(sizes, float)
-    return saltation.Grains.of(
-        grain.diameter * over,
-        density=grain.density,
-        fluid_density=fluid.density,
-        viscosity=fluid.viscosity,
+    hoppers = grain.changed(
+        diameter=grain.diameter * over,
         slope_deg=slopes_deg,
-        roughness=scene.bed.roughness,
-        gravity=fluid.gravity,
-        relative_size=scene.bed.relative_size * over,
+        relative_size=grain.relative_size * over,
     )
+    return hoppers.flat
 
 
 def hopping_on(

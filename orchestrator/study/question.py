@@ -11,9 +11,10 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from orchestrator.digits import SLACK, rounded
+from orchestrator.physics.grain import Grain as PhysicalGrain
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import DEFAULT, LAWS
-from orchestrator.physics.threshold import LAWS_OF, PAPER, weight
+from orchestrator.physics.threshold import LAWS_OF, PAPER
 from orchestrator.study.declare import Part, UnfitError
 from orchestrator.study.parts import (
     Flow,
@@ -130,13 +131,14 @@ class Question(Part):
     @property
     def weight(self) -> float:
         """Submerged weight W of a grain, N."""
-        of_one_grain = weight(
+        of_one = PhysicalGrain(
             diameter=self.grain.diameter,
             density=self.grain.density,
             fluid_density=self.fluid.density,
+            viscosity=self.fluid.viscosity,
             gravity=self.fluid.gravity,
         )
-        return float(of_one_grain)
+        return float(of_one.weight)
 
     @property
     def limiting_slope_deg(self) -> float:

@@ -11,9 +11,9 @@ Eq. 3.46. Lift and cohesion are added here as the pivot of Eq. 1 has them.
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orchestrator.physics.constants import GRAVITY
-from orchestrator.physics.laws import Exposure, ForceLaw
-from orchestrator.physics.threshold import least_ustar, weight
+from orchestrator.physics.grain import Grain
+from orchestrator.physics.laws import ForceLaw
+from orchestrator.physics.threshold import least_ustar
 from orchestrator.types import FloatArray, IntArray
 
 
@@ -42,17 +42,7 @@ def slope_along_deg(slope_deg: ArrayLike, heading_deg: ArrayLike) -> FloatArray:
     return np.asarray(np.degrees(np.arcsin(rise * ahead)))
 
 
-def threshold_across(
-    law: ForceLaw,
-    exposure: Exposure,
-    *,
-    density: ArrayLike,
-    slope_deg: ArrayLike,
-    heading_deg: ArrayLike,
-    entrainment_angle_deg: ArrayLike,
-    gravity: ArrayLike = GRAVITY,
-    cohesion: ArrayLike = 0.0,
-) -> FloatArray:
+def threshold_across(law: ForceLaw, grain: Grain, heading_deg: ArrayLike) -> FloatArray:
     """Find the threshold of a grain under a stress at an angle to the slope.
 
     With the slope b, the heading c between the stress and the direction up the slope,
@@ -63,8 +53,7 @@ def threshold_across(
     and F is the sum of two forces along the bed: drag, and the weight's W sin(b)
     straight down the slope. Without lift the drag over that on a level bed is ``cos(c)
     sin(b)/tan(p) + sqrt(cos(b)^2 - sin(c)^2 sin(b)^2/tan(p)^2)`` with ``p = 90 deg -
-    beta``, which is
-    that of Brooks. Straight up and down the slope it is that of
+    beta``, which is that of Brooks. Straight up and down the slope it is that of
     `orchestrator.physics.threshold.threshold`, but where lift lets the grain roll back
     down a slope that the flow goes up.
 
@@ -72,20 +61,10 @@ def threshold_across(
     ----------
     law
         The force law.
-    exposure
-        The grain and the fluid.
-    density
-        Density of the grain, kg/m3.
-    slope_deg
-        Steepest slope b of the bed, degrees, at least 0.
+    grain
+        The grains, on the steepest slope b of the bed, at least 0.
     heading_deg
         Angle c between the stress and the direction straight up the slope, degrees.
-    entrainment_angle_deg
-        Entrainment angle beta, degrees.
-    gravity
-        Acceleration of gravity, m/s2.
-    cohesion
-        Pull of a contact over the diameter, N/m.
 
     Returns
     -------
@@ -97,41 +76,35 @@ def threshold_across(
     Examples
     --------
     >>> from orchestrator.physics.laws import LAWS
-    >>> sand = Exposure(
-    ...     diameter=1e-3, roughness=1e-3 / 30, fluid_density=1000.0, viscosity=1e-6
+    >>> sand = Grain(
+    ...     diameter=1e-3,
+    ...     density=2650.0,
+    ...     fluid_density=1000.0,
+    ...     viscosity=1e-6,
+    ...     slope_deg=20.0,
+    ...     entrainment_angle_deg=60.0,
     ... )
-    >>> grain = {"density": 2650.0, "entrainment_angle_deg": 60.0}
-    >>> headings = {"slope_deg": 20.0, "heading_deg": [0.0, 90.0, 180.0]}
-    >>> print(threshold_across(LAWS["bridged"], sand, **grain, **headings).round(5))
+    >>> print(threshold_across(LAWS["bridged"], sand, [0.0, 90.0, 180.0]).round(5))
     [0.02468 0.01624 0.01177]
     """
-    slope = np.radians(np.asarray(slope_deg, float))
     heading = np.radians(np.asarray(heading_deg, float))
-    beta = np.radians(np.asarray(entrainment_angle_deg, float))
-    submerged = weight(
-        diameter=exposure.diameter,
-        density=density,
-        fluid_density=exposure.fluid_density,
-        gravity=gravity,
-    )
-    pulled = np.asarray(cohesion, float) * exposure.diameter * np.sin(2 * beta)
-    along = submerged * np.sin(slope) * np.sin(beta)
-    given = np.broadcast_arrays(
-        *exposure.fields.values(),
-        beta,
-        along * np.cos(heading),
-        along * np.sin(heading),
-        submerged * np.cos(slope) * np.cos(beta) + pulled,
-    )
-    *fields, angle, down, aside, held = [np.ravel(array) for array in given]
-    of_grains = Exposure(**dict(zip(exposure.fields, fields, strict=True)))
+    shape = np.broadcast_shapes(grain.shape, heading.shape)
+    heading = np.broadcast_to(heading, shape).ravel()
+    grains = grain.changed(slope_deg=np.broadcast_to(grain.slope_deg, shape)).flat
+    slope = np.radians(grains.slope_deg)
+    beta = np.radians(grains.entrainment_angle_deg)
+    along = grains.weight * np.sin(slope) * np.sin(beta)
+    down = along * np.cos(heading)
+    aside = along * np.sin(heading)
+    pull = grains.cohesion * grains.diameter * np.sin(2 * beta)
+    held = grains.weight * np.cos(slope) * np.cos(beta) + pull
 
     def excess(ustar: FloatArray, places: IntArray) -> FloatArray:
         """Moment over d/2 along the bed less that which holds, N."""
-        at = of_grains.at(places)
-        drag = law.drag(ustar, at) * np.sin(angle[places]) - down[places]
-        lift = law.lift(ustar, at) * np.cos(angle[places])
+        at = grains.at(places)
+        drag = law.drag(ustar, at) * np.sin(beta[places]) - down[places]
+        lift = law.lift(ustar, at) * np.cos(beta[places])
         return np.asarray(np.hypot(drag, aside[places]) + lift - held[places])
 
-    found = least_ustar(excess, of_grains.ustar(1.0))
-    return found.reshape(given[0].shape)
+    found = least_ustar(excess, grains.ustar(1.0))
+    return found.reshape(shape)

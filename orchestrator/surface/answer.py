@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.physics.constants import GAS_BELOW
-from orchestrator.physics.threshold import SingleGrain, check_known
+from orchestrator.physics.grain import Grain
+from orchestrator.physics.threshold import check_known
 from orchestrator.surface import onset
 from orchestrator.surface.heights import Plane, Surface
 from orchestrator.surface.maps import Grid
@@ -87,7 +88,7 @@ class Ground:
         u*_t of every face, m/s; None for the closed form.
     """
 
-    grain: SingleGrain
+    grain: Grain
     law: str
     roughness: float
     is_natural: bool = True

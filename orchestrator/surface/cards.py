@@ -97,7 +97,7 @@ def _grain(answer: Answer, source: str) -> str:
     ground = answer.ground
     if ground.threshold is not None:
         return f"threshold friction velocity {ground.threshold:.3g} m/s{source}"
-    return f"grains of {length(ground.grain.diameter)}"
+    return f"grains of {length(float(ground.grain.diameter))}"
 
 
 def _numbers(answer: Answer) -> Iterator[Number]:

@@ -11,11 +11,10 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from orchestrator.physics import saltation
-from orchestrator.physics.constants import GRAIN_COLUMNS
-from orchestrator.physics.laws import LAWS, Exposure
+from orchestrator.physics.constants import SAND_GRAIN
+from orchestrator.physics.grain import Grain
+from orchestrator.physics.laws import LAWS
 from orchestrator.physics.onset import Criteria
-from orchestrator.physics.shields import shields_of, ustar_of
-from orchestrator.physics.threshold import SingleGrain
 from orchestrator.physics.velocity import log_law_speed
 from orchestrator.surface.across import slope_along_deg, threshold_across
 from orchestrator.types import FloatArray
@@ -114,7 +113,7 @@ def with_fall(
 
 
 def leaves(
-    grain: SingleGrain, law: str, slope_deg: FloatArray, heading_deg: FloatArray
+    grain: Grain, law: str, slope_deg: FloatArray, heading_deg: FloatArray
 ) -> FloatArray:
     """Find the local friction velocity at which a grain leaves its pocket on each face.
 
@@ -132,27 +131,12 @@ def leaves(
     FloatArray
         Friction velocities, m/s, shape (F,); 0 where the grain rolls by itself.
     """
-    exposure = Exposure(
-        diameter=grain.diameter,
-        roughness=grain.roughness,
-        fluid_density=grain.fluid_density,
-        viscosity=grain.viscosity,
-        lift_coefficient=grain.lift_coefficient,
-    )
-    return threshold_across(
-        LAWS[law],
-        exposure,
-        density=grain.density,
-        slope_deg=slope_deg,
-        heading_deg=heading_deg,
-        entrainment_angle_deg=grain.entrainment_angle_deg,
-        gravity=grain.gravity,
-        cohesion=grain.cohesion,
-    )
+    on_face = grain.changed(slope_deg=slope_deg)
+    return threshold_across(LAWS[law], on_face, heading_deg)
 
 
 def goes_on(
-    grain: SingleGrain,
+    grain: Grain,
     leaving: FloatArray,
     slope_deg: FloatArray,
     heading_deg: FloatArray,
@@ -180,17 +164,10 @@ def goes_on(
     """
     ends = saltation.SLOPE_NODES_DEG
     along = np.clip(slope_along_deg(slope_deg, heading_deg), ends[0], ends[-1])
-    grains = saltation.Grains.of(
-        grain.diameter,
-        density=grain.density,
-        fluid_density=grain.fluid_density,
-        viscosity=grain.viscosity,
-        slope_deg=along,
-        gravity=grain.gravity,
-    )
-    table = {column: getattr(grain, name) for name, column in GRAIN_COLUMNS.items()}
-    both = Criteria(shields_of(leaving, table), grains)
-    return ustar_of(both.shields, table)
+    # it hops over a bed of its like
+    hopping = grain.changed(slope_deg=along, roughness=grain.diameter / SAND_GRAIN)
+    both = Criteria(hopping.shields(leaving), hopping)
+    return hopping.ustar_at(both.shields)
 
 
 def wind_of(

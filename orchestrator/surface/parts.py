@@ -9,7 +9,8 @@ from typing import Annotated, Literal, Self, get_args
 
 from pydantic import Field, InstanceOf, model_validator
 
-from orchestrator.physics.threshold import AUTO, PAPER, SingleGrain, usual_law
+from orchestrator.physics.grain import Grain
+from orchestrator.physics.threshold import AUTO, PAPER, usual_law
 from orchestrator.study.declare import Height, Part, Roughness, UnfitError, Viscosity
 from orchestrator.study.declare import field as declared
 from orchestrator.study.method import Turbulence
@@ -204,9 +205,9 @@ class SurfaceScene(Part):
         return not self.fluid.is_paper
 
     @property
-    def grain_in_pocket(self) -> SingleGrain:
+    def grain_in_pocket(self) -> Grain:
         """The grain of a level face."""
-        return SingleGrain(
+        return Grain(
             diameter=self.grain.diameter,
             roughness=self.bed.roughness,
             fluid_density=self.fluid.density,

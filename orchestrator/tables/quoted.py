@@ -12,9 +12,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from orchestrator.physics.beside import LEAVES, measured_level_ustar
+from orchestrator.physics.grain import Grain
 from orchestrator.physics.onset import of_grains
 from orchestrator.physics.reported import in_units
-from orchestrator.physics.shields import ustar_of
 from orchestrator.study.shapes import SHAPES
 from orchestrator.tables.facts import needs_run
 from orchestrator.types import BoolArray, FloatArray
@@ -82,7 +82,7 @@ def quoted(rows: pd.DataFrame, twins: "pd.Series[int] | None" = None) -> dict[st
     level = of_rows(rows.assign(alpha_deg=0.0))["ustar"]
     measured = {}
     for name in ("low", "high"):
-        measured[name] = ustar_of(rows[f"measured_{name}"], rows)
+        measured[name] = Grain.of_table(rows).ustar_at(rows[f"measured_{name}"])
     best = measured_level_ustar(rows)
     columns["level_ustar_m_s"] = level
     columns["measured_level_ustar_m_s"] = best
@@ -268,7 +268,7 @@ def of_rows(rows: pd.DataFrame) -> dict[str, Any]:
     keys = [rows["force_law"].to_numpy(object), criteria]
     for (law, criterion), places in place.groupby(keys):
         part = rows.iloc[places]
-        at = of_grains(part, str(law), str(criterion), gust[places])
+        at = of_grains(Grain.of_table(part), str(law), str(criterion), gust[places])
         found["ustar"][places] = at.friction_velocity
         found["leaving"][places] = at.leaving.friction_velocity
         found["holds"][places] = at.valid & np.isfinite(at.friction_velocity)

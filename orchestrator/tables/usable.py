@@ -10,6 +10,7 @@ from orchestrator.flow.run import SPEED_HEIGHT
 from orchestrator.grains.threshold import within
 from orchestrator.physics import verdict
 from orchestrator.physics.beside import GOES_ON, TESTED_AS, beside
+from orchestrator.physics.grain import Grain
 from orchestrator.physics.onset import against_law
 from orchestrator.physics.threshold import standing_out
 from orchestrator.physics.velocity import open_water_reynolds
@@ -171,7 +172,9 @@ def _against_law(rows: pd.DataFrame, is_pile: bool) -> list[list[Reason]]:
     for name in rows["force_law"].unique():
         places = np.flatnonzero(rows["force_law"] == name)
         part = rows.iloc[places]
-        of_law = against_law(str(name), part, ustar[places], lifts=not is_pile)
+        of_law = against_law(
+            str(name), Grain.of_table(part), ustar[places], lifts=not is_pile
+        )
         for place, reasons in zip(places.tolist(), of_law, strict=True):
             found[place] = reasons
     return found

@@ -12,8 +12,9 @@ from orchestrator.calculator import LARGEST_DEPTH, PARAMETERS, QUANTITIES, answe
 from orchestrator.calculator.table import thresholds
 from orchestrator.fidelity import limits
 from orchestrator.physics.fluids import numbers_of
-from orchestrator.physics.laws import LAWS, Bridged, Exposure
-from orchestrator.physics.saltation import Grains, hops
+from orchestrator.physics.grain import Grain
+from orchestrator.physics.laws import LAWS, Bridged
+from orchestrator.physics.saltation import hops
 from orchestrator.physics.threshold import threshold, why_not
 from orchestrator.study.declare import Length
 from orchestrator.study.fields import FIELDS, PARTS
@@ -27,16 +28,19 @@ def test_every_point_and_law_is_the_closed_form_of_it() -> None:
     table = pd.DataFrame(thresholds({"diameter": d, "slope_deg": slopes}))
     assert len(table) == 40 * len(LAWS)
     for name, law in LAWS.items():
-        here = Exposure(diameter=d, roughness=d / 30, fluid_density=1.0, viscosity=1e-5)
-        one = threshold(
-            law, here, density=2500.0, slope_deg=slopes, entrainment_angle_deg=60.0
+        here = Grain(
+            diameter=d,
+            density=2500.0,
+            fluid_density=1.0,
+            viscosity=1e-5,
+            slope_deg=slopes,
+            entrainment_angle_deg=60.0,
         )
+        one = threshold(law, here)
         rows = table[table["law"] == name]
         np.testing.assert_allclose(rows["ustar_m_s"], one.friction_velocity, rtol=1e-9)
         np.testing.assert_array_equal(rows["valid"], one.valid)
-        why = why_not(
-            law, one.friction_velocity, here, density=2500.0, slope_deg=slopes
-        )
+        why = why_not(law, one.friction_velocity, here)
         for said, texts in zip(rows["why_not"], why, strict=True):
             assert said.split("; ")[: len(texts)] == texts
 
@@ -111,8 +115,8 @@ def test_the_largest_depth_is_that_of_a_study() -> None:
 def test_pages_name_the_size_from_which_quartz_hops_in_water() -> None:
     sizes = np.arange(4.0e-4, 6.0e-4, 1e-5)
     water = numbers_of({"kind": "water"})
-    grains = Grains.of(
-        sizes,
+    grains = Grain(
+        diameter=sizes,
         density=2650.0,
         fluid_density=water["density"],
         viscosity=water["viscosity"],
@@ -129,7 +133,7 @@ class Weak(Bridged):
     name = "weak"
     label = "weak"
 
-    def drag(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
+    def drag(self, ustar: ArrayLike, at: Grain) -> FloatArray:
         return np.asarray(0.5 * super().drag(ustar, at))
 
 

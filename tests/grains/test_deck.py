@@ -13,11 +13,12 @@ from hypothesis import strategies as st
 
 from orchestrator.grains.cells import GrainCase
 from orchestrator.grains.peeling import ForceTable, Loading
-from orchestrator.physics.laws import LAWS, Exposure, ForceLaw
+from orchestrator.physics.grain import Grain
+from orchestrator.physics.laws import LAWS, ForceLaw
 from tests.grains.test_motion import copied
 from tests.waiting import until
 
-WHERE = Exposure(diameter=1e-3, roughness=1e-4, fluid_density=1.0, viscosity=1e-5)
+WHERE = Grain(diameter=1e-3, roughness=1e-4, fluid_density=1.0, viscosity=1e-5)
 TABLE = np.geomspace(5e-5, 5e3, 4001)
 ALONG = np.tile([np.cos(0.3), np.sin(0.3)], (2, 1))
 OUTWARD = np.tile([-np.sin(0.3), np.cos(0.3)], (2, 1))

@@ -14,6 +14,7 @@ from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile, flows
 from orchestrator.grains.threshold import at_size, classes, sampled, within
 from orchestrator.physics import saltation
+from orchestrator.physics.grain import Grain
 from orchestrator.report import poured
 from orchestrator.report.results import Results
 from orchestrator.study import study
@@ -330,8 +331,8 @@ def test_grains_of_poured_beds_leave_in_a_gust_and_go_on_by_their_own_sizes(
     for size, slope, over in zip(
         sizes, np.degrees(np.arctan2(z, x)), ratio, strict=True
     ):
-        grain = saltation.Grains.of(
-            1e-3 * size,
+        grain = Grain(
+            diameter=[1e-3 * size],
             density=2650.0,
             fluid_density=1000.0,
             viscosity=1e-6,

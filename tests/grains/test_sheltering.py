@@ -14,8 +14,9 @@ from orchestrator.grains.loads import Geometry
 from orchestrator.grains.peeling import ForceTable, Loading
 from orchestrator.lab import validate
 from orchestrator.lab.sphere import sphere
+from orchestrator.physics.grain import Grain
 from orchestrator.physics.gusts import peak_over_mean
-from orchestrator.physics.laws import LAWS, Exposure
+from orchestrator.physics.laws import LAWS
 from orchestrator.physics.threshold import threshold
 from orchestrator.study.closed_form import closed_form
 from orchestrator.study.study import parse
@@ -36,7 +37,7 @@ method.kind = "%s"
 def _drag(ustar: FloatArray, sizes: FloatArray, gaps: FloatArray) -> FloatArray:
     return LAW.drag(
         ustar,
-        Exposure(
+        Grain(
             diameter=D * sizes, roughness=Z0, fluid_density=RHO, viscosity=NU, gap=gaps
         ),
     )
@@ -118,16 +119,17 @@ def test_cohesion_is_shao_and_lu_s(gamma: float, method: str) -> None:
     phi = math.radians(30)
     cohesion = math.pi * gamma / (12 * math.cos(phi))
     if method == "closed form":
-        at = Exposure(
+        at = Grain(
             diameter=d,
             roughness=d / 30,
             fluid_density=1.2,
             viscosity=1.5e-5,
             lift_coefficient=0.0,
+            density=density,
+            entrainment_angle_deg=60.0,
         )
-        grain = {"density": density, "slope_deg": 0.0, "entrainment_angle_deg": 60.0}
         with_it, without = (
-            threshold(LAWS["low"], at, **grain, cohesion=value).friction_velocity
+            threshold(LAWS["low"], at.changed(cohesion=value)).friction_velocity
             for value in (cohesion, 0.0)
         )
     else:

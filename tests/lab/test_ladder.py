@@ -97,9 +97,9 @@ def test_the_cost_of_a_pile_does_not_depend_on_what_was_asked_before(
 
         return count
 
-    packed, found = packing.pile, threshold._threshold_of_all
+    packed, found = packing.pile, threshold.threshold
     monkeypatch.setattr(packing, "pile", counted("packed", packed))
-    monkeypatch.setattr(threshold, "_threshold_of_all", counted("found", found))
+    monkeypatch.setattr(threshold, "threshold", counted("found", found))
     work = []
     for _ in range(3):
         done.clear()

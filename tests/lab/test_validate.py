@@ -14,7 +14,8 @@ from orchestrator.errors import InputError
 from orchestrator.flow.stress import WallStress
 from orchestrator.lab import strips, validate
 from orchestrator.physics import beside, saltation
-from orchestrator.physics.curves import Air, iversen_white
+from orchestrator.physics.curves import iversen_white
+from orchestrator.physics.grain import Grain
 from orchestrator.study import fields, scopes, study
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import changed
@@ -219,12 +220,13 @@ def test_the_measured_rows_are_whole() -> None:
 
 
 def test_the_rows_of_the_wind_tunnel_are_on_their_curve() -> None:
-    air = Air(density=2650.0, fluid_density=1.2, viscosity=1.5e-5)
     beds = pd.read_csv(validate.FOLDER / "beds.csv")
     tunnel = beds[beds["set"] == "wind tunnel, curve"]
-    d = tunnel["d_m"].to_numpy()
-    assert len(d) > 0
-    _, curve = air.shields_diagram(d, iversen_white(d, air))
+    assert len(tunnel) > 0
+    sand = Grain(
+        diameter=tunnel["d_m"], density=2650.0, fluid_density=1.2, viscosity=1.5e-5
+    )
+    curve = sand.shields(iversen_white(sand))
     assert tunnel["shields"].to_numpy() == pytest.approx(curve, rel=1e-3)
 
 
@@ -247,7 +249,7 @@ def test_grains_that_go_on_are_as_near_as_the_documents_say() -> None:
     # in water a grain that leaves stops with its gust; in air one that leaves goes on
     alone = validate.going_on(beds, validate.GUST, leaves=False)
     in_water = beds["rho_f_kg_m3"] > 100
-    can_hop = saltation.hops(validate.hoppers(beds))
+    can_hop = saltation.hops(validate.measured(beds))
     assert (alone[in_water & can_hop] == shields[in_water & can_hop]).mean() > 0.95
     assert (alone[~in_water] < shields[~in_water]).all()
     # one that cannot hop goes on where the mean stress turns it over
@@ -258,10 +260,8 @@ def test_grains_that_go_on_are_as_near_as_the_documents_say() -> None:
 def test_a_shallow_flow_is_why_steep_beds_hold_their_grains() -> None:
     beds = pd.read_csv(validate.FOLDER / "beds.csv")
     steep = beds[beds["set"] == "steep flumes"].iloc[::4]
-    shallow = validate.hoppers(steep)
-    deep = saltation.Grains(
-        shallow.galileo, shallow.density_ratio, shallow.slope_deg, shallow.roughness
-    )
+    shallow = validate.measured(steep)
+    deep = shallow.changed(fall=0.0)
     in_deep = saltation.thresholds(deep).cessation / steep["shields"]
     in_shallow = saltation.thresholds(shallow).cessation / steep["shields"]
     assert in_deep.median() < 0.5

@@ -10,6 +10,7 @@ import pytest
 from orchestrator.lab.validate import FOLDER
 from orchestrator.physics import curves
 from orchestrator.physics.beside import FIELD, MEASURED, beside
+from orchestrator.physics.grain import Grain
 from orchestrator.physics.measured import (
     BUFFINGTON_MONTGOMERY,
     VISUAL,
@@ -114,9 +115,9 @@ def test_curves_at_points() -> None:
 
 
 def test_iversen_white_solves_its_implicit_equation_on_both_branches() -> None:
-    air = curves.Air(density=2650.0, fluid_density=1.2, viscosity=1.5e-5)
     d = np.array([5e-5, 1e-4, 5e-4, 1e-3])
-    ustar = curves.iversen_white(d, air)
+    air = Grain(diameter=d, density=2650.0, fluid_density=1.2, viscosity=1.5e-5)
+    ustar = curves.iversen_white(air)
     reynolds = ustar * d / air.viscosity
     assert reynolds[0] < 10 < reynolds[-1]
     cohesion = 1 + 6e-7 / (air.density * air.gravity * d**2.5)
@@ -135,7 +136,6 @@ def test_points_turn_the_dimensionless_diameter_into_a_reynolds_number() -> None
 
 
 def test_curves_for_air_agree_in_order_of_magnitude_for_sand() -> None:
-    air = curves.Air(density=2650.0, fluid_density=1.2, viscosity=1.5e-5)
-    d = np.array([2.5e-4])
-    found = [float(curve(d, air)[0]) for curve in curves.AIR.values()]
+    sand = Grain(diameter=2.5e-4, density=2650.0, fluid_density=1.2, viscosity=1.5e-5)
+    found = [float(curve(sand)) for curve in curves.AIR.values()]
     assert 0.2 < min(found) < max(found) < 0.35

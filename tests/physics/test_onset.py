@@ -1,46 +1,36 @@
 """The one maker of thresholds of grains: both criteria, gusts, and what laws object."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
 from orchestrator.physics import saltation
 from orchestrator.physics.beside import GOES_ON, LEAVES
+from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import LAWS
-from orchestrator.physics.onset import against_law, hoppers, of_grains
-from orchestrator.physics.shields import shields_of, ustar_of
+from orchestrator.physics.onset import against_law, of_grains
 
 SIZES = np.array([2e-5, 3e-4, 2e-3, 2e-2])
 
 
-def grains(**changes: Any) -> dict[str, Any]:
-    """Quartz of some sizes in water."""
-    return {
-        "d_m": SIZES,
-        "rho_sol_kg_m3": 2650.0,
-        "cohesion_n_m": 0.0,
-        "rho_f_kg_m3": 1000.0,
-        "nu_m2_s": 1e-6,
-        "g_m_s2": 9.81,
-        "z0_m": SIZES / 30,
-        "alpha_deg": 0.0,
-        "beta_deg": 60.0,
-        "alpha_s": 1.615,
-        **changes,
-    }
+SAND = Grain(
+    diameter=SIZES,
+    density=2650.0,
+    fluid_density=1000.0,
+    viscosity=1e-6,
+    entrainment_angle_deg=60.0,
+)
+"""Quartz of some sizes in water."""
 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_a_grain_that_goes_on_needs_the_larger_of_two_mean_stresses(law: str) -> None:
-    table = grains()
-    leaving = of_grains(table, law, LEAVES)
-    both = of_grains(table, law, GOES_ON)
+    leaving = of_grains(SAND, law, LEAVES)
+    both = of_grains(SAND, law, GOES_ON)
     assert both.criteria is not None
-    can = saltation.hops(hoppers(table))
+    can = saltation.hops(SAND)
     assert can.any()
     assert not can.all()
-    hopping = saltation.tabulated(hoppers(table)).initiation(saltation.PEAK)
+    hopping = saltation.tabulated(SAND).initiation(saltation.PEAK)
     expected = np.maximum(leaving.shields / saltation.PEAK, hopping)
     assert both.shields[can] == pytest.approx(expected[can])
     # without hops the mean stress has to turn it over
@@ -51,29 +41,29 @@ def test_a_grain_that_goes_on_needs_the_larger_of_two_mean_stresses(law: str) ->
 
 
 def test_gusts_lower_the_mean_stress_and_not_the_forces() -> None:
-    calm = of_grains(grains(), "bridged")
-    gusty = of_grains(grains(), "bridged", gust=[np.nan, 1.0, 2.0, 3.0])
+    calm = of_grains(SAND, "bridged")
+    gusty = of_grains(SAND, "bridged", gust=[np.nan, 1.0, 2.0, 3.0])
     assert gusty.shields == pytest.approx(calm.shields / [1.0, 1.0, 2.0, 3.0])
     assert gusty.drag == pytest.approx(calm.drag)
     assert gusty.valid.tolist() == calm.valid.tolist()
 
 
 def test_numbers_of_a_threshold_agree() -> None:
-    table = grains(alpha_deg=10.0)
+    sloping = SAND.changed(slope_deg=10.0)
     for criterion in (LEAVES, GOES_ON):
-        at = of_grains(table, "bridged", criterion)
-        assert shields_of(at.friction_velocity, table) == pytest.approx(at.shields)
-        assert ustar_of(at.shields, table) == pytest.approx(at.friction_velocity)
+        at = of_grains(sloping, "bridged", criterion)
+        assert sloping.shields(at.friction_velocity) == pytest.approx(at.shields)
+        assert sloping.ustar_at(at.shields) == pytest.approx(at.friction_velocity)
         assert at.reynolds == pytest.approx(at.friction_velocity * SIZES / 1e-6)
 
 
 def test_what_a_law_objects_is_data() -> None:
-    at = of_grains(grains(), "low")
+    at = of_grains(SAND, "low")
     reasons = at.reasons()
     assert [not each for each in reasons] == at.valid.tolist()
     assert {each.code for of_grain in reasons for each in of_grain} == {"law"}
     # where a law goes on in another, that is the remedy
-    coarse = grains(d_m=[0.05], z0_m=0.05 / 30)
+    coarse = SAND.at(slice(3, 4)).changed(diameter=0.05, roughness=0.05 / 30)
     (ends,) = of_grains(coarse, "bridged").reasons()
     assert [each.remedy for each in ends] == ['choose forces.law = "bridged-gravel"']
     # without a threshold no law is beyond its range

@@ -10,7 +10,8 @@ from orchestrator.errors import InputError
 from orchestrator.physics import curves
 from orchestrator.physics import threshold as physics
 from orchestrator.physics.constants import LIFT_COEFFICIENT
-from orchestrator.physics.laws import LAWS, Bridged, Exposure
+from orchestrator.physics.grain import Grain
+from orchestrator.physics.laws import LAWS, Bridged
 from orchestrator.physics.threshold import (
     Threshold,
     check_known,
@@ -40,20 +41,36 @@ INDEPENDENT = [
 ]
 
 
+SAND = Grain(
+    diameter=1e-3,
+    density=2650.0,
+    roughness=1e-4,
+    fluid_density=1000.0,
+    viscosity=1e-6,
+)
+UNIT = np.full(4, SAND.ustar(1.0))
+"""A grain in water, and friction velocities of four such grains at Re* = 1, m/s."""
+
+
 def of_air(
-    name: str, d: ArrayLike, ratio: float, alpha: float, beta: float, nu: ArrayLike
+    name: str, d: ArrayLike, ratio: float, alpha: ArrayLike, beta: float, nu: ArrayLike
 ) -> Threshold:
-    where = Exposure(
-        diameter=d, roughness=np.multiply(ratio, d), fluid_density=1.0, viscosity=nu
+    grain = Grain(
+        diameter=d,
+        density=2500.0,
+        roughness=np.multiply(ratio, d),
+        fluid_density=1.0,
+        viscosity=nu,
+        slope_deg=alpha,
+        entrainment_angle_deg=beta,
     )
-    angles = {"slope_deg": alpha, "entrainment_angle_deg": beta}
-    return threshold(LAWS[name], where, density=2500.0, **angles)
+    return threshold(LAWS[name], grain)
 
 
 def water(d: float, beta: float = 50, law: str = "bridged") -> Threshold:
-    where = Exposure(diameter=d, roughness=d / 30, fluid_density=1000.0, viscosity=1e-6)
     return threshold(
-        LAWS[law], where, density=2650.0, slope_deg=0, entrainment_angle_deg=beta
+        LAWS[law],
+        SAND.changed(diameter=d, roughness=d / 30, entrainment_angle_deg=beta),
     )
 
 
@@ -116,7 +133,7 @@ def test_moments_balance_at_the_threshold(
     found = of_air(name, d, ratio, slope, beta, nu)
     b = np.radians(beta)
     moment = found.drag * np.sin(b) + found.lift * np.cos(b)
-    submerged = physics.weight(diameter=d, density=2500.0, fluid_density=1.0)
+    submerged = np.pi / 6 * d**3 * 2499 * 9.81
     resistance = submerged * physics.pivot_resistance(slope, beta)
     assert float(moment) == pytest.approx(float(resistance), rel=1e-12)
     angles = {"entrainment_angle_deg": beta, "slope_deg": slope}
@@ -127,11 +144,7 @@ def test_moments_balance_at_the_threshold(
 @every_law
 def test_an_array_of_grains_is_its_grains_in_turn(name: str) -> None:
     d, slope = np.array([[5e-5], [3e-4], [2e-3]]), np.array([0.0, 10.0, 25.0])
-    where, grain = (
-        Exposure(diameter=d, roughness=d / 10, fluid_density=1.0, viscosity=1e-5),
-        {"density": 2500.0, "entrainment_angle_deg": 60},
-    )
-    many = threshold(LAWS[name], where, slope_deg=slope, **grain)
+    many = of_air(name, d, 0.1, slope, 60, 1e-5)
     assert many.friction_velocity.shape == many.valid.shape == many.drag.shape == (3, 3)
     for i, j in np.ndindex(3, 3):
         single = of_air(
@@ -148,17 +161,18 @@ def test_an_array_of_grains_is_its_grains_in_turn(name: str) -> None:
 def test_thresholds_rise_with_slope_weight_and_the_depth_of_the_pocket(
     name: str, d: float, ratio: float, beta: float, factor: float
 ) -> None:
-    where, grain = (
-        Exposure(diameter=d, roughness=ratio * d, fluid_density=1.0, viscosity=1e-5),
-        {"density": 2500.0},
-    )
     slopes = np.linspace(0, beta, 9)
-    angle = {"entrainment_angle_deg": beta}
-    up = threshold(
-        LAWS[name], where, slope_deg=slopes, **grain, **angle
-    ).friction_velocity
+    up = of_air(name, d, ratio, slopes, beta, 1e-5).friction_velocity
     assert np.all(np.diff(up) > 0)
-    heavy = threshold(LAWS[name], where, density=2500.0 * factor, slope_deg=0, **angle)
+    grain = Grain(
+        diameter=d,
+        density=2500.0 * factor,
+        roughness=ratio * d,
+        fluid_density=1.0,
+        viscosity=1e-5,
+        entrainment_angle_deg=beta,
+    )
+    heavy = threshold(LAWS[name], grain)
     assert float(heavy.friction_velocity) > up[0]
     assert float(of_air(name, d, ratio, 0, beta - 4, 1e-5).friction_velocity) > up[0]
 
@@ -166,10 +180,11 @@ def test_thresholds_rise_with_slope_weight_and_the_depth_of_the_pocket(
 def test_without_resistance_a_grain_moves_at_once() -> None:
     found = threshold(
         LAWS["bridged"],
-        Exposure(diameter=1e-3, roughness=1e-4, fluid_density=1000.0, viscosity=1e-6),
-        density=np.array([2650.0, 900.0, 2650.0, np.nan]),
-        slope_deg=np.array([-50.0, 0.0, 0.0, 0.0]),
-        entrainment_angle_deg=45.0,
+        SAND.changed(
+            density=np.array([2650.0, 900.0, 2650.0, np.nan]),
+            slope_deg=np.array([-50.0, 0.0, 0.0, 0.0]),
+            entrainment_angle_deg=45.0,
+        ),
     )
     ustar = found.friction_velocity
     np.testing.assert_array_equal(ustar == 0, [True, True, False, False])
@@ -186,35 +201,30 @@ def test_a_grain_without_resistance_moves_at_once_under_any_law(name: str) -> No
 
 def test_a_grain_that_no_flow_moves_has_an_infinite_threshold() -> None:
     # a grain without lift, in a pocket that is bottomless for a drag
-    where = Exposure(
-        diameter=1e-3,
-        roughness=1e-3 / 30,
-        fluid_density=1000.0,
-        viscosity=1e-6,
-        lift_coefficient=0.0,
-    )
-    angles = {"slope_deg": 0, "entrainment_angle_deg": 0}
-    found = threshold(LAWS["bridged"], where, density=2650.0, **angles)
+    grain = SAND.changed(lift_coefficient=0.0, entrainment_angle_deg=0)
+    found = threshold(LAWS["bridged"], grain)
     assert float(found.friction_velocity) == float(found.shields) == np.inf
     assert not bool(found.valid)
 
 
 def test_a_lift_beyond_the_weight_ends_the_pivot() -> None:
     """Up a slope the lift can pass the weight before the drag turns the grain."""
-    grain = {"density": 2650.0, "slope_deg": 20}
     for lift, reason in ((10.0, "lift over the weight"), (1.615, "")):
-        where = Exposure(
+        grain = Grain(
             diameter=5e-4,
-            roughness=5e-4 / 30,
+            density=2650.0,
             fluid_density=1.2,
             viscosity=1.5e-5,
+            slope_deg=20,
+            entrainment_angle_deg=50,
             lift_coefficient=lift,
         )
-        found = threshold(LAWS["bridged"], where, entrainment_angle_deg=50, **grain)
+        found = threshold(LAWS["bridged"], grain)
         assert bool(found.valid) == (not reason)
-        (texts,) = physics.why_not(
-            LAWS["bridged"], found.friction_velocity, where, **grain
-        )
+        (texts,) = physics.why_not(LAWS["bridged"], found.friction_velocity, grain)
+        assert physics.why_not(
+            LAWS["bridged"], found.friction_velocity, grain, lifts=False
+        ) == [[]]
         assert reason in "".join(texts)
         assert bool(texts) == bool(reason)
 
@@ -225,11 +235,6 @@ def test_a_small_grain_hides_between_its_neighbours() -> None:
     assert float(physics.standing_out(1.0, 60.0)) == pytest.approx(np.sqrt(0.75))
     sizes = np.array([0.1, 0.2, 0.5, 1.0, 3.0, 10.0])
     assert np.all(np.diff(physics.standing_out(sizes, 60.0)) > 0)
-
-
-SAND = Exposure(diameter=1e-3, roughness=1e-4, fluid_density=1000.0, viscosity=1e-6)
-UNIT = np.full(4, SAND.ustar(1.0))
-"""A grain in water, and friction velocities of four such grains at Re* = 1, m/s."""
 
 
 def test_unreached_is_infinite_and_no_need_of_flow_is_zero() -> None:
@@ -288,19 +293,8 @@ def test_the_resistance_of_a_pivot_is_symmetric_about_the_entrainment_angle(
 
 
 def test_a_lift_lowers_the_threshold() -> None:
-    without_lift = threshold(
-        LAWS["bridged"],
-        Exposure(
-            diameter=3e-4,
-            roughness=1e-5,
-            fluid_density=1000.0,
-            viscosity=1e-6,
-            lift_coefficient=0.0,
-        ),
-        density=2650.0,
-        slope_deg=0,
-        entrainment_angle_deg=50,
-    )
+    grain = SAND.changed(diameter=3e-4, roughness=1e-5, entrainment_angle_deg=50)
+    without_lift = threshold(LAWS["bridged"], grain.changed(lift_coefficient=0.0))
     lifted = water(3e-4).friction_velocity
     assert float(lifted) < float(without_lift.friction_velocity)
 
@@ -320,18 +314,17 @@ def test_a_root_that_is_not_found_is_not_known() -> None:
 class Blind(Bridged):
     """A law that does not know its drag above a friction velocity."""
 
-    def drag(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
+    def drag(self, ustar: ArrayLike, at: Grain) -> FloatArray:
         u = np.asarray(ustar, float)
         return np.asarray(np.where(u > 0.2, np.nan, super().drag(u, at)))
 
 
 def test_what_a_law_does_not_know_is_neither_never_nor_at_once() -> None:
-    sand = Exposure(diameter=1e-3, roughness=1e-4, fluid_density=1.2, viscosity=1.5e-5)
-    grain = {"density": 2650.0, "entrainment_angle_deg": 60.0}
+    sand = SAND.changed(fluid_density=1.2, viscosity=1.5e-5, entrainment_angle_deg=60.0)
     slopes = np.array([0.0, -29.9, -40.0])  # not known, known, at once
     law = Blind()
-    along = threshold(law, sand, slope_deg=slopes, **grain).friction_velocity
-    across = threshold_across(law, sand, slope_deg=-slopes, heading_deg=180.0, **grain)
+    along = threshold(law, sand.changed(slope_deg=slopes)).friction_velocity
+    across = threshold_across(law, sand.changed(slope_deg=-slopes), 180.0)
     for found in (along, across):
         assert np.isnan(found[0])
         assert 0 < found[1] < 0.2

@@ -7,8 +7,9 @@ import pandas as pd
 import pytest
 
 from orchestrator.physics import saltation, verdict
+from orchestrator.physics.grain import Grain
 from orchestrator.physics.gusts import peak_over_mean
-from orchestrator.physics.threshold import SingleGrain, thresholds_of
+from orchestrator.physics.threshold import thresholds_of
 from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.report import answers, drawing, head, head_grain, shields, single
 from orchestrator.report.card import Card, Number, Worth, lines
@@ -188,7 +189,7 @@ def test_the_answer_of_a_picture_is_that_of_the_card() -> None:
     leaves = answers.by_law(pd.Series(asked))["bridged"][0]
     by_law = answers.by_law(pd.Series({**asked, "criterion": "goes on"}))
     goes_on, holds = by_law["bridged"]
-    (steady,) = thresholds_of("bridged", [SingleGrain.of_row(asked)])
+    steady = thresholds_of("bridged", Grain.of_table(asked))
     assert leaves == pytest.approx(float(steady.friction_velocity))
     # a gust of 2.28 times the mean stress turns it over
     gust = leaves / math.sqrt(saltation.PEAK)

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import BUFFINGTON_MONTGOMERY
 from orchestrator.physics.onset import of_grains
@@ -113,7 +114,7 @@ def test_closed_form_lines_are_solid_where_their_equation_holds(
 def test_grains_of_every_law_lie_on_its_line(law: str, bed: pd.DataFrame) -> None:
     scenes = bed.assign(force_law=law)
     (line,) = [one for one in theory.lines(scenes) if one.law == law]
-    exact = of_grains(scenes, law)
+    exact = of_grains(Grain.of_table(scenes), law)
     assert line.tau(exact.reynolds) == pytest.approx(exact.shields, rel=1e-6)
     assert (line.holds(exact.reynolds) == exact.valid).all()
     assert (line.first, line.last) == (exact.reynolds.min(), exact.reynolds.max())

@@ -227,8 +227,8 @@ def test_motion_starts_on_a_natural_dune_where_stress_and_slope_say(
     x, ustar = row["first_x_m"], stress["ustar_over_ustar0_wall"]
     assert 28 < x == pytest.approx(stress["x_m"][int(ustar.argmax())], abs=0.3)
     (slope,) = whole.model.line.slopes_deg[np.searchsorted(whole.model.line.x, [x]) - 1]
-    grain = replace(single_grain(whole.scene), slope_deg=slope)
-    (by_hand,) = thresholds_of("bridged", [grain])
+    grain = single_grain(whole.scene).changed(slope_deg=slope)
+    by_hand = thresholds_of("bridged", grain)
     felt = by_hand.friction_velocity / np.interp(x, stress["x_m"], ustar)
     assert row["first_ustar0_m_s"] == pytest.approx(felt, rel=0.03)
     # the pivots around the place say the same, and those of the metre just before it

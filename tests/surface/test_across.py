@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.physics.constants import LIFT_COEFFICIENT
-from orchestrator.physics.laws import LAWS, Exposure
+from orchestrator.physics.grain import Grain
+from orchestrator.physics.laws import LAWS
 from orchestrator.physics.threshold import threshold
 from orchestrator.surface.across import slope_along_deg, threshold_across
 
@@ -16,13 +17,14 @@ REPOSE_DEG = 35.0
 ROUGH = [name for name in LAWS if name != "low"]
 
 
-def grain(lift: float = LIFT_COEFFICIENT) -> Exposure:
-    return Exposure(
+def grain(lift: float = LIFT_COEFFICIENT) -> Grain:
+    return Grain(
         diameter=1e-3,
         roughness=1e-3 / 30,
         fluid_density=1000.0,
         viscosity=1e-6,
         lift_coefficient=lift,
+        **SAND,
     )
 
 
@@ -34,17 +36,9 @@ def test_along_the_slope_it_is_the_threshold_of_the_pivot(
 ) -> None:
     slopes = np.linspace(0.0, REPOSE_DEG - 0.5, 40)
     signed = slopes if heading_deg == 0 else -slopes
-    found = threshold_across(
-        LAWS[name],
-        grain(),
-        slope_deg=slopes,
-        heading_deg=heading_deg,
-        cohesion=cohesion,
-        **SAND,
-    )
-    exact = threshold(
-        LAWS[name], grain(), slope_deg=signed, cohesion=cohesion, **SAND
-    ).friction_velocity
+    sand = grain().changed(cohesion=cohesion)
+    found = threshold_across(LAWS[name], sand.changed(slope_deg=slopes), heading_deg)
+    exact = threshold(LAWS[name], sand.changed(slope_deg=signed)).friction_velocity
     assert np.abs(found / exact - 1).max() < 1e-12
 
 
@@ -58,7 +52,7 @@ def test_without_lift_the_drag_is_that_of_brooks(
     law = LAWS["bridged"]
     at = grain(lift=0.0)
     slopes = [0.0, slope_deg]
-    ustar = threshold_across(law, at, slope_deg=slopes, heading_deg=heading_deg, **SAND)
+    ustar = threshold_across(law, at.changed(slope_deg=slopes), heading_deg)
     on_level, on_slope = law.drag(ustar, at)
     b, c, p = np.radians([slope_deg, heading_deg, REPOSE_DEG])
     under = np.cos(b) ** 2 - (np.sin(c) * np.sin(b) / np.tan(p)) ** 2
@@ -73,9 +67,8 @@ def test_both_sides_are_alike_and_turning_downhill_needs_less(
     law = LAWS["bridged"]
     turned = heading_deg + (180.0 - heading_deg) / 2
     headings = [heading_deg, -heading_deg, turned]
-    left, right, further = threshold_across(
-        law, grain(), slope_deg=slope_deg, heading_deg=headings, **SAND
-    )
+    sand = grain().changed(slope_deg=slope_deg)
+    left, right, further = threshold_across(law, sand, headings)
     assert left == pytest.approx(right, rel=1e-12)
     assert further <= left * (1 + 1e-12)
 
@@ -83,9 +76,8 @@ def test_both_sides_are_alike_and_turning_downhill_needs_less(
 def test_on_a_slope_of_repose_grains_are_loose_whatever_the_heading() -> None:
     slopes = [REPOSE_DEG - 0.1, REPOSE_DEG + 0.1]
     headings = np.array([[0.0], [90.0], [180.0]])
-    found = threshold_across(
-        LAWS["bridged"], grain(), slope_deg=slopes, heading_deg=headings, **SAND
-    )
+    sand = grain().changed(slope_deg=slopes)
+    found = threshold_across(LAWS["bridged"], sand, headings)
     assert (found[:, 0] > 0).all()
     assert (found[:, 1] == 0).all()
     # a stress down the slope has next to nothing to do

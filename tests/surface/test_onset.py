@@ -1,7 +1,5 @@
 """Where a bed in three dimensions moves: slopes, headings, shares and hours."""
 
-from dataclasses import replace
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,11 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.physics import saltation
-from orchestrator.physics.threshold import SingleGrain, thresholds_of
+from orchestrator.physics.grain import Grain
+from orchestrator.physics.threshold import thresholds_of
 from orchestrator.surface import onset
 from orchestrator.surface.onset import Shares
 
-SAND = SingleGrain(
+SAND = Grain(
     diameter=5e-4,
     roughness=5e-4 / 30,
     fluid_density=1.2,
@@ -47,7 +46,7 @@ def test_slope_and_heading_come_back_from_vectors(
 
 def test_a_level_face_has_the_threshold_of_a_level_bed() -> None:
     level = np.zeros(1)
-    (exact,) = thresholds_of("bridged", [SAND])
+    exact = thresholds_of("bridged", SAND)
     found = onset.leaves(SAND, "bridged", level, level + 90.0)
     assert found[0] == pytest.approx(float(exact.friction_velocity), rel=1e-12)
 
@@ -58,13 +57,7 @@ def test_grains_go_on_by_the_slope_along_the_stress() -> None:
     excess = (SAND.density / SAND.fluid_density - 1) * 9.81 * SAND.diameter
     leaving = onset.leaves(SAND, "bridged", slopes, headings)
     found = onset.goes_on(SAND, leaving, slopes, headings)
-    grains = saltation.Grains.of(
-        SAND.diameter,
-        density=SAND.density,
-        fluid_density=SAND.fluid_density,
-        viscosity=SAND.viscosity,
-        slope_deg=[20.0, 0.0, -20.0],
-    )
+    grains = SAND.changed(slope_deg=[20.0, 0.0, -20.0])
     going = saltation.tabulated(grains).initiation(saltation.PEAK)
     # the gust must turn the grain over its neighbours, and it must go on after that
     shields = np.maximum(leaving**2 / excess / saltation.PEAK, going)
@@ -72,8 +65,8 @@ def test_grains_go_on_by_the_slope_along_the_stress() -> None:
 
 
 def test_a_grain_that_cannot_hop_has_no_gust() -> None:
-    silt = replace(
-        SAND, diameter=1e-4, roughness=3e-6, fluid_density=1000.0, viscosity=1e-6
+    silt = SAND.changed(
+        diameter=1e-4, roughness=3e-6, fluid_density=1000.0, viscosity=1e-6
     )
     slopes = np.array([0.0, 20.0])
     leaving = onset.leaves(silt, "bridged", slopes, slopes)
