@@ -308,7 +308,8 @@ def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
     for why, times in reasons.most_common():
         yield f"  {times} answered: {why}"
     for why, times in Counter(_not_usable(plan, study.tolerance)).most_common():
-        yield f"  {times} will not be usable: {why}"
+        thresholds = number(times, "threshold")
+        yield f"  {thresholds} of piles will not be usable: {why}"
     if plan.checks:
         yield f"  {number(len(plan.checks), 'check')} by DEM of answers without it"
     if plan.smoothings:
@@ -319,19 +320,20 @@ def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
 
 
 def _not_usable(plan: Plan, tolerance: float | None) -> Iterator[str]:
-    """Why piles will not be usable whatever their runs give: a reason for each."""
+    """Why thresholds of piles will not be usable whatever their runs give."""
     for answer in plan.decisions.values():
         scene = answer.scene
-        bed = scene.bed
-        if not isinstance(bed, PileBed):
+        if not isinstance(scene.bed, PileBed):
             continue
-        error = answer.error_estimate
-        if scene.is_poured and not bed.width and scene.grain.sizes is None:
-            yield "equal spheres in one plane settle into a crystal"
-        elif error is None:
-            yield "the error of their fidelity on such beds is not known"
-        elif tolerance is not None and error > tolerance * (1 + 1e-9):
-            yield "no fidelity is known to be within the tolerance"
+        is_plane = scene.is_poured and not scene.bed.width
+        for fraction in scene.threshold.fractions:
+            error = answer.error_at(fraction)
+            if is_plane and scene.grain.sizes is None:
+                yield "equal spheres in one plane settle into a crystal"
+            elif error is None:
+                yield "the error of their fidelity on such beds is not known"
+            elif tolerance is not None and error > tolerance * (1 + 1e-9):
+                yield "no fidelity is known to be within the tolerance"
 
 
 def expected(

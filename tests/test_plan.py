@@ -22,17 +22,19 @@ bed = {{ kind = "pile", slope_deg = 15.0{} }}
         (
             ', packing = "poured"',
             "",
-            "1 will not be usable: equal spheres in one plane",
+            "4 thresholds of piles will not be usable: equal spheres in one plane",
         ),
         (
             "",
             'method.flow.model = "waves"\nmethod.kind = "pivot"',
-            "1 will not be usable: the error of their fidelity on such beds is not known",
+            "4 thresholds of piles will not be usable: the error of their fidelity on such "
+            "beds is not known",
         ),
         (
             "",
             "tolerance = 0.01",
-            "1 will not be usable: no fidelity is known to be within the tolerance",
+            "4 thresholds of piles will not be usable: no fidelity is known to be within "
+            "the tolerance",
         ),
         ("", "tolerance = 0.2", "1 check by DEM"),
     ],

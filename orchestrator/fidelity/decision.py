@@ -87,10 +87,11 @@ class Decision:
 
     @property
     def error_estimate(self) -> float | None:
-        """The known error with its uncertainty; None where it is not known."""
-        if math.isinf(self.known.total):
-            return None
-        return self.known.total
+        """The known error with its uncertainty, at the fraction where it is largest.
+
+        None where it is not known.
+        """
+        return _if_known(self.known.total)
 
     def error_at(self, fraction: float) -> float | None:
         """Find the known error of one threshold of the scene.
@@ -108,7 +109,7 @@ class Decision:
         """
         if not has_measured(self.scene, fraction):
             return None
-        return self.error_estimate
+        return _if_known(self.known.at(fraction).total)
 
     @property
     def is_along(self) -> bool:
@@ -125,6 +126,10 @@ class Decision:
         # rows without an end hold their grains by DEM: it is no check of places
         is_quasi_static = method.packs_grains and not method.is_resolved_in_time
         return is_pile and self.is_chosen and is_quasi_static
+
+
+def _if_known(error: float) -> float | None:
+    return error if math.isfinite(error) else None
 
 
 def decide(scene: Scene, tolerance: float | None) -> Decision:
@@ -497,7 +502,7 @@ def _cheapest(errors: Mapping[Fidelity, Known], most: float) -> tuple[Fidelity, 
         if error.total <= most:
             return one, f"{one.name}, the cheapest fidelity"
     least = min(error.total for error in errors.values())
-    alike = next(one for one, error in errors.items() if error.error <= least)
+    alike = next(one for one, error in errors.items() if error.worst.error <= least)
     why = "the cheapest fidelity that cannot be told from the best, which is known to"
     return alike, f"{alike.name}, {why} {least:.1%}: none is"
 

@@ -396,11 +396,16 @@ def has_measured(scene: Scene, fraction: float) -> bool:
     bool
         Whether the fraction is between those that were measured on its class.
     """
-    for part in _parts(scene):
-        rows = _measured().get((part, scene_class(part, scene), FRACTIONS))
-        if not _is_within(fraction, rows):
-            return False
-    return True
+    return all(
+        _has_measured(part, scene_class(part, scene), fraction)
+        for part in _parts(scene)
+    )
+
+
+@cache
+def _has_measured(part: str, name: str, fraction: float) -> bool:
+    """Whether errors of a class were measured at a fraction, or on both sides of it."""
+    return _is_within(fraction, _measured().get((part, name, FRACTIONS)))
 
 
 def unmeasured(scene: Scene) -> str:

@@ -6,6 +6,8 @@ where it is within what they were (`orchestrator.fidelity.domain`).
 """
 
 import math
+from collections.abc import Iterable
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -19,7 +21,7 @@ from orchestrator.fidelity.classes import (
     LEVEL_BED,
     scene_class,
 )
-from orchestrator.fidelity.domain import unmeasured
+from orchestrator.fidelity.domain import has_measured, unmeasured
 from orchestrator.fidelity.fidelities import (
     FIDELITIES,
     FLAT,
@@ -31,42 +33,126 @@ from orchestrator.fidelity.fidelities import (
     Rung,
 )
 from orchestrator.study.scene import Scene
-from orchestrator.types import FloatArray
 
 FOLDER = Path(__file__).with_name("calibration")
 LEAST_SCENES = 10  # of a class, for an error to be known
 UNBOUND = 10.0  # a rung that was off by so many times a threshold says nothing of it
 
 
-class Known(NamedTuple):
-    """Known relative error of tau_c against the reference.
+class Error(NamedTuple):
+    """Relative error of tau_c against the reference, at one fraction.
 
     Attributes
     ----------
     error
         Largest relative difference from the reference.
     uncertainty
-        Change of the reference itself when its own numbers were changed; NaN where
+        Change of the reference itself when its own numbers were changed; None where
         that was not tried.
     """
 
     error: float
-    uncertainty: float
+    uncertainty: float | None
 
     @property
     def total(self) -> float:
         """Error and known uncertainty: the root of the sum of their squares."""
-        return math.hypot(self.error, float(np.nan_to_num(self.uncertainty)))
+        return math.hypot(self.error, self.uncertainty or 0.0)
 
 
-UNKNOWN = Known(math.inf, math.inf)
+class Measured(NamedTuple):
+    """The measured errors of a rung on a class of scenes.
+
+    Attributes
+    ----------
+    fractions
+        Fractions n/N at which they were measured, from the least.
+    errors, uncertainties
+        What `Error` has, at each of them.
+    """
+
+    fractions: tuple[float, ...]
+    errors: tuple[float, ...]
+    uncertainties: tuple[float | None, ...]
+
+    def at(self, fraction: float) -> Error:
+        """Find the error at a fraction; between two that were measured, the larger.
+
+        Parameters
+        ----------
+        fraction
+            Fraction n/N, of those measured or between them.
+
+        Returns
+        -------
+        Error
+            Error and uncertainty.
+        """
+        index = float(np.interp(fraction, self.fractions, range(len(self.fractions))))
+        beside = {math.floor(index), math.ceil(index)}
+        found = [Error(self.errors[i], self.uncertainties[i]) for i in beside]
+        return max(found, key=lambda one: one.total)
+
+
+@dataclass(frozen=True)
+class Known:
+    """Known error of a pile.
+
+    Attributes
+    ----------
+    parts
+        What was measured of its flow and of its grains, as far as these have errors;
+        None where nothing is known.
+    fractions
+        Fractions n/N at which the pile is asked for, and errors were measured.
+    """
+
+    parts: tuple[Measured, ...] | None
+    fractions: tuple[float, ...] = ()
+
+    def at(self, fraction: float) -> Error:
+        """Find the error at a fraction.
+
+        Errors and uncertainties of flow and grains add up by their squares
+        (docs/ladder.md).
+
+        Parameters
+        ----------
+        fraction
+            Fraction n/N, of those measured or between them.
+
+        Returns
+        -------
+        Error
+            Error and uncertainty; infinite where they are not known.
+        """
+        if self.parts is None:
+            return Error(math.inf, math.inf)
+        parts = [part.at(fraction) for part in self.parts]
+        found = Error(
+            math.hypot(*(part.error for part in parts)),
+            math.hypot(*(part.uncertainty or 0.0 for part in parts)),
+        )
+        return found if found.total < UNBOUND else Error(math.inf, math.inf)
+
+    @property
+    def worst(self) -> Error:
+        """The error at the asked fraction at which it is largest."""
+        found = map(self.at, self.fractions)
+        nothing = Error(math.inf, math.inf)
+        return max(found, key=lambda one: one.total, default=nothing)
+
+    @property
+    def total(self) -> float:
+        """The largest error with its uncertainty, of the asked fractions."""
+        return self.worst.total
+
+
+UNKNOWN = Known(None)
 
 
 def known(fidelity: Fidelity, scene: Scene) -> Known:
-    """Known error of a fidelity on a pile, at the fraction where it is largest.
-
-    Errors and uncertainties of flow and grains add up by their squares
-    (docs/ladder.md).
+    """Known error of a fidelity on a pile, at each of its fractions.
 
     Parameters
     ----------
@@ -93,9 +179,13 @@ def known(fidelity: Fidelity, scene: Scene) -> Known:
     elif fidelity is OWN_NUMBERS:
         flow = _no_finer(FLOW, scene)
         grains = _no_finer(GRAINS, scene)
-    return _of_classes(
-        flow, grains, scene_class(FLOW, scene), scene_class(GRAINS, scene)
-    )
+    flow_class, grain_class = scene_class(FLOW, scene), scene_class(GRAINS, scene)
+    keys = [(GRAINS, grains.name, grain_class)]
+    if flow_class == LEVEL_BED and flow is not FLAT:
+        return UNKNOWN
+    if flow_class != LEVEL_BED:
+        keys.append((FLOW, flow.name, flow_class))
+    return _of(keys, scene)
 
 
 def _of_flow(scene: Scene) -> Known:
@@ -105,11 +195,21 @@ def _of_flow(scene: Scene) -> Known:
     """
     name = scene_class(FLOW, scene)
     if name == LEVEL_BED:
-        return Known(0.0, 0.0)
-    found = measured().get((FLOW, _no_finer(FLOW, scene).name, name))
-    if found is None:
-        return UNKNOWN
-    return _worst(*found)
+        return _of([], scene)
+    return _of([(FLOW, _no_finer(FLOW, scene).name, name)], scene)
+
+
+def _of(keys: Iterable[tuple[str, str, str]], scene: Scene) -> Known:
+    """Known error of the rungs of a pile on their classes."""
+    table = measured()
+    parts = []
+    for key in keys:
+        if key not in table:
+            return UNKNOWN
+        parts.append(table[key])
+    asked = scene.threshold.fractions
+    fractions = tuple(one for one in asked if has_measured(scene, one))
+    return Known(tuple(parts), fractions)
 
 
 def _no_finer(part: str, scene: Scene) -> Rung:
@@ -126,50 +226,27 @@ def _no_finer(part: str, scene: Scene) -> Rung:
     return OWN
 
 
-@cache  # a study has thousands of scenes of a few classes
-def _of_classes(flow: Rung, grains: Rung, flow_class: str, grain_class: str) -> Known:
-    """Known error of two rungs on two classes; unknown where it has no bound."""
-    keys = [(GRAINS, grains.name, grain_class)]
-    if flow_class == LEVEL_BED and flow is not FLAT:
-        return UNKNOWN
-    if flow_class != LEVEL_BED:
-        keys.append((FLOW, flow.name, flow_class))
-    table = measured()
-    if not all(key in table for key in keys):
-        return UNKNOWN
-    # both parts at each fraction, and the worst fraction
-    parts = np.array([table[key] for key in keys])
-    errors = np.hypot.reduce(parts[:, 0])
-    uncertainties = np.hypot.reduce(np.nan_to_num(parts[:, 1]))
-    found = _worst(errors, uncertainties)
-    return found if found.total < UNBOUND else UNKNOWN
-
-
-def _worst(errors: FloatArray, uncertainties: FloatArray) -> Known:
-    """Error and uncertainty at the fraction where both together are largest."""
-    both = np.hypot(errors, np.nan_to_num(uncertainties))
-    worst = int(np.argmax(both))
-    return Known(float(errors[worst]), float(uncertainties[worst]))
-
-
 @cache
-def measured() -> dict[tuple[str, str, str], FloatArray]:
+def measured() -> dict[tuple[str, str, str], Measured]:
     """The measured errors, by part, name of the rung and class of scene.
 
-    Each is an array with the rows error and uncertainty, and a column for each
-    fraction. What fewer than `LEAST_SCENES` scenes say is left out: a class, or an
-    uncertainty, which is NaN then. Without it nobody knows what the reference is worth:
-    of grains nothing is known of the class, of the flow nothing of the reference.
+    What fewer than `LEAST_SCENES` scenes say is left out: a class, or an uncertainty,
+    which is None then. Without it nobody knows what the reference is worth: of grains
+    nothing is known of the class, of the flow nothing of the reference.
     """
     table = pd.read_csv(FOLDER / "errors.csv").sort_values("fraction")
     is_tried = table["uncertainty_scenes"] >= LEAST_SCENES
     table["uncertainty"] = table["uncertainty"].where(is_tried)
-    found: dict[tuple[str, str, str], FloatArray] = {}
+    found: dict[tuple[str, str, str], Measured] = {}
     for (part, rung, name), rows in table.groupby(["part", "rung", "scene_class"]):
         is_bare = rows["uncertainty"].isna().any()
         if is_bare and (part == GRAINS or rung == REFERENCE.name):
             continue
         if rows["scenes"].min() >= LEAST_SCENES:
-            numbers = rows[["error", "uncertainty"]].to_numpy(float).T
-            found[str(part), str(rung), str(name)] = numbers
+            uncertainties = rows["uncertainty"].astype(object)
+            found[str(part), str(rung), str(name)] = Measured(
+                tuple(rows["fraction"]),
+                tuple(rows["error"]),
+                tuple(uncertainties.where(rows["uncertainty"].notna(), None)),
+            )
     return found

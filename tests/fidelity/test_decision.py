@@ -44,7 +44,7 @@ def test_the_choice_is_within_the_tolerance_or_says_that_none_is(
         assert "none is" not in chosen.why
     else:
         assert "none is within the tolerance" in chosen.why
-        assert chosen.known.error <= min(error.total for error in errors.values())
+        assert chosen.known.worst.error <= min(error.total for error in errors.values())
 
 
 @pytest.mark.parametrize(

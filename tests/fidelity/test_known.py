@@ -71,12 +71,37 @@ def test_a_pile_belongs_to_one_class_for_the_flow_and_one_for_the_grains(
     assert (scene_class(FLOW, scene), scene_class(GRAINS, scene)) == (flow, grains)
 
 
+KEYS = ((FLOW, "static", "wall"), (GRAINS, "static", "aligned"))
+
+
+def _totals(*keys: tuple[str, str, str]) -> list[list[float]]:
+    """Errors with their uncertainties, a row for each part."""
+    fractions = (0.1, 0.3, 0.5, 0.7)
+    return [[measured()[key].at(one).total for one in fractions] for key in keys]
+
+
 def test_errors_of_flow_and_grains_add_up_by_their_squares(pile: MakePile) -> None:
-    table = measured()
-    flow, grains = table[FLOW, "static", "wall"], table[GRAINS, "static", "aligned"]
-    squares = np.nan_to_num(flow) ** 2 + grains**2
-    found = known(STATIC, pile())
-    assert found.total == pytest.approx(math.sqrt(squares.sum(axis=0).max()))
+    scene = pile({"threshold.fractions": [0.1, 0.3, 0.5, 0.7]})
+    expected = np.hypot(*_totals(*KEYS))
+    found = known(STATIC, scene)
+    assert [found.at(one).total for one in (0.1, 0.3, 0.5, 0.7)] == pytest.approx(
+        expected
+    )
+    assert found.total == pytest.approx(expected.max())
+    # of the fractions that are asked for, and no others
+    upper = known(STATIC, pile({"threshold.fractions": [0.3, 0.5, 0.7]}))
+    assert upper.total == pytest.approx(expected[1:].max())
+
+
+def test_between_two_fractions_the_larger_error_holds(pile: MakePile) -> None:
+    scene = pile({"threshold.fractions": [0.1, 0.2, 0.3, 0.35]})
+    found = known(STATIC, scene)
+    lower, upper = found.at(0.1).total, found.at(0.3).total
+    assert lower != upper
+    for key in KEYS:
+        part = measured()[key]
+        assert part.at(0.2).total == max(part.at(0.1).total, part.at(0.3).total)
+    assert found.at(0.2).total >= max(lower, upper)
 
 
 def test_a_class_of_fewer_than_ten_scenes_has_no_known_error(
@@ -87,8 +112,7 @@ def test_a_class_of_fewer_than_ten_scenes_has_no_known_error(
     assert (table[of_class]["scenes"] >= LEAST_SCENES).all()
     fewer = table.assign(scenes=table["scenes"].where(~of_class, LEAST_SCENES - 1))
     monkeypatch.setattr(pd, "read_csv", lambda path: fewer)
-    for cached in ("measured", "_of_classes"):
-        monkeypatch.setattr(errors, cached, getattr(errors, cached).__wrapped__)
+    monkeypatch.setattr(errors, "measured", errors.measured.__wrapped__)
     assert known(STATIC, pile()) == UNKNOWN
     assert math.isfinite(known(STATIC, pile(packing="horizontal")).total)
 
@@ -160,6 +184,8 @@ def test_own_numbers_have_the_error_of_a_coarser_fidelity(pile: MakePile) -> Non
     softest = changed(coarser, {"method.grains.stiffness": 100.0})
     assert known(OWN_NUMBERS, softest) == UNKNOWN
     pivot = changed(scene, {"method.kind": "pivot"})
-    flow = measured()[FLOW, "standard", "wall"]
-    expected = np.hypot(np.nan_to_num(flow), measured()[GRAINS, "quick", "aligned"])
-    assert known(OWN_NUMBERS, pivot).total == pytest.approx(np.hypot(*expected).max())
+    parts = ((FLOW, "standard", "wall"), (GRAINS, "quick", "aligned"))
+    found = known(OWN_NUMBERS, pivot)
+    for fraction in pivot.threshold.fractions:
+        totals = [measured()[part].at(fraction).total for part in parts]
+        assert found.at(fraction).total == pytest.approx(math.hypot(*totals))

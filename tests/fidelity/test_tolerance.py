@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 
@@ -62,12 +61,11 @@ def test_an_answer_that_its_check_contradicts_is_not_usable(
     # quick by pivots, and data that call them good for level rows, which they are not
     monkeypatch.setitem(QUICK.grains.on, "horizontal", {})
     wrong = {
-        (part, one.name, like): np.tile([[0.01], [0.0]], 4)
+        (part, one.name, like): known.Measured((0.1, 0.7), (0.01, 0.01), (0.0, 0.0))
         for part, like in (("flow", "wall"), ("grains", "horizontal"))
         for one in FIDELITIES
     }
     monkeypatch.setattr(known, "measured", lambda: wrong)
-    monkeypatch.setattr(known, "_of_classes", known._of_classes.__wrapped__)
     tables = _run("horizontal", tmp_path, BY_HAND)
     groups = tables["scenes"][["scene_id", "group"]]
     answers = tables["pile_threshold"].merge(groups)
