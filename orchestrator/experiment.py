@@ -246,7 +246,8 @@ class Experiment:
     def _todo(self, cases: Path) -> dict[str, case.Case]:
         """The runs that are missing, but for those that have ended by a verdict."""
         todo = {}
-        missing = self.planned.missing(cases, self.planned.done(cases))
+        done = reuse.done(self.planned.cases, cases)
+        missing = self.planned.missing(cases, done)
         for name, run in missing.items():
             ended, _ = case.failure(cases / name)
             if ended not in self.verdicts:
@@ -262,7 +263,7 @@ class Experiment:
         """
         cases = space.cases
         with style.settings():
-            runs = Runs(self.planned, cases, self.planned.done(cases))
+            runs = Runs(self.planned, cases, reuse.done(self.planned.cases, cases))
             tables, sections = self.results(runs)
             if not tables and failed:
                 raise next(iter(failed.values()))

@@ -13,7 +13,7 @@ from orchestrator.command import say
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.plan import Plan
 from orchestrator.report.results import Results
-from orchestrator.runs import case, cluster, engine, terminal, workspace
+from orchestrator.runs import case, cluster, engine, reuse, terminal, workspace
 from orchestrator.runs.case import Case
 from orchestrator.runs.cluster import Queue
 from orchestrator.runs.workspace import EXPERIMENT, STATE, STUDY, Workspace, claimed
@@ -111,7 +111,7 @@ def run(
             study=study.text,
             tolerance=study.tolerance,
         )
-        states = planned.done(space.cases)
+        states = reuse.done(planned.cases, space.cases)
         todo = planned.missing(space.cases, states)
         failed = complete(
             todo,
@@ -123,7 +123,7 @@ def run(
         )
         failures = _with_advice(failed, planned)
         if todo:
-            states |= planned.done(space.cases, but=states)
+            states |= reuse.done(todo, space.cases)
         elif planned.cases:
             print("every case was done already; no solver was started", file=sys.stderr)
         else:
@@ -256,7 +256,7 @@ def redraw(out: Path, *, every: bool = False) -> Finished:
     space = Workspace(out.absolute())
     study, planned = reopen(space)
     with claimed(space.root, STUDY, study.name, new=False):
-        states = planned.done(space.cases)
+        states = reuse.done(planned.cases, space.cases)
         space.check_cases_of_tables(states)
         failed = {}
         for name in planned.cases:
@@ -290,7 +290,7 @@ def prune(directory: Path) -> str:
             return workspace.prune(space, ids, ())
     study, planned = reopen(space)
     with claimed(space.root, STUDY, study.name, new=False):
-        done = planned.done(space.cases)
+        done = reuse.done(planned.cases, space.cases)
         made = tables.make(study, planned, space.cases, done)
         drawn = report.drawn_from(Results(study, planned, made, space.cases))
         kept = {case.name for case in drawn}

@@ -2,14 +2,11 @@
 
 import time
 import timeit
-import warnings
 from collections import Counter
-from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -18,8 +15,8 @@ from orchestrator.fidelity import decision, limits, smoothing
 from orchestrator.fidelity.decision import Decision, decide
 from orchestrator.grains.cells import SingleGrainCase, batches
 from orchestrator.grains.pile import Pile
-from orchestrator.runs import processors, reuse
-from orchestrator.runs.case import Case, done_state, is_whole
+from orchestrator.runs import reuse
+from orchestrator.runs.case import Case, is_whole
 from orchestrator.runs.engine import human
 from orchestrator.study.closed_form import law_holds, regime_of
 from orchestrator.study.parts import PileBed
@@ -97,57 +94,6 @@ class Plan:
     def ids(self) -> dict[str, str]:
         """The ids of the cases, by name."""
         return {name: case.id for name, case in self.cases.items()}
-
-    def done(
-        self, directory: Path, but: Container[str] = ()
-    ) -> dict[str, dict[str, Any]]:
-        """Read the markers of the cases that are done.
-
-        Results are checked. A case that other code has made is done only if the present
-        code would make the same. A case is not done either if it needs one that is not.
-
-        Parameters
-        ----------
-        directory
-            The directory of the cases.
-        but
-            Names of cases that are left out.
-
-        Returns
-        -------
-        dict of str to dict
-            The markers, by name.
-        """
-        names = [name for name in self.cases if name not in but]
-        cases = [self.cases[name] for name in names]
-        with ThreadPoolExecutor(
-            processors.count()
-        ) as pool:  # gigabytes of results are read
-            states = pool.map(partial(done_state, cases=directory), cases)
-        done: dict[str, dict[str, Any]] = {}
-        outdated: set[str] = set()
-        for case, state in zip(cases, states, strict=True):
-            if not state:
-                continue
-            needs = {need.name for need in case.needs}
-            if needs & outdated or not reuse.is_as_made_now(case, directory):
-                outdated.add(case.name)
-            else:
-                done[case.name] = state
-        if outdated:
-            warnings.warn(self._outdated(outdated, directory), stacklevel=2)
-        return done
-
-    def _outdated(self, names: Collection[str], directory: Path) -> str:
-        """Say why some finished cases do not count as done."""
-        pruned = [name for name in names if not is_whole(self.cases[name], directory)]
-        what = f"{len(names)} cases were made by other code of this program"
-        if len(pruned) < len(names):
-            what += ", which now makes them otherwise"
-        if pruned:
-            why = "so that nothing is left to compare"
-            what += f"; {len(pruned)} of them were pruned, {why}"
-        return what
 
     def missing(self, directory: Path, done: Container[str]) -> dict[str, Case]:
         """List the cases to be run.
@@ -358,7 +304,7 @@ def expected(
         Lines of text: cases by kind, expected time and disk.
     """
     found = reuse.elsewhere(plan.cases, directory, beside)
-    done = {*plan.done(directory), *found}
+    done = {*reuse.done(plan.cases, directory, holds=False), *found}
     missing = plan.missing(directory, done).values()
     kinds = _counted(case.kind for case in plan.cases.values()) or "none"
     todo = _counted(case.kind for case in missing) or "none"

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from orchestrator import plan, tables
 from orchestrator.report.results import Results
-from orchestrator.runs import engine
+from orchestrator.runs import engine, reuse
 from orchestrator.study import study
 from tests.waiting import HANGS_S
 
@@ -43,9 +43,9 @@ def run(out: Path, text: str = TEXT) -> Results:
     cases.mkdir(parents=True, exist_ok=True)
     asked = study.parse(text, name="small", where="test")
     planned = plan.make(asked, cases=cases)
-    done = planned.done(cases)
+    done = reuse.done(planned.cases, cases)
     todo = {name: one for name, one in planned.cases.items() if name not in done}
     with engine.local(cases, workers=2, limit_s=HANGS_S) as pool:
         assert not engine.run(todo, pool, lambda *_: None)
-    made = tables.make(asked, planned, cases, planned.done(cases))
+    made = tables.make(asked, planned, cases, reuse.done(planned.cases, cases))
     return Results(asked, planned, made, cases)

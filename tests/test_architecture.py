@@ -62,7 +62,7 @@ def _room(module: str) -> str:
     return module.split(".")[1]
 
 
-def _arrows() -> list[tuple[str, str]]:
+def arrows() -> list[tuple[str, str]]:
     """Which module imports which other one."""
     arrows = []
     for name, path in MODULES.items():
@@ -82,22 +82,22 @@ def test_every_module_has_its_room_in_the_document() -> None:
 def test_a_room_imports_from_those_below_it() -> None:
     rooms = _rooms()
     upward = []
-    for name, other in _arrows():
+    for name, other in arrows():
         if rooms.index(_room(other)) > rooms.index(_room(name)):
             upward.append(f"{name} imports {other}")
     assert upward == []
 
 
-def _reached(start: str, graph: dict[str, set[str]]) -> set[str]:
+def reached(start: str, graph: dict[str, set[str]]) -> set[str]:
     """The modules that a module imports, directly or through others."""
-    reached: set[str] = set()
+    found: set[str] = set()
     todo = [start]
     while todo:
         for other in graph.get(todo.pop(), ()):
-            if other not in reached:
-                reached.add(other)
+            if other not in found:
+                found.add(other)
                 todo.append(other)
-    return reached
+    return found
 
 
 def test_no_module_of_the_core_imports_a_guest() -> None:
@@ -105,7 +105,7 @@ def test_no_module_of_the_core_imports_a_guest() -> None:
     rooms = _rooms()
     assert set(rooms[-len(GUESTS) :]) == guests, "they are the last of the document"
     inward = []
-    for name, other in _arrows():
+    for name, other in arrows():
         if _room(other) in guests and _room(name) not in guests:
             inward.append(f"{name} imports {other}")
     assert inward == []
@@ -113,12 +113,12 @@ def test_no_module_of_the_core_imports_a_guest() -> None:
 
 def test_no_modules_import_each_other_in_a_circle() -> None:
     graph: dict[str, set[str]] = {}
-    for name, other in _arrows():
+    for name, other in arrows():
         graph.setdefault(name, set()).add(other)
-    reached = {name: _reached(name, graph) for name in graph}
+    behind = {name: reached(name, graph) for name in graph}
     circles = []
     for name in graph:
-        circle = {other for other in reached[name] if name in reached.get(other, ())}
+        circle = {other for other in behind[name] if name in behind.get(other, ())}
         if circle and circle not in circles:
             circles.append(circle)
     assert circles == []
@@ -145,7 +145,7 @@ def test_methods_models_and_shapes_are_asked_for_facts_and_never_for_their_names
 
 def test_one_module_knows_the_code_that_moves_grains() -> None:
     code = "orchestrator.solvers.liggghts"
-    knowing = {name for name, other in _arrows() if other == code}
+    knowing = {name for name, other in arrows() if other == code}
     # doctor says whether each program is installed
     assert knowing == {"orchestrator.solvers.dem", "orchestrator.solvers.doctor"}
 

@@ -171,7 +171,6 @@ class GoingCase(Case):
     scene: Scene
     kind: ClassVar[str] = "going"
     template: ClassVar[str] = "../tools/going"
-    recipe: ClassVar[int] = 1
     results: ClassVar[tuple[str, ...]] = ("settling.csv", "samples.csv", GOING, GONE)
 
     @cached_property

@@ -141,7 +141,6 @@ class PouredBed(DeckCase):
 
     kind: ClassVar[str] = "poured"
     template: ClassVar[str] = f"{ENGINE.TEMPLATES}/poured"
-    recipe: ClassVar[int] = 6
     results: ClassVar[tuple[str, ...]] = (SETTLING, DUMP)
     derived: ClassVar[tuple[str, ...]] = (BED,)
 

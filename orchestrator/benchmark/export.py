@@ -18,7 +18,7 @@ from orchestrator.benchmark.pack import KINDS, OF_POCKET, STUDY, Pack, Problem
 from orchestrator.errors import InputError, SolverError
 from orchestrator.grains.pile import Pile
 from orchestrator.plan import Plan
-from orchestrator.runs import case, engine, process
+from orchestrator.runs import case, engine, process, reuse
 from orchestrator.runs.workspace import Workspace
 from orchestrator.solvers.dem import ENGINE
 from orchestrator.study import fields, study
@@ -404,7 +404,7 @@ class Ours:
         asked = replace(self.study, groups=(group,))
         planned = plan.make(asked, cases=self.root)
         self._run(planned, kind)
-        states = planned.done(self.root)
+        states = reuse.done(planned.cases, self.root)
         results: Tables = {}
         if states:
             results = tables.make(asked, planned, self.root, states)

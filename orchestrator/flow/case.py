@@ -102,7 +102,6 @@ class FlowCase(OpenFoamCase[WallStress]):
     above: Flow = field(default_factory=Flow)
 
     kind: ClassVar[str] = "flow"
-    recipe: ClassVar[int] = 10
     needs_bulky: ClassVar[bool] = True
     mesher: ClassVar[str] = "gmsh"
 

@@ -93,7 +93,6 @@ class SingleGrainCase(GrainCase):
 
     scenes: tuple[Scene, ...]
     kind: ClassVar[str] = "cells"
-    recipe: ClassVar[int] = 13
 
     @property
     def parameters(self) -> dict[str, Any]:

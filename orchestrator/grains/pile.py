@@ -167,7 +167,6 @@ class WornFlow(Case):
     run: Case | None
     kind: ClassVar[str] = "worn"
     template: ClassVar[str] = FlowCase.template
-    recipe: ClassVar[int] = FlowCase.recipe + 1
     results: ClassVar[tuple[str, ...]] = FlowCase.results
     derived: ClassVar[tuple[str, ...]] = FlowCase.derived
     bulky: ClassVar[tuple[str, ...]] = FlowCase.bulky
@@ -459,7 +458,6 @@ class PileCase(GrainCase):
     flow: WornFlow | None = None
     before: "PileCase | None" = None
     kind: ClassVar[str] = "pile"
-    recipe: ClassVar[int] = 15
     derived: ClassVar[tuple[str, ...]] = (*GrainCase.derived, GRAINS)
 
     @cached_property

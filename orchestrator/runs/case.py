@@ -1,11 +1,12 @@
 """A case directory: its identity, its files, how far it came, whatever the solver."""
 
 import contextlib
+import inspect
 import os
 import re
 import stat
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from fnmatch import fnmatchcase
 from functools import cache, cached_property
 from hashlib import sha256
@@ -22,57 +23,31 @@ from orchestrator.runs.files import (
     read_json,
 )
 
-MAKERS = (
-    "bed",
-    "digits.py",
+ROOMS: tuple[str, ...] = (
+    "types.py",
     "errors.py",
-    "flow",
-    "grains",
-    "physics",
+    "digits.py",
     "runs",
     "solvers",
+    "physics",
     "study",
-    "surface/across.py",
-    "surface/case.py",
-    "surface/epsg.py",
-    "surface/heights.py",
-    "surface/mesh.py",
-    "surface/parts.py",
-    "surface/points.py",
-    "surface/raster.py",
-    "surface/stress.py",
-    "surface/study.py",
-    "surface/truth.py",
-    "types.py",
+    "bed",
+    "flow",
+    "grains",
 )
-"""Parts of the package that make cases; the others only read them."""
+"""Parts of the package that make cases, low to high: none imports one above it."""
 NAME = re.compile(r"[a-z]+-[0-9a-f]{12}")
 """Name of a case's directory."""
 IDENTITY = "case.json"
 CODE = "code_sha256"
-"""Key of the identity: the code that made the case, or that would make the same."""
+"""Key of the marker: the code by which inputs and tables are those of the case."""
 DONE = "done.json"
 FAILED = "failed.json"
 CHECKSUMS = "results.sha256"
 LOG = "log.Allrun"
-GENERATED = (
-    "[1-9]",
-    "[1-9][0-9]",
-    "[1-9][0-9][0-9]",
-    "[1-9][0-9][0-9][0-9]",
-    "log.*",
-    "postProcessing",
-    "polyMesh",
-    "settling.csv",
-    "going.csv",
-    "samples.csv",
-    "*.dump",
-    "load_steps.csv",
-    "bed_flow.csv",
-    "column_flow.csv",
-    "processor[0-9]*",
-)
-"""Files that a run by hand leaves in a template's own folder; no part of it."""
+FILES = "files.txt"
+"""Names of the files of a template, one a line. Others in its folder, such as those
+that a run by hand leaves, are no part of it."""
 
 
 def templates() -> Path:
@@ -98,70 +73,71 @@ def template_files(name: str) -> tuple[tuple[str, int, bytes], ...]:
     Returns
     -------
     tuple
-        Path in the template, mode and content of each file.
+        Path in the template, mode and content of each file of its list `FILES`.
     """
     root = templates() / name
     found = []
-    for path in sorted(path for path in root.rglob("*") if path.is_file()):
-        parts = path.relative_to(root).parts
-        if not any(map(_is_generated, parts)):
-            mode = stat.S_IMODE(path.stat().st_mode)
-            found.append(("/".join(parts), mode, path.read_bytes()))
+    for part in (root / FILES).read_text(encoding="utf-8").splitlines():
+        path = root / part
+        mode = stat.S_IMODE(path.stat().st_mode)
+        found.append((part, mode, path.read_bytes()))
     return tuple(found)
 
 
-def _is_generated(part: str) -> bool:
-    """Whether a run by hand leaves files or folders of this name."""
-    return any(fnmatchcase(part, pattern) for pattern in GENERATED)
-
-
 @cache
-def _template_digest(name: str) -> str:
-    """One digest of every file of a template, names included."""
-    digests = {}
-    for path, _, content in template_files(name):
-        digests[path] = sha256(content).hexdigest()
-    return digest_text(canonical_json(digests))
+def code_of(kind: "type[Case]") -> str:
+    """Compute one digest of the code and of the template that cases of a kind are of.
 
-
-@cache
-def code_digest() -> str:
-    """Compute one digest of the code that makes cases.
+    Parameters
+    ----------
+    kind
+        The class of the cases.
 
     Returns
     -------
     str
-        SHA-256 of the names and contents of all files of `MAKERS`: of the code, and of
-        the numbers that it reads.
+        SHA-256 of the names and contents of the files of the template, of the part of
+        the package in which the class is, and of all parts of `ROOMS` below it: of
+        code, and of the numbers that it reads.
     """
-    paths = []
-    for part in MAKERS:
-        place = PACKAGE / part
+    module = Path(inspect.getfile(kind))
+    own = module
+    below = ROOMS
+    if module.is_relative_to(PACKAGE):
+        room = module.relative_to(PACKAGE).parts[0]
+        own = PACKAGE / room
+        below = ROOMS[: ROOMS.index(room)] if room in ROOMS else ROOMS
+    digests = {}
+    for place in (own, *(PACKAGE / room for room in below)):
         inside = place.rglob("*") if place.is_dir() else [place]
-        paths += [path for path in inside if path.is_file() and path.suffix != ".pyc"]
-    digests = files.digest_files(paths, root=PACKAGE)
+        for path in inside:
+            if path.is_file() and path.suffix != ".pyc":
+                name = path.relative_to(place.parent).as_posix()
+                digests[name] = files.digest_file(path)
+    for name, _, content in template_files(kind.template):
+        digests[f"{kind.template}/{name}"] = sha256(content).hexdigest()
     return digest_text(canonical_json(digests))
 
 
 class Case(ABC):
-    """One run of a solver: what it depends on, its inputs, and what its end means.
+    """One run of a solver: its inputs, its results, and the tables made of them.
 
-    A subclass is a frozen value. Its `parameters` and its template are its identity, so
-    two scenes that need the same run name the same directory.
+    A subclass is a frozen value. Its `parameters` and the cases that it needs are its
+    identity, so two scenes that need the same run name the same directory. `write`
+    makes its inputs of them, the solver makes the results of the inputs, and `collect`
+    makes the tables of the results: as often as the code changes, without the solver.
     """
 
     kind: ClassVar[str]
     """First word of the directory's name."""
     template: ClassVar[str]
     """Folder below `templates/` that the directory starts as a copy of."""
-    recipe: ClassVar[int]
-    """Raised whenever the same parameters come to give other inputs or results."""
     results: ClassVar[tuple[str, ...]]
     """Glob patterns of the files that a rerun by hand must reproduce byte for byte."""
     derived: ClassVar[tuple[str, ...]] = ()
-    """Tables that `collect` makes of the results; not the solver's own."""
+    """Glob patterns of the tables that `collect` makes of the results."""
     bulky: ClassVar[tuple[str, ...]] = ()
-    """Large files that the run leaves, and that nothing reads when the tables are made:
+    """Large files that the run leaves, and that nothing reads once the tables are made:
     `prune` drops them.
 
     Those that are no results may differ in their last digits from processor to
@@ -219,7 +195,7 @@ class Case(ABC):
 
     @abstractmethod
     def collect(self, directory: Path) -> None:
-        """Derive the tables.
+        """Make the tables of the results, also of a case that has them already.
 
         Parameters
         ----------
@@ -244,11 +220,9 @@ class Case(ABC):
 
     @cached_property
     def id(self) -> str:
-        """Digest of all that the results depend on."""
+        """Digest of what is asked of the solver: in which words is in no id."""
         depends = {
             "kind": self.kind,
-            "recipe": self.recipe,
-            "template": _template_digest(self.template),
             "parameters": self.parameters,
             "needs": [case.id for case in self.needs],
         }
@@ -284,13 +258,10 @@ def prepare(case: Case, cases: Path) -> Path:
     identity = {
         "id": case.id,
         "kind": case.kind,
-        "recipe": case.recipe,
         "template": case.template,
-        "template_sha256": _template_digest(case.template),
         "parameters": case.parameters,
         "needs": [need.name for need in case.needs],
         "inputs_sha256": inputs,
-        CODE: code_digest(),
         "programs": case.versions(),
     }
     (directory / IDENTITY).write_text(files.text_of(identity))
@@ -340,23 +311,51 @@ def finish(case: Case, directory: Path, **times: float) -> None:
         work.
     """
     results = _digests(directory, _matching(directory, case.results))
-    derived = _digests(directory, _matching(directory, case.derived))
     bulky = _matching(directory, case.bulky)
     others = _digests(directory, [name for name in bulky if name not in results])
     sums = "".join(f"{digest}  {name}\n" for name, digest in results.items())
     (directory / CHECKSUMS).write_text(sums)
-    stamps = {name: _stamp(directory / name) for name in {*results, *derived, *others}}
     marker = {
         "id": case.id,
         "ended": "done",
         **times,
         "results_sha256": results,
-        "derived_sha256": derived,
         "others_sha256": others,
         "bulky": bulky,
-        "stamps": stamps,
+        "stamps": _stamps(directory, {**results, **others}),
     }
-    files.write_durably(directory / DONE, files.text_of(marker))
+    note_tables(case, directory, marker)
+
+
+def note_tables(
+    case: Case, directory: Path, marker: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Write the marker with the tables that the present code has made of the results.
+
+    Parameters
+    ----------
+    case
+        The case.
+    directory
+        Its directory.
+    marker
+        The marker with the results.
+
+    Returns
+    -------
+    dict
+        The marker with both.
+    """
+    tables = _digests(directory, _matching(directory, case.derived))
+    stamps = {**marker["stamps"], **_stamps(directory, tables)}
+    noted = {
+        **marker,
+        "tables_sha256": tables,
+        "stamps": stamps,
+        CODE: code_of(type(case)),
+    }
+    files.write_durably(directory / DONE, files.text_of(noted))
+    return noted
 
 
 def fail(directory: Path, error: SolverError) -> None:
@@ -392,7 +391,7 @@ def failure(directory: Path) -> tuple[str, str]:
 
 
 def done_state(case: Case, cases: Path) -> dict[str, Any] | None:
-    """The marker of a finished case.
+    """The marker of a finished case of the present code.
 
     Parameters
     ----------
@@ -404,9 +403,11 @@ def done_state(case: Case, cases: Path) -> dict[str, Any] | None:
     Returns
     -------
     dict, or None
-        The marker; None where anything about the case cannot be trusted.
+        The marker; None where anything about the case cannot be trusted, or other code
+        has written its inputs or made its tables.
     """
-    return marker_of(cases / case.name, case.id)
+    state = marker_of(cases / case.name, case.id)
+    return state if state and state.get(CODE) == code_of(type(case)) else None
 
 
 def id_of(directory: Path) -> str:
@@ -428,8 +429,6 @@ def id_of(directory: Path) -> str:
 def marker_of(directory: Path, identity: str) -> dict[str, Any] | None:
     """The marker of the finished case of an id.
 
-    A bulky file may be missing: `prune` drops it when the tables are made.
-
     Parameters
     ----------
     directory
@@ -442,30 +441,78 @@ def marker_of(directory: Path, identity: str) -> dict[str, Any] | None:
     dict, or None
         The marker; None where anything about the case cannot be trusted.
     """
+    state = run_of(directory, identity)
+    if state is None:
+        return None
+    return state if _are_unchanged(directory, state, state["tables_sha256"]) else None
+
+
+def run_of(directory: Path, identity: str) -> dict[str, Any] | None:
+    """The marker of the case of an id whose solver has ended, whatever its tables are.
+
+    A bulky file may be missing: `prune` drops it when the tables are made.
+
+    Parameters
+    ----------
+    directory
+        The directory of the case.
+    identity
+        The id of the case.
+
+    Returns
+    -------
+    dict, or None
+        The marker; None where anything about the results cannot be trusted.
+    """
     about = read_json(directory / IDENTITY)
     state = read_json(directory / DONE)
     if not about.get("id") == state.get("id") == identity:
         return None
-    made = {**state["results_sha256"], **state["derived_sha256"]}
-    digests = {**made, **state.get("others_sha256", {})}
-    bulky = state.get("bulky", ())
-    stamps = state["stamps"]
+    results = state.get("results_sha256")
+    if not results or "tables_sha256" not in state:
+        return None
+    made = {**results, **state["others_sha256"]}
+    return state if _are_unchanged(directory, state, made) else None
+
+
+def _are_unchanged(
+    directory: Path, state: Mapping[str, Any], digests: Mapping[str, str]
+) -> bool:
+    """Whether files of a case are as its marker says; bulky ones may be missing."""
     try:
         marked = (directory / DONE).stat().st_mtime_ns
         for name, digest in digests.items():
             path = directory / name
-            if name in bulky and not os.path.lexists(path):
+            if name in state["bulky"] and not os.path.lexists(path):
                 continue
             # Digests of a thousand piles are those of 7 GB: they are compared only if
             # size or time have changed. A file written in the same tick of the clock as
             # the marker may have changed since without a trace, so its digest decides.
-            size, changed = _stamp(path)
-            untouched = [size, changed] == stamps.get(name) and changed < marked
+            stamp = _stamp(path)
+            untouched = stamp == state["stamps"].get(name) and stamp[1] < marked
             if not untouched and files.digest_file(path) != digest:
-                return None
+                return False
     except OSError:
-        return None
-    return state if made else None
+        return False
+    return True
+
+
+def has_results(state: Mapping[str, Any], directory: Path) -> bool:
+    """Whether a finished case has all of its results, of which tables are made.
+
+    Parameters
+    ----------
+    state
+        Its marker.
+    directory
+        Its directory.
+
+    Returns
+    -------
+    bool
+        Whether none of them was pruned.
+    """
+    return all((directory / name).is_file() for name in state["results_sha256"])
 
 
 def is_whole(case: Case, cases: Path) -> bool:
@@ -572,10 +619,15 @@ def _digests(directory: Path, names: Iterable[str]) -> dict[str, str]:
     return {name: files.digest_file(directory / name) for name in names}
 
 
-def _stamp(path: Path) -> tuple[int, int]:
+def _stamps(directory: Path, names: Iterable[str]) -> dict[str, list[int]]:
+    """The `_stamp` of each of some files of a directory, by their names."""
+    return {name: _stamp(directory / name) for name in names}
+
+
+def _stamp(path: Path) -> list[int]:
     """Size, bytes, and time of the last change, ns."""
     state = path.stat()
-    return state.st_size, state.st_mtime_ns
+    return [state.st_size, state.st_mtime_ns]
 
 
 def _matching(directory: Path, patterns: Iterable[str]) -> list[str]:

@@ -15,7 +15,7 @@ from filelock import FileLock
 
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.extras import imported
-from orchestrator.runs import engine, process, reuse
+from orchestrator.runs import engine, process
 from orchestrator.runs.case import Case, done_state, names_in
 from orchestrator.runs.engine import Pool
 from orchestrator.runs.files import PACKAGE
@@ -182,7 +182,7 @@ def execute_unless_done(case: Case, cases: Path, limit_s: float) -> float:
     """
     with FileLock(_lock_of(case.name, cases)):
         state = done_state(case, cases)
-        if state and reuse.is_as_made_now(case, cases):
+        if state:
             return float(state["wall_s"])
         return engine.execute(case, cases, limit_s)
 

@@ -147,7 +147,6 @@ class SurfaceFlowCase(OpenFoamCase[SurfaceStress]):
     first_cell_m: float | None = None
 
     kind: ClassVar[str] = "surface"
-    recipe: ClassVar[int] = 2
     mesher: ClassVar[str] = "numpy"
     of_template: ClassVar[tuple[str, ...]] = (*OpenFoamCase.of_template, "*.geo")
 

@@ -11,7 +11,7 @@ from orchestrator import plan, tables
 from orchestrator.benchmark import pack, scenes
 from orchestrator.benchmark.export import scene_names
 from orchestrator.errors import InputError
-from orchestrator.runs import case, engine
+from orchestrator.runs import case, engine, reuse
 from orchestrator.study import study
 from orchestrator.study.closed_form import regime_of
 from orchestrator.study.study import Group, Study
@@ -60,7 +60,7 @@ def test_fresh_piles_are_as_expected(
     for one in planned.cases.values():
         engine.execute(one, tmp_path, HANGS_S, threading.Event())
         assert case.done_state(one, tmp_path)
-    results = tables.make(asked, planned, tmp_path, planned.done(tmp_path))
+    results = tables.make(asked, planned, tmp_path, reuse.done(planned.cases, tmp_path))
     names = scene_names(plan.make(paper), paper)
     assert len(planned.piles) >= 2
     for pile in planned.piles.values():

@@ -27,7 +27,6 @@ class Step(Case):
     by: int = 1
     kind: ClassVar[str] = "step"
     template: ClassVar[str] = "liggghts/checks"
-    recipe: ClassVar[int] = 1
     results: ClassVar[tuple[str, ...]] = ("result.txt",)
 
     @property
@@ -61,8 +60,11 @@ def test_a_case_is_a_copy_of_its_template_with_inputs_and_then_results(
     assert step.id == Step(1.0).id != Step(2.0).id
     directory = case.prepare(step, tmp_path)
     assert directory.name == step.name == f"step-{step.id[:12]}"
-    for path in (templates() / "liggghts/checks").iterdir():
-        assert (directory / path.name).read_bytes() == path.read_bytes()
+    template = templates() / "liggghts/checks"
+    names = (template / case.FILES).read_text().split()
+    assert names
+    for name in names:
+        assert (directory / name).read_bytes() == (template / name).read_bytes()
     identity = json.loads((directory / case.IDENTITY).read_text())
     assert identity["parameters"] == {"size": 1.0, "by": 1}
     assert "Allrun" in identity["inputs_sha256"]

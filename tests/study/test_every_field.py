@@ -17,7 +17,7 @@ from orchestrator.study.fields import COLUMNS, FIELDS, PARTS, Quantity, default_
 from orchestrator.tables import csv, rows
 
 ROOT = Path(__file__).parents[2]
-PROFILE = str(ROOT / "tests/recipes/profile.csv")
+PROFILE = str(ROOT / "tests/study/profile.csv")
 OTHER_PROFILE = str(ROOT / "tests/study/other_profile.csv")
 Asked = Mapping[str, Any]
 Found = list[str]
