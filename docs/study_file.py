@@ -122,9 +122,9 @@ SHORT = "| field | symbol, unit, range | default | meaning |"
 COLUMNS = f"{SHORT} scope | column |"
 SURFACES = f"""## Beds in three dimensions
 
-With `bed.kind = "{surface_study.KIND}"` the tables are those below, and `study` and `erosion` answer
+With `bed.kind = "surface"` the tables are those below, and `study` and `erosion` answer
 ([surface.md](surface.md)). At the top such a file may have `title`, `time_limit`,
-`units_confirmed` and `[axes]` of up to {surface_study.MOST_FLOWS} combinations. The law `paper`, two answers in the transition, is
+`units_confirmed`, `[axes]` and `[[group]]`, of up to {surface_study.MOST_FLOWS} combinations. The law `paper`, two answers in the transition, is
 refused.
 """
 
@@ -179,6 +179,8 @@ def text() -> str:
     lines.append(SURFACES)
     defaults = {"roughness": BED["roughness"]}
     for table, model in surface_study.TABLES.items():
+        if table == "method":
+            continue  # it holds no more than the table within it
         about = " ".join((model.__doc__ or "").split())
         lines.append(f"### `[{table}]`\n\n{about}\n\n{SHORT}\n{'|---' * 4}|")
         for name, field in model.model_fields.items():

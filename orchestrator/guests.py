@@ -7,15 +7,16 @@ below the commands, since the answers of the Python functions have cards of gues
 
 from argparse import Namespace
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from orchestrator.command import Command
 
 if TYPE_CHECKING:
     from orchestrator.report.page import Guest
-    from orchestrator.study.study import Study
+    from orchestrator.study.study import Beds, Study
     from orchestrator.tables import Tables
 
 GUESTS = ("benchmark", "lab", "paper", "stockpile", "surface")
@@ -32,14 +33,17 @@ class Offer:
         Its commands.
     cards
         Makes its cards on the page of a study; None for a guest without cards.
+    beds
+        Its kinds of beds, by their words for `bed.kind`.
     take_over
-        Runs a command on a study file of beds that the core does not know, and returns
-        its exit code, or None for other beds; None for a guest without beds.
+        Runs a command on a study of its beds, and returns its exit code, or None for
+        other beds; None for a guest without beds.
     """
 
     commands: tuple[Command, ...] = ()
     cards: "Callable[[Study, Tables], list[Guest]] | None" = None
-    take_over: Callable[[Namespace], int | None] | None = None
+    beds: "Beds" = field(default_factory=dict)
+    take_over: "Callable[[Study[Any], Namespace], int | None] | None" = None
 
 
 def offers() -> Iterator[Offer]:
@@ -77,13 +81,43 @@ def cards(study: "Study", tables: "Tables") -> "list[Guest]":
     return made
 
 
-def taken_over(options: Namespace) -> int | None:
-    """Let a guest run a command, if the study file has beds of that guest.
+def load(source: str | Path, tolerance: float | None) -> "Study[Any]":
+    """Read a study file, also on the beds of a guest.
 
     Parameters
     ----------
+    source
+        The path of the file, or the name of a preset.
+    tolerance
+        Relative error that tau_c may have, in place of the file's.
+
+    Returns
+    -------
+    Study
+        The study.
+
+    Raises
+    ------
+    InputError
+        With the file, the field and the remedy.
+    """
+    from orchestrator.study.study import load_any
+
+    beds: Beds = {}
+    for offer in offers():
+        beds = {**beds, **offer.beds}
+    return load_any(source, tolerance, beds)
+
+
+def taken_over(study: "Study[Any]", options: Namespace) -> int | None:
+    """Let a guest run a command, if the study has beds of that guest.
+
+    Parameters
+    ----------
+    study
+        The study, as `load` reads it.
     options
-        The options of the command, with its name and its study file.
+        The options of the command.
 
     Returns
     -------
@@ -91,7 +125,7 @@ def taken_over(options: Namespace) -> int | None:
         The exit code of the command; None for a study of the core's own beds.
     """
     for offer in offers():
-        code = offer.take_over(options) if offer.take_over is not None else None
+        code = offer.take_over(study, options) if offer.take_over is not None else None
         if code is not None:
             return code
     return None

@@ -30,13 +30,12 @@ def _run(options: Namespace) -> int:
             print("it was answered already; no solver was started", file=sys.stderr)
             print(*answered, sep="\n")
             return 0
-    code = guests.taken_over(options)
+    study = guests.load(options.source, options.tolerance)
+    code = guests.taken_over(study, options)
     if code is not None:
         return code
     from orchestrator import pipeline, plan
-    from orchestrator.study.study import load
 
-    study = load(options.source, options.tolerance)
     out = options.out or Path("results") / study.name
     if options.plan:
         cases = out.absolute() / "cases"

@@ -14,13 +14,12 @@ def _options(command: Parser) -> None:
 
 def _run(options: Namespace) -> int:
     """Run the experiment on a section, or that of a guest on its own beds."""
-    code = guests.taken_over(options)
+    study = guests.load(options.source, options.tolerance)
+    code = guests.taken_over(study, options)
     if code is not None:
         return code
     from orchestrator.stockpile import erosion
-    from orchestrator.study.study import load
 
-    study = load(options.source, options.tolerance)
     out = options.out or Path("results") / options.command
     return erosion.experiment(study, out).command(options, out)
 

@@ -1,27 +1,29 @@
 """The tables of a study file by name, and those within another one in their place."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-from orchestrator.study.fields import METHOD, PARTS
+from orchestrator.study.fields import PARTS
 
 Table = dict[str, Any]
 Tables = dict[str, Table]
 """The tables of a scene by their names, such as ``bed`` and ``method.flow``."""
 
 
-def by_name(data: Mapping[str, Any]) -> Tables:
+def by_name(data: Mapping[str, Any], parts: Iterable[str] = PARTS) -> Tables:
     """The tables of a scene by their names; those within the method stand beside it.
 
     Parameters
     ----------
     data
         The tables of a study file or of a group.
+    parts
+        The names of the tables of a scene.
 
     Returns
     -------
     dict of str to dict
-        A new table for each name of `fields.PARTS`.
+        A new table for each name.
 
     Examples
     --------
@@ -29,9 +31,9 @@ def by_name(data: Mapping[str, Any]) -> Tables:
     {'speed': 1.0}
     """
     tables: Tables = {}
-    for name in PARTS:
+    for name in parts:
         tables[name] = dict(data.get(name, {}))
-    for name in METHOD:
+    for name in [*tables]:
         outer, _, inner = name.partition(".")
         # what is no table stays, and the validation refuses it
         if inner and isinstance(tables[outer].get(inner), dict):

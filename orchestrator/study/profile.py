@@ -5,20 +5,20 @@ import io
 import json
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from hashlib import sha256
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from orchestrator.digits import on_grid, rounded
 from orchestrator.errors import InputError
-from orchestrator.runs.files import digest_text
+from orchestrator.runs.files import digest_file, digest_text
 from orchestrator.study.heads import ALONG, HEIGHT, in_metres, more_cells, name_of
 from orchestrator.study.noise import needed_smoothing
 from orchestrator.study.shapes import SHAPES
@@ -53,6 +53,7 @@ OVER = (
     0.5  # each of the two lengths whose means give the slope of a line, over its height
 )
 
+T = TypeVar("T")
 WITH_X, AGAINST_X = "+x", "-x"
 """Where the flow goes in the file of a profile."""
 
@@ -226,7 +227,7 @@ def _is_number(value: Any) -> bool:
 
 @dataclass
 class Files:
-    """The files that a study names: profiles and sieve tables.
+    """The files that a study names, each read once.
 
     Attributes
     ----------
@@ -247,6 +248,7 @@ class Files:
     digests: dict[str, str | None] = field(default_factory=dict)
     added: str = ""
     _read: dict[str, str] = field(default_factory=dict)
+    _made: dict[str, Any] = field(default_factory=dict)
 
     def bed(self, bed: dict[str, Any], where: str, towards: str) -> dict[str, Any]:
         """Fields of a bed that names a profile.
@@ -314,6 +316,38 @@ class Files:
         lines, rows = read_columns(text, CLASSES, place, SIEVE_REMEDY)
         _check_rows(lines, rows, place)
         return rows
+
+    def once(self, name: str, where: str, read: Callable[[Path, str], T]) -> T:
+        """Read a file that a study cannot carry.
+
+        Parameters
+        ----------
+        name
+            The name of the file.
+        where
+            The study file and the field that names it, for messages.
+        read
+            Reads the file at a path; its second argument is the place for messages.
+
+        Returns
+        -------
+        object
+            What is read.
+
+        Raises
+        ------
+        InputError
+            If the study is to be whole without its files.
+        """
+        place = self._place(name, where)
+        if self.folder is None:
+            what = "no study carries it in its table [profiles]"
+            raise InputError(what, place, "read the study file itself")
+        if name not in self._made:
+            self._made[name] = read(self.folder / name, place)
+            self.digests[name] = digest_file(self.folder / name)
+        made: T = self._made[name]
+        return made
 
     def _place(self, name: str, where: str) -> str:
         """The path of a file, for messages."""

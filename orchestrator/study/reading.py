@@ -1,20 +1,18 @@
 """The tables of a study file: read, spread over its axes, and refused in its words.
 
-Files on beds in a plane (`study`) and in three dimensions (`surface_study`) are read
-alike.
+Files on all kinds of beds are read alike.
 """
 
 import difflib
 import itertools
 import re
 import tomllib
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
-from operator import attrgetter
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, TypeVar
+from typing import Annotated, Any, NamedTuple, Protocol, TypeVar
 
 from pydantic import Field, ValidationError
 
@@ -46,8 +44,17 @@ ASKED = (
 """The fields that are asked about where their numbers are usual in another unit."""
 CONFIRMED = "write units_confirmed = true at the top of the study file"
 """What accepts a bed of an unusual size."""
-Made = TypeVar("Made")
-Model = TypeVar("Model", bound=Part)
+
+
+class Point(Protocol):
+    """A scene of any kind of beds: one point of a study."""
+
+    @property
+    def id(self) -> str:
+        """What tells it from every other scene."""
+
+
+Made = TypeVar("Made", bound=Point)
 TAGS = ("", "rows", "float", "str")
 """Names of the members of unions, which are no keys."""
 Hint = Callable[[Sequence[str], str], tuple[str, str] | None]
@@ -218,7 +225,6 @@ def scenes_at(
     where: str,
     make: Callable[[Tables], Made],
     numbers: "Numbers",
-    key: Callable[[Made], Hashable] = attrgetter("id"),
 ) -> Iterator[Made]:
     """Make a scene of each combination of the axes' values.
 
@@ -234,8 +240,6 @@ def scenes_at(
         Makes the scene of the tables at one point.
     numbers
         The numbers that are asked about, to which those of these scenes are added.
-    key
-        Tells scenes apart.
 
     Yields
     ------
@@ -248,14 +252,14 @@ def scenes_at(
         For a scene that is refused, with the questions on its numbers, and for one that
         the axes have a second time.
     """
-    points: dict[Hashable, tuple[Any, ...]] = {}
+    points: dict[str, tuple[Any, ...]] = {}
     for point, made in at_points(tables, axes, where):
         numbers.add(made)
         try:
             scene = make(made)
         except InputError as error:
             raise units.hinted(error, numbers.asked) from None
-        same = points.setdefault(key(scene), point)
+        same = points.setdefault(scene.id, point)
         if same is not point:
             one = ", ".join(map(str, same))
             other = ", ".join(map(str, point))

@@ -8,16 +8,18 @@ import itertools
 import math
 import os
 import warnings
-from collections.abc import Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from numbers import Real
 from operator import attrgetter
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Generic
 
 from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
+from typing_extensions import TypeVar
 
 from orchestrator.errors import InputError
 from orchestrator.study import units
@@ -35,6 +37,7 @@ from orchestrator.study.reading import (
     TIME_LIMIT_S,
     Given,
     Numbers,
+    Point,
     explained,
     fluid_of,
     place_of,
@@ -84,7 +87,9 @@ class _Group(_Tables):
     name: str = ""
 
 
-class _File(_Tables):
+class File(_Tables):
+    """The keys at the top of a study file; its tables are read scene by scene."""
+
     title: str = ""
     time_limit: float = Field(
         default=TIME_LIMIT_S, gt=0, le=1e8
@@ -97,8 +102,193 @@ class _File(_Tables):
     group: Annotated[tuple[_Group, ...], List, Field(min_length=1)] | None = None
 
 
+S = TypeVar("S", bound=Point, default=Scene)
+"""The scenes of a kind of beds, by default those of the core."""
+
+
+class Kind(ABC, Generic[S]):
+    """A kind of beds: how a study file on them becomes scenes.
+
+    The core has `PLANE`, a guest may offer another one.
+
+    Attributes
+    ----------
+    file
+        The keys at the top of such a file.
+    tables
+        Its tables.
+    without
+        Keys at the top that beds in a plane alone have.
+    most
+        Most scenes of a study.
+    """
+
+    file: type[File] = File
+    tables: Mapping[str, type[Part]]
+    without: Sequence[str] = ()
+    most: int = MOST_SCENES
+
+    def with_files(
+        self, data: Mapping[str, Any], where: str, files: Files
+    ) -> Mapping[str, Any]:
+        """Read the files that are named beside the tables of a scene.
+
+        Parameters
+        ----------
+        data
+            The tables of the file.
+        where
+            The study file, for messages.
+        files
+            The files that it may name.
+
+        Returns
+        -------
+        Mapping of str to object
+            The tables with what was read in place of names.
+        """
+        del where, files
+        return data
+
+    @abstractmethod
+    def make(
+        self, tables: Mapping[str, Table], where: str, files: Files | None = None
+    ) -> S:
+        """Make a scene of its tables.
+
+        Parameters
+        ----------
+        tables
+            The tables by their names.
+        where
+            The file, for messages.
+        files
+            The files that the tables may name.
+
+        Returns
+        -------
+        Scene
+            The scene.
+
+        Raises
+        ------
+        InputError
+            For the first thing that is wrong.
+        """
+
+    def resolved(self, scenes: Sequence[S]) -> Iterator[Sequence[S]]:
+        """Decide what the scenes of a study leave open.
+
+        Parameters
+        ----------
+        scenes
+            The scenes.
+
+        Yields
+        ------
+        Sequence
+            The scenes that answer each of them: by default it alone.
+        """
+        for scene in scenes:
+            yield [scene]
+
+    def check_effect(
+        self, names: Sequence[str], scenes: Sequence[S], where: str
+    ) -> None:
+        """Refuse a field that is written for some scenes, and has an effect on none.
+
+        Parameters
+        ----------
+        names
+            Names of the fields that are written.
+        scenes
+            The scenes.
+        where
+            The file or the group, for messages.
+
+        Raises
+        ------
+        InputError
+            With the scenes on which it has one.
+        """
+
+    def asked(self, file: File) -> list[units.Remark]:
+        """Ask about numbers of the files that are named beside the tables of a scene.
+
+        Parameters
+        ----------
+        file
+            The keys at the top.
+
+        Returns
+        -------
+        list of Remark
+            The questions.
+        """
+        del file
+        return []
+
+    @abstractmethod
+    def check(self, file: File, groups: "Sequence[Group[S]]", where: str) -> None:
+        """Refuse beds that are likelier in millimetres, and what does not go together.
+
+        Parameters
+        ----------
+        file
+            The keys at the top.
+        groups
+            The groups with their scenes.
+        where
+            The study file, for messages.
+
+        Raises
+        ------
+        InputError
+            With the field and the remedy.
+        """
+
+    @abstractmethod
+    def hint(self, names: Sequence[str], branch: str) -> tuple[str, str] | None:
+        """Say which beds have a field that is of no bed of this kind.
+
+        Parameters
+        ----------
+        names
+            The path of the unknown key.
+        branch
+            The bed among those of this kind, where there are several.
+
+        Returns
+        -------
+        what, remedy : tuple of str, or None
+            None where the key is no more than unknown.
+        """
+
+    def explained(self, error: ValidationError, where: str) -> InputError:
+        """Refuse a file's tables, for the first thing that is wrong in them.
+
+        Parameters
+        ----------
+        error
+            What pydantic says of them.
+        where
+            The file, for messages.
+
+        Returns
+        -------
+        InputError
+            The refusal.
+        """
+        keys = {"": [*self.file.model_fields], "group": [*_Group.model_fields]}
+        return explained(error, where, self.tables, keys, self.hint)
+
+
+Beds = Mapping[str, Callable[[], Kind[Any]]]
+"""Kinds of beds that guests offer, by their words for `bed.kind`."""
+
+
 @dataclass(frozen=True)
-class Group:
+class Group(Generic[S]):
     """Scenes of a study that belong together: the points of one experiment.
 
     Attributes
@@ -112,12 +302,12 @@ class Group:
     """
 
     name: str
-    scenes: tuple[Scene, ...]  # in the file's order, each with its force law decided
+    scenes: tuple[S, ...]  # in the file's order, each with its force law decided
     where: str  # its place in messages: the file, and which group of it
 
 
 @dataclass(frozen=True)
-class Study:
+class Study(Generic[S]):
     """The content of a study file.
 
     Attributes
@@ -142,11 +332,13 @@ class Study:
         Where the text came from; None if it was no file.
     asked
         What is said of numbers that are usual in another unit.
+    kind
+        The kind of its beds.
     """
 
     name: str  # the file's, without its ending
     title: str
-    groups: tuple[Group, ...]
+    groups: tuple[Group[S], ...]
     time_limit_s: float  # wall time after which one solver run counts as hung, s
     tolerance: float | None
     """Relative error that tau_c may have; None: not given."""
@@ -158,6 +350,7 @@ class Study:
     """None if the text came from elsewhere."""
     asked: tuple[units.Remark, ...] = ()
     """What is said of numbers that are usual in another unit; of a preset nothing."""
+    kind: Kind[S] = field(kw_only=True, compare=False, repr=False)
 
     @property
     def file(self) -> str:
@@ -165,9 +358,9 @@ class Study:
         return self.source.file if self.source else ""
 
     @cached_property
-    def scenes(self) -> tuple[Scene, ...]:
+    def scenes(self) -> tuple[S, ...]:
         """Every scene once, in the file's order."""
-        found = {}
+        found: dict[str, S] = {}
         for group in self.groups:
             found.update({scene.id: scene for scene in group.scenes})
         return tuple(found.values())
@@ -179,7 +372,7 @@ class Study:
 
 
 def load(source: str | Path, tolerance: float | None = None) -> Study:
-    """Read a study file by its path, or a preset by its name.
+    """Read a study file of the core's beds by its path, or a preset by its name.
 
     Parameters
     ----------
@@ -198,6 +391,31 @@ def load(source: str | Path, tolerance: float | None = None) -> Study:
     InputError
         With the file, the field and the remedy.
     """
+    return load_any(source, tolerance, {})
+
+
+def load_any(source: str | Path, tolerance: float | None, beds: Beds) -> Study[Any]:
+    """Read a study file, also on the beds of guests.
+
+    Parameters
+    ----------
+    source
+        The path of the file, or the name of a preset.
+    tolerance
+        Relative error that tau_c may have, in place of the file's.
+    beds
+        What guests offer.
+
+    Returns
+    -------
+    Study
+        The study, of the kind that its beds have.
+
+    Raises
+    ------
+    InputError
+        With the file, the field and the remedy.
+    """
     given: Any = tolerance  # Python gives what it likes
     is_number = isinstance(given, Real) and not isinstance(given, bool)
     if given is not None and not (is_number and 0 < given < 1):
@@ -209,12 +427,13 @@ def load(source: str | Path, tolerance: float | None = None) -> Study:
     files = Files(inputs.path.parent)
     # a file's name may be bytes that are no text; the page and the tables are text
     name = os.fsencode(inputs.path.stem).decode("utf-8", "replace")
-    study = _study(inputs.tables, inputs.text, name, str(inputs.path), files)
+    kind = _kind_of(inputs.tables, beds)
+    study = _study(kind, inputs.tables, inputs.text, name, str(inputs.path), files)
     study = replace(study, source=inputs.source(files.digests, tolerance))
     if tolerance is not None:
         study = replace(study, tolerance=tolerance)
     if study.questions:
-        warnings.warn("; ".join(study.questions), stacklevel=2)
+        warnings.warn("; ".join(study.questions), stacklevel=3)
     return study
 
 
@@ -247,25 +466,34 @@ def parse(text: str, *, name: str, where: str, files: Files | None = None) -> St
     """
     if files is None:
         files = Files(Path(where).parent)
-    return _study(tables_of(text, where), text, name, where, files)
+    return _study(PLANE, tables_of(text, where), text, name, where, files)
 
 
 def _study(
-    data: Mapping[str, Any], text: str, name: str, where: str, files: Files
-) -> Study:
-    """The study of the tables of a file."""
+    kind: Kind[S],
+    data: Mapping[str, Any],
+    text: str,
+    name: str,
+    where: str,
+    files: Files,
+) -> Study[S]:
+    """The study of the tables of a file, whose beds are of a kind."""
+    for place, table in _levels(data, where):
+        for key in table.keys() & {*kind.without}:
+            what = "beds in a plane alone have it"
+            remedy = 'leave it out, or bed.kind = "pile"'
+            raise InputError(what, f"{place}: {key}", remedy)
     try:
-        file = _File.model_validate(data)
+        file = kind.file.model_validate(kind.with_files(data, where, files))
     except ValidationError as error:
-        raise _explained(error, where) from None
+        raise kind.explained(error, where) from None
     files.carried = dict(file.profiles)
     numbers = Numbers(partial(files.sieve, where=where))
-    groups = _groups(file, where, files, numbers)
-    asked = numbers.asked
+    groups = _groups(kind, file, where, files, numbers)
+    kind.check(file, groups, where)
+    asked = numbers.asked + kind.asked(file)
     if file.units_confirmed:
         asked = [one for one in asked if not one.is_question]
-    else:
-        _check_profiles(groups)
     if any(text == path.read_text(encoding="utf-8") for path in presets().values()):
         asked = []
     return Study(
@@ -278,58 +506,62 @@ def _study(
         erosion=file.erosion,
         text=text + files.added,
         asked=tuple(asked),
+        kind=kind,
     )
 
 
-def _check_profiles(groups: Sequence[Group]) -> None:
-    """Refuse profiles that are likelier in millimetres."""
-    for group in groups:
-        for scene in group.scenes:
-            bed = scene.bed
-            if not isinstance(bed, PileBed) or not bed.profile:
-                continue
-            asked = units.of_bed(bed.profile.name, bed.profile.x[-1], bed.height)
-            if asked:
-                remedy = f"divide x_m and z_m by 1000, or {CONFIRMED} if it is so large"
-                raise InputError(asked, f"{group.where}: bed.profile", remedy)
+def _kind_of(data: Mapping[str, Any], beds: Beds) -> Kind[Any]:
+    """The kind of the beds of a file, or of its first group that has one."""
+    for _, table in _levels(data, ""):
+        bed = table.get("bed")
+        word = bed.get("kind") if isinstance(bed, dict) else None
+        if isinstance(word, str) and word in beds:
+            return beds[word]()
+    return PLANE
+
+
+def _levels(
+    data: Mapping[str, Any], where: str
+) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """The top of a file and its groups, with their places; what is none is left out."""
+    yield where, data
+    groups = data.get("group")
+    for number, table in enumerate(groups if isinstance(groups, list) else ()):
+        if isinstance(table, dict):
+            yield place_of(where, number), table
 
 
 def _groups(
-    file: _File, where: str, files: Files, numbers: Numbers
-) -> tuple[Group, ...]:
+    kind: Kind[S], file: File, where: str, files: Files, numbers: Numbers
+) -> tuple[Group[S], ...]:
     """The groups of a study with their scenes, the force law of each decided."""
     tables_of = file.group or (_Group(),)
     places = [where]
     if file.group:
         places = [place_of(where, number) for number in range(len(file.group))]
-    listed: list[list[Scene]] = []
+    parts = [name for name in kind.tables if name != "erosion"]
+    listed: list[list[S]] = []
     count = 0
     for group, place in zip(tables_of, places, strict=True):
         axes = _axes(file, group, place)
         count += math.prod(map(len, axes.values()))
-        if count > MOST_SCENES:
-            what = f"more than {MOST_SCENES} scenes in the study"
+        if count > kind.most:
+            what = f"more than {kind.most} scenes in the study"
             raise InputError(what, f"{place}: axes", "shorten the lists")
-        tables = by_name(dict(file))
-        for part, table in by_name(dict(group)).items():
+        tables = by_name(dict(file), parts)
+        own = by_name(dict(group), parts)
+        for part, table in own.items():
             tables[part] |= table
-        make = partial(make_scene, where=place, files=files)
+        make = partial(kind.make, where=place, files=files)
         listed.append([*scenes_at(tables, axes, place, make, numbers)])
-        own = [
-            f"{table}.{key}"
-            for table, keys in by_name(dict(group)).items()
-            for key in keys
-        ]
-        _check_effect(own, listed[-1], place)
-    top = [
-        f"{table}.{key}" for table, keys in by_name(dict(file)).items() for key in keys
-    ]
-    _check_effect(top, [*itertools.chain(*listed)], where)
+        kind.check_effect(_fields_in(own), listed[-1], place)
+    every = [*itertools.chain(*listed)]
+    kind.check_effect(_fields_in(by_name(dict(file), parts)), every, where)
     # force laws are found for the scenes of all groups at once
-    laws = resolved([*itertools.chain(*listed)])
+    laws = kind.resolved(every)
     groups = []
     for number, group in enumerate(tables_of):
-        scenes: list[Scene] = []
+        scenes: list[S] = []
         for _ in listed[number]:
             scenes += next(laws)
         name = group.name or f"group {number + 1}"
@@ -337,17 +569,12 @@ def _groups(
     return tuple(groups)
 
 
-def _check_effect(names: Sequence[str], scenes: Sequence[Scene], where: str) -> None:
-    """Refuse a field that is written for some scenes, and has an effect on none."""
-    for each in FIELDS:
-        if each.name not in names or any(map(each.applies, scenes)):
-            continue
-        if any(each.read(scene) != default_of(each.name) for scene in scenes):
-            what = f"it has an effect on {each.info.scope} alone"
-            raise InputError(what, f"{where}: {each.name}", "leave it out")
+def _fields_in(tables: Tables) -> list[str]:
+    """The names of the fields in some tables."""
+    return [f"{name}.{key}" for name, table in tables.items() for key in table]
 
 
-def _axes(file: "_File", table: "_Group", where: str) -> dict[str, list[Any]]:
+def _axes(file: File, table: "_Group", where: str) -> dict[str, list[Any]]:
     """The axes of a group, with the seeds that it asks for."""
     axes = {**file.axes, **table.axes}
     seeds = table.seeds
@@ -407,7 +634,7 @@ def make_scene(
     except UnfitError as error:
         raise InputError(error.what, f"{where}: {error.field}", error.remedy) from None
     except ValidationError as error:
-        raise _explained(error, where) from None
+        raise PLANE.explained(error, where) from None
 
 
 def _name_shape(bed: Table, where: str) -> None:
@@ -524,16 +751,53 @@ def changed(scene: Scene, fields: Mapping[str, Any]) -> Scene:
     return make_scene(tables, "fields that are changed")
 
 
-def _explained(error: ValidationError, where: str) -> InputError:
-    """The refusal of a file's tables, for the first thing that is wrong in them."""
-    keys = {"": [*_File.model_fields], "group": [*_Group.model_fields]}
-    return explained(error, where, TABLES, keys, _hint)
+class _Plane(Kind[Scene]):
+    """Beds in a plane: a grain on two others, and piles."""
+
+    tables = TABLES
+
+    def make(
+        self, tables: Mapping[str, Table], where: str, files: Files | None = None
+    ) -> Scene:
+        """Make a scene of its tables."""
+        return make_scene(tables, where, files)
+
+    def resolved(self, scenes: Sequence[Scene]) -> Iterator[Sequence[Scene]]:
+        """Find the force laws of the scenes: two answer in the transition."""
+        return resolved(scenes)
+
+    def check_effect(
+        self, names: Sequence[str], scenes: Sequence[Scene], where: str
+    ) -> None:
+        """Refuse a field that has an effect on none of the scenes."""
+        for each in FIELDS:
+            if each.name not in names or any(map(each.applies, scenes)):
+                continue
+            if any(each.read(scene) != default_of(each.name) for scene in scenes):
+                what = f"it has an effect on {each.info.scope} alone"
+                raise InputError(what, f"{where}: {each.name}", "leave it out")
+
+    def check(self, file: File, groups: Sequence[Group], where: str) -> None:
+        """Refuse profiles that are likelier in millimetres."""
+        del where
+        for group in () if file.units_confirmed else groups:
+            for scene in group.scenes:
+                bed = scene.bed
+                if not isinstance(bed, PileBed) or not bed.profile:
+                    continue
+                asked = units.of_bed(bed.profile.name, bed.profile.x[-1], bed.height)
+                if asked:
+                    remedy = "divide x_m and z_m by 1000, or "
+                    remedy += f"{CONFIRMED} if it is so large"
+                    raise InputError(asked, f"{group.where}: bed.profile", remedy)
+
+    def hint(self, names: Sequence[str], branch: str) -> tuple[str, str] | None:
+        """Say which beds have a field that is of no bed of this kind."""
+        *table, name = names
+        if branch == "grain" and name in PileBed.model_fields:
+            return "a bed of one grain has none", 'a pile has it: kind = "pile"'
+        told = (hint(".".join(table), name) for hint in HINTS)
+        return next(filter(None, told), None)
 
 
-def _hint(names: Sequence[str], branch: str) -> tuple[str, str] | None:
-    """Say which beds have a field that is of no bed of this kind."""
-    *table, name = names
-    if branch == "grain" and name in PileBed.model_fields:
-        return "a bed of one grain has none", 'a pile has it: kind = "pile"'
-    told = (hint(".".join(table), name) for hint in HINTS)
-    return next(filter(None, told), None)
+PLANE: Kind[Scene] = _Plane()

@@ -1,10 +1,9 @@
 """Beds in three dimensions: heights, mesh, flow, stress and thresholds."""
 
-import warnings
 from argparse import Namespace
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from orchestrator.errors import InputError
 from orchestrator.guests import Offer
@@ -12,6 +11,7 @@ from orchestrator.study.hints import HINTS
 
 if TYPE_CHECKING:
     from orchestrator.experiment import Experiment
+    from orchestrator.study.study import Kind, Study
 
 TRUTH = ("ridge", "turn", "interval", "piles", "askervein")
 """Comparisons of flows over beds in three dimensions."""
@@ -22,13 +22,15 @@ COMMANDS = {
 """Commands on beds in three dimensions, and the modules of their experiments."""
 
 
-def take_over(options: Namespace) -> int | None:
-    """Take over a command on a study file of beds in three dimensions.
+def take_over(study: "Study[Any]", options: Namespace) -> int | None:
+    """Take over a command on a study of beds in three dimensions.
 
     Parameters
     ----------
+    study
+        The study.
     options
-        The options of the command, with its name and its study file.
+        The options of the command.
 
     Returns
     -------
@@ -38,21 +40,16 @@ def take_over(options: Namespace) -> int | None:
     Raises
     ------
     InputError
-        If the study file is refused, or an option that such beds do not have is given.
+        If an option is given that such beds do not have.
     """
-    if options.command not in COMMANDS:
-        return None
-    from orchestrator.surface import study as surface_study
+    from orchestrator.surface.study import SURFACES
 
-    study = surface_study.load(options.source)
-    if study is None:
+    if study.kind is not SURFACES:
         return None
     for name in ("cluster", "tolerance"):
         if getattr(options, name, None) is not None:
             what = "a bed in three dimensions has none"
             raise InputError(what, f"--{name}", "leave it out")
-    for question in study.questions:
-        warnings.warn(question, stacklevel=1)
     module = import_module(COMMANDS[options.command])
     name = study.name if options.command == "study" else options.command
     out = options.out or Path("results") / name
@@ -71,5 +68,12 @@ def _hint(table: str, name: str) -> tuple[str, str] | None:
     return "beds in three dimensions alone have it", remedy
 
 
+def _surfaces() -> "Kind[Any]":
+    """The beds in three dimensions, for the loader of studies."""
+    from orchestrator.surface.study import SURFACES
+
+    return SURFACES
+
+
 HINTS.append(_hint)
-OFFER = Offer(take_over=take_over)
+OFFER = Offer(beds={"surface": _surfaces}, take_over=take_over)

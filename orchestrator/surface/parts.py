@@ -11,11 +11,13 @@ from pydantic import Field, InstanceOf, model_validator
 
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.threshold import AUTO, PAPER, usual_law
+from orchestrator.runs.files import canonical_json, digest_text
 from orchestrator.study.declare import Height, Part, Roughness, UnfitError, Viscosity
 from orchestrator.study.declare import field as declared
 from orchestrator.study.method import Turbulence
 from orchestrator.study.parts import LAW_LABELS, Drag, Erosion, Fluid, Sphere
 from orchestrator.surface.heights import Surface, barchan, cone, oval
+from orchestrator.surface.rose import Rose
 
 Shape = Literal["cone", "oval", "barchan"]
 OVAL_LENGTH = 3.0
@@ -157,7 +159,7 @@ class SurfaceMethod(Part):
 class SurfaceErosion(Erosion):
     """What is asked of the wind, and by the command `erosion`."""
 
-    wind: str | None = None
+    wind: InstanceOf[Rose] | None = None
     """wind rose, a CSV file with the columns from_deg, speed_m_s and share"""
 
 
@@ -188,6 +190,12 @@ class SurfaceScene(Part):
             remedy = "lower it: its elements would stand out of the cells"
             raise UnfitError("method.flow.roughness", what, remedy)
         return self
+
+    @property
+    def id(self) -> str:
+        """What tells it from every other scene: its fields, and its heights."""
+        fields = self.model_dump(mode="json", exclude={"bed": {"surface"}})
+        return digest_text(canonical_json([fields, self.heights.digest]))[:12]
 
     @property
     def heights(self) -> Surface:

@@ -46,7 +46,7 @@ from orchestrator.surface.mesh import LEVELS
 from orchestrator.surface.parts import SurfaceScene
 from orchestrator.surface.raster import geotiff
 from orchestrator.surface.stress import SurfaceStress
-from orchestrator.surface.study import SurfaceStudy
+from orchestrator.surface.study import SurfaceStudy, rose_of
 from orchestrator.types import FloatArray
 
 HEADINGS = {
@@ -229,13 +229,14 @@ def roses_of(
     InputError
         If the rose blows from where no flow is.
     """
-    if not study.rose:
+    rose = rose_of(study)
+    if not rose:
         return {}
     where = f"{study.file}: erosion.wind"
     found = {}
     for bare, scenes in members.items():
         directions = [scene.flow.from_deg for scene in scenes]
-        found[bare] = study.rose.table(directions, where)
+        found[bare] = rose.table(directions, where)
     return found
 
 

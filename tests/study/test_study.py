@@ -302,10 +302,10 @@ def test_a_level_bed_has_no_height(bed: str) -> None:
 
 SOLVERS = """
 import sys
-from orchestrator.surface import study as surface_study
+from orchestrator import guests
 from orchestrator.study import study
 for name in study.presets():
-    assert (surface_study.load(name) or study.load(name)).scenes
+    assert guests.load(name, None).scenes
 print(*set(sys.modules) & {"orchestrator.flow", "orchestrator.solvers", "gmsh", "pyvista"})
 """
 

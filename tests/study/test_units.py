@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from orchestrator import guests
 from orchestrator.calculator import PARAMETERS
 from orchestrator.calculator.asked import thresholds_and_questions
 from orchestrator.calculator.cli import OPTIONS
@@ -13,7 +14,6 @@ from orchestrator.errors import InputError
 from orchestrator.study import study, units
 from orchestrator.study.parts import PileBed
 from orchestrator.study.source import presets
-from orchestrator.surface import study as surface_study
 
 WATER = "fluid.kind = 'water'\n"
 QUARTZ = f"{WATER}grain.density = 2650.0\n"
@@ -123,7 +123,7 @@ def test_a_study_asks_about_numbers_that_are_usual_in_another_unit(
 
 @pytest.mark.parametrize("name", presets())
 def test_presets_are_asked_nothing(name: str) -> None:
-    assert (surface_study.load(name) or study.load(name)).questions == ()
+    assert guests.load(name, None).questions == ()
 
 
 def test_a_study_and_the_command_ask_alike() -> None:

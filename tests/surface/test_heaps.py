@@ -8,12 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from orchestrator import guests
 from orchestrator.errors import InputError
 from orchestrator.experiment import Experiment, Results, Runs
 from orchestrator.flow.run import WALL_STRESS
 from orchestrator.report.card import Card
 from orchestrator.surface import cards, erosion, pipeline
-from orchestrator.surface import study as surface_study
 from orchestrator.surface.raster import geotiff
 from orchestrator.surface.stress import SurfaceStress, faces_of
 from orchestrator.surface.study import SurfaceStudy
@@ -60,8 +60,7 @@ def study_of(
     (folder / "heaps.tif").write_bytes(geotiff(EAST + x, NORTH + y, z, ""))
     path = folder / "heaps.toml"
     path.write_text(FILE.format([*directions]) + more)
-    found = surface_study.load(path)
-    assert found is not None
+    found: SurfaceStudy = guests.load(path, None)
     return found
 
 
@@ -231,8 +230,7 @@ def test_a_low_heap_alone_is_flat_ground_to_ap42(tmp_path: Path) -> None:
     study_of(tmp_path, more=COAL)
     heights = np.maximum(np.maximum(high, low), 0.0)
     (tmp_path / "heaps.tif").write_bytes(geotiff(EAST + x, NORTH + y, heights, ""))
-    study = surface_study.load(tmp_path / "heaps.toml")
-    assert study is not None
+    study = guests.load(tmp_path / "heaps.toml", None)
     experiment = erosion.experiment(study)
     made, sections = answered(study, experiment, tmp_path / "cases")
     told = sections[0].text.split("\n\n")
@@ -320,7 +318,6 @@ def test_a_current_takes_no_dust(tmp_path: Path) -> None:
     study_of(tmp_path)
     path = tmp_path / "heaps.toml"
     path.write_text(path.read_text().replace('"air"', '"water"'))
-    study = surface_study.load(path)
-    assert study is not None
+    study = guests.load(path, None)
     with pytest.raises(InputError, match=r"fluid.density: a fluid of .* is no wind"):
         erosion.experiment(study)

@@ -6,10 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from orchestrator import guests
 from orchestrator.errors import InputError
-from orchestrator.surface import study as surface_study
+from orchestrator.study import study as plane
+from orchestrator.study.study import PLANE
 from orchestrator.surface.heights import cone
 from orchestrator.surface.raster import geotiff
+from orchestrator.surface.study import SurfaceStudy, rose_of
 
 FILE = """
 [fluid]
@@ -26,11 +29,10 @@ slope_deg = 30
 """
 
 
-def load(folder: Path, text: str) -> surface_study.SurfaceStudy:
+def load(folder: Path, text: str) -> SurfaceStudy:
     path = folder / "pile.toml"
     path.write_text(text)
-    found = surface_study.load(path)
-    assert found is not None
+    found: SurfaceStudy = guests.load(path, None)
     return found
 
 
@@ -51,11 +53,63 @@ def test_a_raster_and_a_rose_are_read_beside_the_file(tmp_path: Path) -> None:
     text = FILE.replace('shape = "cone"\nheight = 10\nslope_deg = 30', "{}")
     text += '[erosion]\nwind = "year.csv"\n'
     study = load(tmp_path, text.format('surface = "heap.tif"'))
-    assert study.rose is not None
+    assert rose_of(study) is not None
     assert study.scenes[0].heights.z == pytest.approx(heap.z, abs=1e-5)
     assert study.scenes[0].heights.said == ()
     names = {"pile.toml", "heap.tif", "year.csv"}
+    assert study.source is not None
     assert set(study.source.digests) == names
+
+
+GROUPS = """
+[[group]]
+name = "gentle"
+bed.slope_deg = 20
+[[group]]
+name = "steep"
+axes = { "grain.diameter" = [5e-4, 1e-3] }
+"""
+
+
+def test_surfaces_have_groups_as_every_study(tmp_path: Path) -> None:
+    study = load(tmp_path, FILE + GROUPS)
+    assert [group.name for group in study.groups] == ["gentle", "steep"]
+    gentle, steep = study.groups
+    assert {scene.bed.slope_deg for scene in gentle.scenes} == {20.0}
+    # the directions are those of the top
+    assert [scene.flow.from_deg for scene in gentle.scenes] == [0.0, 90.0]
+    assert len(steep.scenes) == 4
+    assert len(study.scenes) == 6
+
+
+@pytest.mark.parametrize(
+    ("of_group", "message"),
+    [
+        ("seeds = 3", "group 1: seeds: beds in a plane alone have it"),
+        ('bed.kind = "pile"', "bed.kind: 'pile' is not accepted"),
+        ("bed.slope_deg = 61", "bed.slope_deg: 61 is not accepted"),
+    ],
+)
+def test_a_group_of_other_beds_is_refused(
+    tmp_path: Path, of_group: str, message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        load(tmp_path, f"{FILE}[[group]]\n{of_group}\n")
+
+
+def test_surfaces_of_the_same_heights_are_one_scene(tmp_path: Path) -> None:
+    heap = cone(10.0, 30.0)
+    for name in ("one.tif", "other.tif"):
+        (tmp_path / name).write_bytes(geotiff(heap.x, heap.y, heap.z, ""))
+    text = FILE.replace('shape = "cone"\nheight = 10\nslope_deg = 30\n', "")
+    text += '"bed.surface" = ["one.tif", "other.tif"]\n'
+    with pytest.raises(InputError, match=r"axes: .* are one scene"):
+        load(tmp_path, text)
+
+
+def test_other_commands_refuse_a_surface() -> None:
+    with pytest.raises(InputError, match="answered by study and erosion alone"):
+        plane.load("cone")
 
 
 def test_smoothing_of_more_cells_is_another_surface(tmp_path: Path) -> None:
@@ -68,15 +122,14 @@ def test_smoothing_of_more_cells_is_another_surface(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["cone", "oval", "barchan"])
 def test_the_presets_are_studies(name: str) -> None:
-    study = surface_study.load(name)
-    assert study is not None
+    study = guests.load(name, None)
     assert study.scenes[0].bed.shape == name
     assert study.questions == ()
 
 
 @pytest.mark.parametrize("name", ["stockpile", "first-look"])
 def test_other_studies_are_none_of_surfaces(name: str) -> None:
-    assert surface_study.load(name) is None
+    assert guests.load(name, None).kind is PLANE
 
 
 @pytest.mark.parametrize(
@@ -184,7 +237,8 @@ def test_wrong_fields_are_refused_with_their_names(
 
 def test_a_confirmed_unit_is_not_asked_about(tmp_path: Path) -> None:
     text = FILE.replace("[fluid]", "[forces]\nlift_coefficient = 6.5\n[fluid]")
-    (asked,) = load(tmp_path, text).questions
+    with pytest.warns(match="6.5: did you mean Saffman's"):
+        (asked,) = load(tmp_path, text).questions
     assert asked.startswith("6.5: did you mean Saffman's")
     assert load(tmp_path, f"units_confirmed = true\n{text}").questions == ()
 
@@ -236,7 +290,8 @@ def test_a_wind_rose_over_water_is_refused(tmp_path: Path) -> None:
 
 def test_a_wind_that_is_likelier_in_another_unit_is_asked_about(tmp_path: Path) -> None:
     (tmp_path / "year.csv").write_text("from_deg,speed_m_s,share\n0,36,0.9\n0,0,0.1\n")
-    study = load(tmp_path, FILE + '[erosion]\nwind = "year.csv"\n')
+    with pytest.warns(match="did you mean km/h"):
+        study = load(tmp_path, FILE + '[erosion]\nwind = "year.csv"\n')
     (asked,) = study.questions
     assert asked == (
         "the wind of year.csv is 32.4 m/s in the mean: did you mean km/h, 9 m/s?"
