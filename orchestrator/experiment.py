@@ -17,7 +17,6 @@ from orchestrator.fidelity.decision import with_criterion, written
 from orchestrator.pipeline import Finished
 from orchestrator.plan import Plan
 from orchestrator.report import page, style
-from orchestrator.report.card import lines
 from orchestrator.report.page import Section
 from orchestrator.runs import case, reuse, workspace
 from orchestrator.runs.files import Folder
@@ -211,13 +210,8 @@ class Experiment:
             what = f"{number(sought, 'case')} failed, which is an answer here"
             where = f"`orchestrator status {out}` names each with its cause"
             print(f"{what}; {where}", file=sys.stderr)
-        said = []
-        for section in sections:
-            if section.card is not None:
-                said += [*lines(section.card), ""]
-            if not section.title:
-                said.append(section.text.replace("\n\n", "\n"))
-        return Finished(space.page, len(todo), failures, "\n".join(said).rstrip())
+        said = "\n".join(section.told for section in sections)
+        return Finished(space.page, len(todo), failures, said.rstrip())
 
     def command(self, options: Namespace, out: Path) -> int:
         """Run as a command, or say what would run.
@@ -278,7 +272,8 @@ class Experiment:
                 for path, content in made.items():
                     folder.put(path, content)
                 solvers = case.programs(cases, self.planned.cases)
-                page.write(self.title, sections, folder, space.page.name, solvers)
+                name = space.page.name
+                page.write_experiment(self.title, sections, folder, name, solvers)
         return sections
 
 

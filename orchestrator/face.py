@@ -323,10 +323,11 @@ class Plot:
         OrchestratorError
             If the study has no thresholds.
         """
-        from orchestrator.report import shields, style
+        from orchestrator.report import style
+        from orchestrator.report.figures import shields
 
         with style.settings():
-            for figure in shields.draw(self._results):
+            for figure in shields.FIGURE.draw(self._results):
                 if figure.canvas:
                     return figure.canvas
         directory = self._results.cases.parent

@@ -4,16 +4,15 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+import pandas as pd
+
 from orchestrator import face
 from orchestrator.errors import InputError, OrchestratorError
-from orchestrator.report import PAGE, page
-from orchestrator.report.style import FIGURES
+from orchestrator.report import LIST, PAGE, page
 from orchestrator.runs.files import Folder
 from orchestrator.runs.workspace import STUDY
 
 NAME = "gallery.html"
-PICTURES = ("bed-*.svg", "shields.svg", "*.svg")
-"""The figure that a card shows: the first that there is."""
 
 
 def write(directory: Path) -> Path:
@@ -62,13 +61,17 @@ def _card(study: Path) -> dict[str, Any]:
         "directory": study.name,
         "link": quote(f"{study.name}/{PAGE}"),
         "says": says,
-        "image": _picture(study / FIGURES),
+        "image": _picture(study / LIST),
     }
 
 
-def _picture(figures: Path) -> bytes:
-    """The figure of a study that its card shows; empty if there is none."""
-    for pattern in PICTURES:
-        for path in sorted(figures.glob(pattern)):
+def _picture(listed: Path) -> bytes:
+    """The first figure that leads a page, of its list; empty if there is none."""
+    if not listed.is_file():
+        return b""
+    figures = pd.read_csv(listed)
+    for name in figures.loc[figures["place"] == "lead", "name"]:
+        path = listed.with_name(f"{name}.svg")
+        if path.is_file():
             return path.read_bytes()
     return b""

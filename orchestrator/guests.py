@@ -1,4 +1,4 @@
-"""The guests: packages that add commands, cards and kinds of beds to the core.
+"""The guests: packages that add commands, cards, figures and kinds of beds to the core.
 
 Each stands in a room of its own, which no module of the core imports. The package of a
 guest has an `OFFER`; the core asks what is offered. Here stands the one list of guests:
@@ -35,6 +35,9 @@ class Offer:
         Makes its cards on the page of a study; None for a guest without cards.
     beds
         Its kinds of beds, by their words for `bed.kind`.
+    figures
+        Name of a package whose modules are figures of the page of a study, as those of
+        `report.figures`; empty for a guest without figures.
     take_over
         Runs a command on a study of its beds, and returns its exit code, or None for
         other beds; None for a guest without beds.
@@ -43,6 +46,7 @@ class Offer:
     commands: tuple[Command, ...] = ()
     cards: "Callable[[Study, Tables], list[Guest]] | None" = None
     beds: "Beds" = field(default_factory=dict)
+    figures: str = ""
     take_over: "Callable[[Study[Any], Namespace], int | None] | None" = None
 
 
@@ -79,6 +83,17 @@ def cards(study: "Study", tables: "Tables") -> "list[Guest]":
         if offer.cards is not None:
             made += offer.cards(study, tables)
     return made
+
+
+def figures() -> list[str]:
+    """List the packages of guests whose modules are figures of the page of a study.
+
+    Returns
+    -------
+    list of str
+        Their names.
+    """
+    return [offer.figures for offer in offers() if offer.figures]
 
 
 def load(source: str | Path, tolerance: float | None) -> "Study[Any]":

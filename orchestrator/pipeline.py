@@ -292,7 +292,8 @@ def prune(directory: Path) -> str:
     with claimed(space.root, STUDY, study.name, new=False):
         done = reuse.done(planned.cases, space.cases)
         made = tables.make(study, planned, space.cases, done)
-        drawn = report.drawn_from(Results(study, planned, made, space.cases))
+        results = Results(study, planned, made, space.cases)
+        drawn = report.drawn_from(results, guests.figures())
         kept = {case.name for case in drawn}
         return workspace.prune(space, {name: planned.ids[name] for name in done}, kept)
 
@@ -323,7 +324,8 @@ def _draw(
         tables.write({"timings": times}, space, "timings")
         answer = report.said(results, cards)
         try:
-            undrawn = report.write(results, causes, space, cards, every)
+            rooms = guests.figures()
+            undrawn = report.write(results, causes, space, cards, every, rooms)
         except BaseException:
             # no memory for a picture, or an interrupt: the answer is found
             print(answer, file=sys.stderr)

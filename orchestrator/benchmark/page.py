@@ -17,7 +17,14 @@ from orchestrator.errors import printable
 from orchestrator.physics import curves
 from orchestrator.report import page, style
 from orchestrator.report.card import Card, Number, Worth
-from orchestrator.report.page import Section
+from orchestrator.report.page import (
+    IN_SENTENCES,
+    Element,
+    Limits,
+    Paragraphs,
+    Section,
+    Table,
+)
 from orchestrator.report.style import DIAMETERS, PANELS, WATER, Figure, Look
 from orchestrator.runs.files import Folder
 from orchestrator.types import FloatArray
@@ -121,24 +128,30 @@ def write(
         warnings.filterwarnings("ignore", "Glyph .* missing from font")
         beds = _beds(numbers, theirs) + _shields(chosen, numbers)
         listed = thresholds(numbers)
-        of_beds = Section("Beds", "", beds)
+        of_beds: list[Element] = [*beds]
         if len(listed):
-            of_beds = Section("Beds", THRESHOLDS, beds, (listed,))
+            of_beds += [Paragraphs(THRESHOLDS, "lead"), Table.of(listed)]
         said = "\n\n".join([*notes, *judge.in_words(theirs)])
+        in_sentences = Paragraphs(said, fold=IN_SENTENCES)
+        failures = judge.failures(theirs)
+        by_quantity = judge.by_quantity(numbers)
+        quantities: list[Element] = []
+        if len(by_quantity):
+            quantities = [Paragraphs(QUANTITIES, "lead"), Table.of(by_quantity)]
+        times: list[Element] = [Limits(LIMITS), *_speed(verdicts)]
         sections = [
-            Section("", said, (), (judge.summary(theirs),), card=_card(theirs)),
-            Section("What failed", tables=(judge.failures(theirs),)),
-            Section("By quantity", QUANTITIES, tables=(judge.by_quantity(numbers),)),
-            of_beds,
-            Section("Time and error", ERRORS, _speed(verdicts), (scenes,), LIMITS),
+            Section("", [_card(theirs), in_sentences, Table.of(judge.summary(theirs))]),
+            Section("What failed", [Table.of(failures)] if len(failures) else []),
+            Section("By quantity", quantities),
+            Section("Beds", of_beds),
+            Section(
+                "Time and error", [*times, Paragraphs(ERRORS, "lead"), Table.of(scenes)]
+            ),
         ]
         names = ", ".join(theirs["solver"].unique())
         title = f"Against the pack “{printable(chosen.root.name)}”: {names}"
-        shown = []
-        for section in sections:
-            if section.figures or any(map(len, section.tables)):
-                shown.append(section)
-        page.write(title, shown, folder, PAGE, chosen.manifest.programs)
+        shown = [section for section in sections if section.content]
+        page.write_experiment(title, shown, folder, PAGE, chosen.manifest.programs)
 
 
 def _beds(numbers: pd.DataFrame, theirs: pd.DataFrame) -> list[Figure]:

@@ -24,7 +24,7 @@ from orchestrator.grains.pile import Pile
 from orchestrator.physics.laws import LAWS
 from orchestrator.report import style
 from orchestrator.report.card import Card, Number, Worth
-from orchestrator.report.page import Section
+from orchestrator.report.page import IN_SENTENCES, Limits, Paragraphs, Section, Table
 from orchestrator.report.results import FRACTION
 from orchestrator.report.style import Figure
 from orchestrator.study.closed_form import law_holds
@@ -543,9 +543,11 @@ def _sections(
         tornados.append(section)
     together = Section(
         "All choices together",
-        TOGETHER_TEXT,
-        tables=[pd.DataFrame(rows)],
-        limits=[LIMIT_TEXT],
+        [
+            Paragraphs(TOGETHER_TEXT, "lead"),
+            Limits([LIMIT_TEXT]),
+            Table.of(pd.DataFrame(rows)),
+        ],
     )
     first, *others = tornados
     of_bed = _changing_bed(moved)
@@ -568,7 +570,8 @@ def _of_scene(
     chart = Figure(figure, ALONE, SCENE_TEXT, (), tornado(largest))
     told = _in_words(name, fraction, theta, ustar0)
     said = f"{name}; criterion: a grain {'goes on' if base.goes_on else 'leaves'}"
-    section = Section("", told, [chart], card=_card(said, fraction, theta, ustar0))
+    card = _card(said, fraction, theta, ustar0)
+    section = Section("", [card, chart, Paragraphs(told, fold=IN_SENTENCES)])
     return _row(name, theta, ustar0), section
 
 
@@ -657,7 +660,8 @@ def _changing_bed(moved: pd.DataFrame) -> list[Section]:
             "u*₀, %": 100 * frozen["ustar0"],
         }
     )
-    return [Section("The bed that changes", CHANGING_TEXT, tables=[table])]
+    text = Paragraphs(CHANGING_TEXT, "lead")
+    return [Section("The bed that changes", [text, Table.of(table)])]
 
 
 def _alternatives(moved: pd.DataFrame) -> Section:
@@ -669,7 +673,7 @@ def _alternatives(moved: pd.DataFrame) -> Section:
             names = ", ".join(dict.fromkeys(tried))
             rows.append((choice.name, names, choice.why))
     table = pd.DataFrame(rows, columns=["choice", "alternatives", "why"])
-    return Section("The choices and their alternatives", tables=[table])
+    return Section("The choices and their alternatives", [Table.of(table)])
 
 
 def tornado(largest: pd.DataFrame) -> Canvas:

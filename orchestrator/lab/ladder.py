@@ -49,7 +49,7 @@ from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import of_pile
 from orchestrator.report import style
 from orchestrator.report.card import Card, Number, Worth
-from orchestrator.report.page import Section
+from orchestrator.report.page import Limits, Paragraphs, Section, Table
 from orchestrator.report.style import Figure, Look
 from orchestrator.runs.case import Case
 from orchestrator.study.parts import PileBed
@@ -539,10 +539,13 @@ def _sections(pairs: pd.DataFrame, known: pd.DataFrame) -> list[Section]:
     means = table_of(pairs)
     title = "The rungs, and what is known of them"
     of_rungs = _tables_of_rungs(known)
+    accuracy = Paragraphs(words["accuracy"], "lead")
+    rungs = Paragraphs(words["rungs"], "lead")
+    limit = Limits([words["limit"]])
     return [
-        Section("", card=_card(_of_most_piles(pairs))),
-        Section("Speed against accuracy", words["accuracy"], charts, [means]),
-        Section(title, words["rungs"], (), of_rungs, [words["limit"]]),
+        Section("", [_card(_of_most_piles(pairs))]),
+        Section("Speed against accuracy", [*charts, accuracy, Table.of(means)]),
+        Section(title, [rungs, limit, *map(Table.of, of_rungs)]),
     ]
 
 

@@ -27,7 +27,7 @@ from orchestrator.grains import threshold
 from orchestrator.grains.motion import Motion
 from orchestrator.report import style
 from orchestrator.report.card import Card, Number, Worth
-from orchestrator.report.page import Section
+from orchestrator.report.page import Limits, Paragraphs, Section
 from orchestrator.report.style import Figure
 from orchestrator.runs import case
 from orchestrator.study.closed_form import resolved
@@ -227,14 +227,16 @@ def _sections(maps: Sequence[Map], table: pd.DataFrame) -> list[Section]:
     """The page: all maps in one figure, and each with its question."""
     whole = Figure("maps", TITLE, "", (), draw(maps, table))
     sections = [
-        Section("", card=_card(table)),
-        Section("All maps", MAPS_TEXT, [whole]),
+        Section("", [_card(table)]),
+        Section("All maps", [whole, Paragraphs(MAPS_TEXT, "lead")]),
     ]
     for each in maps:
         title = each.data["title"]
         figure = Figure(f"map-{each.name}", title, "", (), draw([each], table))
+        question = Paragraphs(each.data["question"], "lead")
         limits = each.data.get("limits", ())
-        sections.append(Section(title, each.data["question"], [figure], (), limits))
+        said = [Limits(limits)] if limits else []
+        sections.append(Section(title, [*said, figure, question]))
     return sections
 
 

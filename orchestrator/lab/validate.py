@@ -30,7 +30,7 @@ from orchestrator.physics.onset import Criteria, Onset, of_grains
 from orchestrator.physics.threshold import LAWS_OF, PAPER
 from orchestrator.report import style
 from orchestrator.report.card import Card, Number, Worth
-from orchestrator.report.page import Section
+from orchestrator.report.page import IN_SENTENCES, Paragraphs, Section, Table
 from orchestrator.report.style import Figure
 from orchestrator.study.fidelities import Fields
 from orchestrator.study.parts import PileBed
@@ -517,11 +517,14 @@ def _sections(rows: pd.DataFrame, scored: pd.DataFrame) -> list[Section]:
     wide = wide.reset_index()
     is_from_memory = (rows["sure"] != READ) & (rows["model"] == MODELS[-1].name)
     memory = rows.loc[is_from_memory, ["set", "source", "measured", "value", "ratio"]]
+    told = Paragraphs(_nearest_in_words(nearest), fold=IN_SENTENCES)
+    medians = [Table.of(nearest.reset_index()), Table.of(wide)]
+    of_beds = Paragraphs(THRESHOLDS_TEXT, "lead")
     return [
-        Section("", _nearest_in_words(nearest), card=_card(nearest)),
-        Section(title, SETS_TEXT, (chart,), [nearest.reset_index(), wide]),
-        Section("Thresholds", THRESHOLDS_TEXT, (points,), [scored]),
-        Section("From memory", MEMORY_TEXT, (), [memory]),
+        Section("", [_card(nearest), told]),
+        Section(title, [chart, Paragraphs(SETS_TEXT, "lead"), *medians]),
+        Section("Thresholds", [points, of_beds, Table.of(scored)]),
+        Section("From memory", [Paragraphs(MEMORY_TEXT, "lead"), Table.of(memory)]),
         truth.section(truth.stored()),
     ]
 

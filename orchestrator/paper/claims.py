@@ -14,7 +14,7 @@ from orchestrator.paper import measures
 from orchestrator.paper.evidence import RULE, Comparison, Evidence, Verdict, combined
 from orchestrator.report import page
 from orchestrator.report.card import Card, Mark, Number, Worth
-from orchestrator.report.page import Guest
+from orchestrator.report.page import Guest, Section, Text
 from orchestrator.report.sheets import Sheet
 from orchestrator.tables import Tables
 
@@ -28,21 +28,6 @@ WORDS: dict[Verdict, str] = {
 """Verdicts, and what the page calls them."""
 MARKS: dict[Verdict, Mark] = {"reproduced": "good", "partly": "care", "not": "bad"}
 """Verdicts, and their marks; one that was not judged has none."""
-
-
-NUMBERS = {
-    "closed-form-horizontal": "Paper, Fig. 5",
-    "dem-horizontal": "Paper, Figs. 5 and 6",
-    "closed-form-slope": "Paper, Fig. 7",
-    "dem-slope": "Paper, Figs. 7 and 8",
-    "mesh": "Paper, Fig. 11",
-    "bed-": "Paper, Fig. 13",
-    "fractions-reynolds-alpha15": "Paper, Fig. 14, left",
-    "fractions-alpha15": "Paper, Fig. 14, right",
-    "extended-shields-d10": "Paper, Fig. 15",
-    "extended-shields-d30": "Paper, Fig. 16",
-}
-"""Numbers of the paper's figures, by the beginning of the names of ours."""
 
 
 @dataclass(frozen=True)
@@ -151,8 +136,8 @@ def guest(judged: Sequence[Judged], tables: Tables, file: str) -> Guest:
         A card on how many claims hold, a section with each, and the file.
     """
 
-    def section(figures: Sequence[str]) -> Markup:
-        """The section of the page, with the titles of the figures that show claims."""
+    def sections(figures: Sequence[str]) -> list[Section]:
+        """The claims, with the names of the figures that show each."""
         entries = []
         for one in judged:
             shown = [name for name in figures if name.startswith(one.claim.figures)]
@@ -167,17 +152,11 @@ def guest(judged: Sequence[Judged], tables: Tables, file: str) -> Guest:
             file=file,
             links={},
         )
-        return Markup(text)
+        title = "What the paper claims, and what this study finds"
+        return [Section(title, [Text(Markup(text))], "claims", "Claims")]
 
     files = {file: frame(judged).to_csv(index=False)}
-    return Guest(
-        "claims",
-        section,
-        files,
-        card(judged, tables),
-        sheet(judged, file),
-        NUMBERS,
-    )
+    return Guest(sections, files, card(judged, tables), sheet(judged, file), True)
 
 
 def card(judged: Sequence[Judged], tables: Tables) -> Card:

@@ -1,9 +1,9 @@
 """Figures and page of a study."""
 
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from orchestrator.runs import terminal
 
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from orchestrator.runs.files import Folder
 
 PAGE = "report.html"
+LIST = "figures/figures.csv"
+"""The figures of a page in their order."""
 
 
 def write(
@@ -23,6 +25,7 @@ def write(
     folder: "Folder",
     guests: Sequence["Guest"] = (),
     every: bool = False,
+    packages: Sequence[str] = (),
 ) -> list[str]:
     """Draw the figures of a study and write its page into its directory.
 
@@ -38,6 +41,8 @@ def write(
         Sections that others add to the page, with their files.
     every
         Whether the figures that the page folds away are drawn too.
+    packages
+        Packages of others with further figures, as of `figures.kinds`.
 
     Returns
     -------
@@ -45,122 +50,83 @@ def write(
         A line for each figure that could not be drawn, such as for want of memory. The
         page has the line in its place.
     """
-    from orchestrator.report import page, words
+    from orchestrator.report import page, sections
 
-    numbers: dict[str, str] = {}
-    for guest in guests:
-        numbers |= guest.numbers
-    figures, faults = _drawn(results, folder, every, numbers)
+    is_paper = any(guest.is_paper for guest in guests)
+    figures, faults = _drawn(results, folder, every, is_paper, packages)
+    folder.put(LIST, _listed(figures))
     for guest in guests:
         for name, text in guest.files.items():
             folder.put(name, text)
-    names = [figure.name for figure in figures]
-    parts = words.contents(results, failures, guests)
-    parts["faults"] = faults
-    parts["figures"] = figures
-    parts["guests"] = guests
-    parts |= _heads(results, guests, faults)
-    parts["sections"] = [guest.section(names) for guest in guests]
+    listed = sections.of_study(results, failures, guests, figures, faults)
     terminal.check()
-    folder.put(PAGE, page.fill("page.html.j2", **parts))
+    page.write(
+        folder,
+        PAGE,
+        results.study.title,
+        listed,
+        above=f"Study “{results.study.title}”",
+        links=sections.links(results),
+        is_paper=is_paper,
+    )
     return faults
 
 
-def _heads(
-    results: "Results", guests: Sequence["Guest"], faults: list[str]
-) -> "dict[str, Any]":
-    """The picture below the card, and what stands under a picture of grains."""
-    from orchestrator.report import drawing, head, style
-
-    shown: dict[str, Any] = {"head": None, "under": None}
-    if guests:
-        return shown
-    for name, choose in {"head": head.of, "under": head.below}.items():
-        try:
-            with style.settings():
-                chosen = choose(results)
-                if chosen is not None:
-                    shown[name] = (chosen, drawing.written(chosen))
-        except Exception as error:
-            fault = f"{head.__name__}: {type(error).__name__}: {error}"
-            faults.append(fault)
-            print(f"a figure could not be drawn: {fault}", file=sys.stderr)
-        if shown["head"]:
-            break
-    return shown
-
-
 def _drawn(
-    results: "Results", folder: "Folder", every: bool, numbers: Mapping[str, str]
+    results: "Results",
+    folder: "Folder",
+    every: bool,
+    is_paper: bool,
+    packages: Sequence[str],
 ) -> "tuple[list[Figure], list[str]]":
-    """The figures of a study, leading ones first, and a line for each that failed."""
-    from orchestrator.report import along, bed, flows, piles, poured, shields, style
+    """The figures of a study, and a line for each that failed."""
+    from orchestrator.report import figures, style
 
-    drawing: list[Callable[[Results], Iterator[Figure]]] = [
-        flows.hills,
-        along.draw,
-        bed.draw,
-        shields.draw,
-        shields.singles,
-        shields.piles,
-        piles.fractions,
-        piles.fractions_by_reynolds,
-        piles.wear,
-        shields.accuracy,
-        poured.draw,
-        flows.stress,
-        flows.flow,
-        flows.mesh,
-    ]
-    figures: list[Figure] = []
+    found: list[Figure] = []
     faults: list[str] = []
     with style.settings():
-        for draw in drawing:
+        for kind in figures.kinds(packages):
             try:
-                for figure in draw(results):
-                    figure = _numbered(figure, numbers)
-                    is_folded = bool(figure.fold and figure.drawing)
-                    if every or not is_folded:
+                for figure in kind.draw(results):
+                    if is_paper and figure.follows:
+                        figure = replace(figure, place="")
+                    if every or figure.place != "folded":
                         figure = style.saved(figure, folder)
-                    figures.append(figure)
+                    found.append(figure)
             except Exception as error:
-                name = f"{draw.__module__}.{draw.__name__}"
-                fault = f"{name}: {type(error).__name__}: {error}"
+                fault = f"{kind.draws.__module__}: {type(error).__name__}: {error}"
                 faults.append(fault)
                 print(f"a figure could not be drawn: {fault}", file=sys.stderr)
             terminal.check()
-    figures.sort(key=lambda figure: not figure.leads)
-    return figures, faults
+    return found, faults
 
 
-def _numbered(figure: "Figure", numbers: Mapping[str, str]) -> "Figure":
-    """A figure with the number that others gave it, which is drawn then."""
-    is_further = ", more panels" in figure.title
-    for name, number in numbers.items():
-        if figure.name.startswith(name) and not is_further:
-            return replace(figure, number=number, fold=False)
-    return figure
+def _listed(figures: "Sequence[Figure]") -> str:
+    """The figures as a table: names of their files, and where the page has them."""
+    import pandas as pd
+
+    rows = [(figure.name, figure.title, figure.place) for figure in figures]
+    return pd.DataFrame(rows, columns=["name", "title", "place"]).to_csv(index=False)
 
 
-def drawn_from(results: "Results") -> "list[Case]":
+def drawn_from(results: "Results", packages: Sequence[str] = ()) -> "list[Case]":
     """Find the cases whose bulky files the page's pictures are drawn from.
 
     Parameters
     ----------
     results
         The study with its tables.
+    packages
+        As of `write`.
 
     Returns
     -------
     list of Case
         The cases.
     """
-    from orchestrator.report import bed, flows
+    from orchestrator.report import figures
 
-    if "pile_threshold" not in results.tables:
-        return []
-    shown = [run for _, pile in bed.chosen(results) for run in pile.runs]
-    return [*shown, *(pile.flow for pile in flows.drawn(results))]
+    return figures.files(results, packages)
 
 
 def said(results: "Results", guests: Sequence["Guest"] = ()) -> str:

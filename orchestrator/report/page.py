@@ -1,15 +1,15 @@
-"""Pages: templates, captions, values in HTML, and the page of an experiment."""
+"""Pages: a list of sections, templates, captions, and values in HTML."""
 
 import base64
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from hashlib import sha256
 from importlib import metadata
 from pathlib import Path
 from platform import python_version
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Union
 from urllib.parse import quote
 
 import pandas as pd
@@ -17,16 +17,20 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from orchestrator import __version__
+from orchestrator.report.card import Card, lines
 from orchestrator.runs.files import Folder
 
 if TYPE_CHECKING:
-    from orchestrator.report.card import Card
     from orchestrator.report.sheets import Sheet
     from orchestrator.report.style import Figure
 
 HERE = Path(__file__).parent
 IN_ADDRESS = " <>/=:;,.'()!*?[]{}|~+-"
 """Letters that stand for themselves in the address of a picture."""
+MOST_ROWS = 60
+"""Rows of a table that a page of an experiment shows; more are folded away."""
+IN_SENTENCES = "The answer in sentences"
+"""The line that opens the text below the figure of a card."""
 PACKAGES = (
     "gmsh",
     "matplotlib",
@@ -88,6 +92,44 @@ def caption(name: str, /, **values: Any) -> str:
     return " ".join(str(macro(**values)).split())
 
 
+def written(text: str, /, **values: Any) -> str:
+    """Fill the text of a caption.
+
+    Parameters
+    ----------
+    text
+        A template, which may take macros from ``captions.j2``.
+    values
+        Values by the names that it has for them.
+
+    Returns
+    -------
+    str
+        Plain text on one line.
+    """
+    template = _templates(HERE, autoescape=False).from_string(text)
+    return " ".join(template.render(**values).split())
+
+
+def said(name: str, /, **values: Any) -> Markup:
+    """Write what the page of a study says somewhere.
+
+    Parameters
+    ----------
+    name
+        Name of its macro in ``texts.html.j2``.
+    values
+        Arguments of the macro.
+
+    Returns
+    -------
+    Markup
+        The HTML; empty where there is nothing to say.
+    """
+    template = _templates(HERE).get_template("texts.html.j2")
+    return Markup(str(getattr(template.module, name)(**values)).strip())
+
+
 @cache
 def _templates(folder: Path, autoescape: bool = True) -> Environment:
     """The templates of a directory, with the filters of all pages."""
@@ -103,6 +145,7 @@ def _templates(folder: Path, autoescape: bool = True) -> Environment:
         "address": address,
         "inline": _inline,
         "cell": _cell,
+        "kind": _kind,
     }
     environment.policies["json.dumps_kwargs"] = {
         "separators": (",", ":"),
@@ -195,6 +238,11 @@ def _with_titles(svg: str, group: str, points: Sequence[Sequence[str]]) -> str:
     return before + re.sub(r"<use ([^>]*)/>", titled, after, count=len(points))
 
 
+def _kind(element: object) -> str:
+    """The name of the class of an element of a page, by which it is shown."""
+    return type(element).__name__
+
+
 def _cell(value: Any) -> str:
     """A value of a table: a number to four digits, a dash for a missing value."""
     if pd.isna(value):
@@ -205,58 +253,164 @@ def _cell(value: Any) -> str:
 
 
 @dataclass(frozen=True)
-class Guest:
-    """What another package adds to a page.
+class Paragraphs:
+    """A text of a page, which a terminal can have too.
 
     Attributes
     ----------
+    text
+        Plain text; an empty line parts two paragraphs.
+    look
+        The class of its paragraphs in the style of the page, such as ``lead``.
+    fold
+        Of a text that is folded away the line that opens it.
+    """
+
+    text: str
+    look: str = ""
+    fold: str = ""
+
+
+@dataclass(frozen=True)
+class Text:
+    """A text of a page that is HTML already.
+
+    Attributes
+    ----------
+    html
+        The text.
+    fold
+        Of a text that is folded away the line that opens it.
+    """
+
+    html: Markup
+    fold: str = ""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a reader should not conclude.
+
+    Attributes
+    ----------
+    said
+        A remark each.
+    """
+
+    said: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of a page.
+
+    Attributes
+    ----------
+    frame
+        Its values by the heads of their columns.
+    file
+        The file that has its columns; a narrow page leaves some away then.
+    kept
+        How many columns a narrow page keeps.
+    fold
+        Of a table that is folded away the line that opens it.
+    """
+
+    frame: pd.DataFrame
+    file: str = ""
+    kept: int = 4
+    fold: str = ""
+
+    @classmethod
+    def of(cls, frame: pd.DataFrame) -> "Table":
+        """Make a table that is folded away if it is long.
+
+        Parameters
+        ----------
+        frame
+            Its values.
+
+        Returns
+        -------
+        Table
+            The table.
+        """
+        is_long = len(frame) > MOST_ROWS
+        return cls(frame, fold=f"All {len(frame)} rows" if is_long else "")
+
+
+Element = Union[Card, "Figure", "Sheet", Table, Paragraphs, Text, Limits]
+"""What a section holds."""
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a page.
+
+    Attributes
+    ----------
+    title
+        Its title; the first part has none.
+    content
+        What it holds, in its order.
     name
-        The anchor of its section.
-    section
-        Makes the section from the names of the page's figures in their order.
+        Its anchor.
+    label
+        What the links at the head of the page call it; empty without a link.
+    in_grid
+        Whether its figures stand side by side.
+    """
+
+    title: str
+    content: Sequence[Element]
+    name: str = ""
+    label: str = ""
+    in_grid: bool = False
+
+    @property
+    def figures(self) -> "list[Figure]":
+        """Its figures."""
+        from orchestrator.report.style import Figure  # it imports matplotlib
+
+        return [each for each in self.content if isinstance(each, Figure)]
+
+    @property
+    def told(self) -> str:
+        """What a terminal says of it: its card, and its text if it has no title."""
+        told: list[str] = []
+        for each in self.content:
+            if isinstance(each, Card):
+                told += [*lines(each), ""]
+            elif isinstance(each, Paragraphs) and not self.title:
+                told.append(each.text.replace("\n\n", "\n"))
+        return "\n".join(told)
+
+
+@dataclass(frozen=True)
+class Guest:
+    """What another package adds to the page of a study.
+
+    Attributes
+    ----------
+    sections
+        Makes its sections, which take the place of the leading figure, from the names
+        of the page's figures in their order.
     files
         Texts of files beside the page, by name.
     card
         The answer card, in place of the study's own.
     sheet
         The table below it.
-    numbers
-        Numbers that others gave to figures, by the beginning of their names; such
-        figures are drawn even where the page of another study folds them away.
+    is_paper
+        Whether figures that follow one of the paper have its number; such figures are
+        drawn even where the page of another study folds them away.
     """
 
-    name: str
-    section: Callable[[Sequence[str]], Markup]
+    sections: Callable[[Sequence[str]], Sequence[Section]]
     files: Mapping[str, str]
-    card: "Card | None" = None
+    card: Card | None = None
     sheet: "Sheet | None" = None
-    numbers: Mapping[str, str] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Section:
-    """A part of the page of an experiment.
-
-    Attributes
-    ----------
-    title
-        Its title; the answer of the experiment has none.
-    text
-        What stands before its figures.
-    figures, tables
-        What it shows.
-    limits
-        What a reader should not conclude.
-    card
-        The answer card of the page.
-    """
-
-    title: str
-    text: str = ""
-    figures: Sequence["Figure"] = ()
-    tables: Sequence[pd.DataFrame] = ()
-    limits: Sequence[str] = ()
-    card: "Card | None" = None
+    is_paper: bool = False
 
 
 def versions(solvers: Mapping[str, str]) -> pd.DataFrame:
@@ -282,6 +436,46 @@ def versions(solvers: Mapping[str, str]) -> pd.DataFrame:
 
 
 def write(
+    folder: Folder,
+    name: str,
+    title: str,
+    sections: Sequence[Section],
+    *,
+    above: str = "",
+    links: Mapping[str, str] | None = None,
+    is_paper: bool = False,
+) -> None:
+    """Write a page.
+
+    Parameters
+    ----------
+    folder
+        The directory of its results.
+    name
+        File name of the page.
+    title
+        Its title.
+    sections
+        Its parts, the answer first; their figures have images.
+    above
+        What stands above the first part, by default the title.
+    links
+        Addresses of cases by their names.
+    is_paper
+        Whether figures that follow one of the paper have its number.
+    """
+    text = fill(
+        "page.html.j2",
+        title=title,
+        above=above or title,
+        sections=sections,
+        links=links or {},
+        is_paper=is_paper,
+    )
+    folder.put(name, text)
+
+
+def write_experiment(
     title: str,
     sections: Sequence[Section],
     folder: Folder,
@@ -305,16 +499,15 @@ def write(
     """
     from orchestrator.report import style  # it imports matplotlib
 
-    drawn = []
+    listed = []
     for section in sections:
-        figures = [style.saved(figure, folder, png=True) for figure in section.figures]
-        drawn.append(replace(section, figures=figures))
-    text = fill(
-        "document.html.j2",
-        title=title,
-        card=next((part.card for part in sections if part.card), None),
-        sections=drawn,
-        programs=versions(solvers),
-        links={},
-    )
-    folder.put(name, text)
+        content: list[Element] = []
+        for each in section.content:
+            if isinstance(each, style.Figure):
+                each = style.saved(each, folder, png=True)
+            content.append(each)
+        listed.append(replace(section, content=content))
+    files: list[Element] = [Table(versions(solvers))]
+    if any(section.figures for section in sections):
+        files.insert(0, Text(said("files_of_figures")))
+    write(folder, name, title, [*listed, Section("Files", files)])

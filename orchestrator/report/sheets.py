@@ -18,12 +18,6 @@ from orchestrator.report.subjects import MEAN, STRESS, TERMS, WIND, Quantity, is
 from orchestrator.study import fields
 from orchestrator.tables.facts import needs_run
 
-SPEEDS = {
-    "wind_1m_m_s": "wind at 1 m",
-    "wind_10m_m_s": "wind at 10 m",
-    "mean_velocity_m_s": "mean velocity",
-}
-"""Speeds of a flow that are measured in the field, by their columns."""
 HEADS = {WIND: "wind at 10 m", MEAN: "mean velocity", STRESS: "stress on the bed"}
 """Quantities of flows in the heads of columns."""
 TITLES = {

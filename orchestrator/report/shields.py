@@ -1,7 +1,6 @@
-"""Shields diagrams of a study, of single grains and of piles; DEM over closed form."""
+"""Shields diagrams on axes: published curves, closed forms, points."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache, partial
 from typing import Any, NamedTuple
 
@@ -11,23 +10,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 
-from orchestrator.physics import curves
+from orchestrator.physics import curves as published
 from orchestrator.physics.beside import FIELD
 from orchestrator.physics.fluids import ALIKE, NUMBERS_OF_PAPER
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import MEASURED_SOURCE
 from orchestrator.report import labels, style, theory
-from orchestrator.report.page import caption
-from orchestrator.report.results import (
-    Results,
-    case_names,
-    drawable,
-    held,
-    split,
-    valid,
-)
-from orchestrator.report.style import Figure, Look
-from orchestrator.report.theory import BINS, Line
+from orchestrator.report.results import Results, held, split, valid
+from orchestrator.report.style import Look
+from orchestrator.report.theory import BINS, Going, Line
 from orchestrator.study import fields
 from orchestrator.study.criterion import GOES_ON
 from orchestrator.tables.facts import needs_run
@@ -44,18 +35,11 @@ LABEL = "label"
 REYNOLDS = np.geomspace(1e-4, 1e6, 601)
 """Re* at which lines are drawn; the axes cut them."""
 AIR_DASHES = ("-.", "--", (0, (1, 1)))
-AIR_STYLES = dict(zip(curves.AIR, AIR_DASHES, strict=True))
+AIR_STYLES = dict(zip(published.AIR, AIR_DASHES, strict=True))
 SLOPED = "Shao & Lu 2000"
 """The curve for air of sloping beds: three for each slope would hide the rest."""
 RESULT = ("closed form", "points", "points, not usable")
 """Names of artists: lines of the closed form, usable points, others."""
-NAME = "shields"
-TOLD = ("alpha_deg", "d_m", "z0_over_d", "force_law")
-"""Columns that the text of a point always tells of its scene."""
-FEW = 8
-"""Number of piles up to which every fraction is drawn in the one diagram."""
-LINES = 3
-"""Number of laws beyond which only those near the measurements are drawn."""
 SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "force_law")
 """Columns that figures, panels, axes, colours and markers tell apart."""
 SERIES = ("nu_m2_s", "force_law", "regime", SHAPE)
@@ -70,6 +54,13 @@ GAP = np.full((1, 2), np.nan)
 """A point that interrupts a line."""
 BEYOND = 1e6
 """A place above every frame, over the lower end of a bar."""
+PANELS_BY = {
+    "fraction": "alpha_deg",
+    "force_law": "beta_deg",
+    "beta_deg": "z0_over_d",
+    "alpha_deg": "z0_over_d",
+}
+"""The column that parts panels, by the column that colours tell apart."""
 AXES = labels.RE_AXIS, labels.TAU_AXIS
 DEM = ("reynolds", "shields_dem", "shields_low", "shields_high")
 """Columns of a single grain: x, y and the ends of its interval."""
@@ -235,7 +226,7 @@ def about(rows: pd.DataFrame) -> dict[str, Any]:
         "air": ", ".join(theory.air_lines(rows)),
         "wet": not theory.in_gas(rows).all(),
         "sloped": SLOPED if is_sloped else "",
-        "curves": "; ".join(curve.name for curve in curves.WATER),
+        "curves": "; ".join(curve.name for curve in published.WATER),
         "measured": MEASURED_SOURCE,
         "bagnold_from": f"{theory.BAGNOLD_FROM:g}",
     }
@@ -318,76 +309,174 @@ def shade_transition(ax: Axes, rows: pd.DataFrame) -> None:
     ax.set_xlim(low, high)
 
 
-def draw_line(
+class Curve(NamedTuple):
+    """A closed form as it is drawn.
+
+    Attributes
+    ----------
+    label, colour, dash, width
+        Its entry in the legend and its look where its law holds.
+    points
+        Re* and tau, shape (2, n).
+    holds, dotted
+        Where it is drawn, and where it is dotted since its law does not hold there.
+    """
+
+    label: str
+    colour: str
+    dash: theory.Dash
+    width: float
+    points: FloatArray
+    holds: BoolArray
+    dotted: BoolArray
+
+    def draw(self, ax: Axes) -> None:
+        """Draw it.
+
+        Parameters
+        ----------
+        ax
+            The panel.
+        """
+        parts = [(self.label, self.holds, self.dash), (DOTTED, self.dotted, ":")]
+        look: Look = {"color": self.colour, "lw": self.width, "gid": RESULT[0]}
+        for label, chosen, dash in parts:
+            if chosen.any():
+                shown = np.where(chosen, self.points, np.nan)
+                ax.plot(*shown, ls=dash, label=label, **look)
+
+
+class Points(NamedTuple):
+    """Thresholds as they are drawn.
+
+    Attributes
+    ----------
+    rows
+        Rows with the columns `SHAPE` and `LABEL`.
+    colour, size
+        Colour of all markers, and their size, points.
+    columns
+        Columns of x, of y and of both ends of its interval.
+    are_joined
+        Whether lines join beds that differ in the diameter alone.
+    """
+
+    rows: pd.DataFrame
+    colour: str
+    columns: Sequence[str]
+    size: float = 4.2
+    are_joined: bool = False
+
+    def draw(self, ax: Axes) -> list[tuple[Line2D, BoolArray]]:
+        """Draw them, hollow where a threshold is not usable, with their intervals.
+
+        Parameters
+        ----------
+        ax
+            The panel.
+
+        Returns
+        -------
+        list of (line, mask)
+            Each group of markers, and which rows it shows.
+        """
+        if self.are_joined:
+            _join_piles(ax, self.rows, self.colour)
+        return _draw_points(ax, self.rows, self.colour, self.columns, self.size)
+
+
+def diagram(
     ax: Axes,
-    line: Line,
-    label: str,
-    colour: str,
-    dash: theory.Dash,
-    width: float = 1.1,
-) -> None:
-    """Draw a closed-form line, dotted where the study has grains beyond its law.
+    scenes: pd.DataFrame,
+    xlim: tuple[float, float],
+    curves: Iterable[Curve],
+    points: Iterable[Points],
+    slopes: Mapping[Any, str] | None = None,
+) -> list[tuple[Line2D, pd.DataFrame]]:
+    """Draw a Shields diagram.
 
     Parameters
     ----------
     ax
         The panel.
-    line
-        The line.
-    label
-        Its entry in the legend.
-    colour, dash
-        Its look where the law holds.
-    width
-        Its width, points.
+    scenes
+        The scenes that it shows, for whose fluids published curves are drawn.
+    xlim
+        The range of Re*.
+    curves, points
+        What is drawn over these.
+    slopes
+        Colours by slope, where these tell the curves for air apart.
+
+    Returns
+    -------
+    list of (line, rows)
+        Each group of markers, and the rows that it shows.
     """
-    holds = line.holds(REYNOLDS)
-    is_dotted = line.near(REYNOLDS) & ~holds
-    points = np.array([REYNOLDS, line.tau(REYNOLDS)])
-    look: Look = {"color": colour, "lw": width}
-    _draw_curve(ax, points, {label: (holds, dash), DOTTED: (is_dotted, ":")}, look)
+    _draw_published(ax, scenes, xlim, slopes)
+    for curve in curves:
+        curve.draw(ax)
+    drawn = []
+    for each in points:
+        drawn += [(line, each.rows[mask]) for line, mask in each.draw(ax)]
+    return drawn
 
 
-def _draw_curve(
-    ax: Axes,
-    points: FloatArray,
-    parts: Mapping[str, tuple[BoolArray, theory.Dash]],
-    look: Look,
-) -> None:
-    """The parts of a curve, each where it is chosen and with its dash, by its label."""
-    for label, (chosen, dash) in parts.items():
-        if chosen.any():
-            shown = np.where(chosen, points, np.nan)
-            ax.plot(*shown, gid=RESULT[0], ls=dash, label=label, **look)
+def curves_of(
+    lines: Iterable[Line],
+    going: Sequence[Going],
+    criteria: Iterable[str],
+    name: Callable[[Line | Going], str],
+    look: Callable[[Line | Going], tuple[str, theory.Dash, float]],
+) -> Iterator[Curve]:
+    """Make the curves of what is answered, by its criteria.
+
+    Where no curve of grains that go on is known, that of their pockets stands there.
+
+    Parameters
+    ----------
+    lines
+        The closed forms of grains that leave their pockets.
+    going
+        Those of grains that go on.
+    criteria
+        The criteria of the answers.
+    name
+        Names a curve without its criterion.
+    look
+        Gives its colour, dash and width.
+
+    Yields
+    ------
+    Curve
+        The curves.
+    """
+    asked = set(criteria)
+    for curve in going:
+        colour, _, width = look(curve)
+        points = np.array([curve.reynolds, curve.tau])
+        label = f"{name(curve)}, {theory.GOING}"
+        yield Curve(label, colour, GOING_DASH, width, points, curve.holds, ~curve.holds)
+    if going and asked == {GOES_ON}:
+        return
+    for line in lines:
+        label = name(line)
+        if GOES_ON in asked:
+            label = f"{label}, {theory.LEAVING}"
+        holds = line.holds(REYNOLDS)
+        dotted = line.near(REYNOLDS) & ~holds
+        points = np.array([REYNOLDS, line.tau(REYNOLDS)])
+        yield Curve(label, *look(line), points, holds, dotted)
 
 
-def draw_points(
+def _draw_points(
     ax: Axes,
     rows: pd.DataFrame,
     colour: str,
     columns: Sequence[str],
-    size: float = 4.2,
+    size: float,
 ) -> list[tuple[Line2D, BoolArray]]:
-    """Intervals and the rows' own markers, hollow where a threshold is not usable.
-
-    Parameters
-    ----------
-    ax
-        The panel.
-    rows
-        Rows with the columns `SHAPE` and `LABEL`.
-    colour
-        Colour of all markers.
-    columns
-        Columns of x, of y and of both ends of its interval.
-    size
-        Size of a marker, points.
-
-    Returns
-    -------
-    list of (line, mask)
-        Each group of markers, and which rows it shows.
-    """
+    """Intervals and the rows' own markers; groups of markers with what they show."""
     x, y, low, high = (rows[column].to_numpy(float) for column in columns)
     _draw_intervals(ax, x, low, high, colour, size)
     usable = valid(rows).to_numpy()
@@ -429,24 +518,16 @@ def _draw_intervals(
     ax.plot(np.repeat(x, 3), ends, zorder=2.5, gid="intervals", **bar, **caps)
 
 
-def draw_published(
-    ax: Axes, scenes: pd.DataFrame, xlim: tuple[float, float], colours: Any = None
+def _draw_published(
+    ax: Axes,
+    scenes: pd.DataFrame,
+    xlim: tuple[float, float],
+    colours: Mapping[Any, str] | None,
 ) -> None:
     """Draw published curves: for air, and those and measurements for water.
 
     On slopes one curve for air is drawn, times the slope factor, in the colours of the
     slopes; of beds that slope in a gas nothing for water is.
-
-    Parameters
-    ----------
-    ax
-        The panel.
-    scenes
-        The scenes that it shows.
-    xlim
-        The range of Re*.
-    colours
-        Colours by slope.
     """
     is_sloped = bool((scenes["alpha_deg"] > 0).any())
     for alpha in sorted(set(scenes["alpha_deg"])):
@@ -485,7 +566,7 @@ def _draw_field(ax: Axes, xlim: tuple[float, float]) -> None:
 def _draw_water(ax: Axes, xlim: tuple[float, float]) -> None:
     """Published curves for water, and the measurements with medians within two ends."""
     lines = []
-    for curve in curves.WATER:
+    for curve in published.WATER:
         lines += [np.column_stack(curve.points()), GAP]
     thin: Look = {"color": style.WATER, "lw": 0.7, "zorder": 1}
     ax.plot(*np.concatenate(lines).T, label="water: published curves", **thin)
@@ -498,6 +579,101 @@ def _draw_water(ax: Axes, xlim: tuple[float, float]) -> None:
     ax.vlines(x, tenths, ninetieths, **dark)
     ax.hlines(y, [item.low for item in bins], [item.high for item in bins], **dark)
     ax.plot(x, y, "s", ms=3.5, label="measured in water: median, 10 to 90 %", **dark)
+
+
+def panels(
+    rows: pd.DataFrame, by: str, colours: Mapping[Any, str], height: float = 2.5
+) -> Iterator[tuple[Sheet, pd.DataFrame, Callable[[], Canvas]]]:
+    """Shields diagrams of single grains or of piles, with closed forms, in panels.
+
+    Parameters
+    ----------
+    rows
+        Single grains with or without thresholds by DEM, or piles.
+    by
+        The column that colours tell apart, of `PANELS_BY`.
+    colours
+        Colours by its values.
+    height
+        Height of a panel, inches.
+
+    Yields
+    ------
+    sheet : Sheet
+        The panels of a figure.
+    shown : DataFrame
+        The rows that are points in them.
+    draw : callable
+        Draws it.
+    """
+    columns = PILE if by == "fraction" else DEM
+    every = rows[rows[columns[1]].notna()]
+    # the closed form depends on nothing else that a panel does not show
+    known = "fraction" if by == "fraction" else "beta_deg"
+    choices, every = parted(every, *SHOWN, known)
+    # to part a hundred columns takes long
+    narrow = ["scene_id", *SHOWN, *columns, by, "regime", "usable", SHAPE, LABEL]
+    narrow = list(dict.fromkeys(narrow))
+    for sheet in sheets(rows, [PANELS_BY[by], *choices], height, *AXES):
+        shown = every[every["scene_id"].isin(sheet.rows["scene_id"])]
+        yield sheet, shown, partial(_draw_panels, sheet, shown[narrow], by, colours)
+
+
+def _draw_panels(
+    sheet: Sheet, shown: pd.DataFrame, by: str, colours: Mapping[Any, str]
+) -> Canvas:
+    """The panels of a figure."""
+    xlim = ends(sheet.rows, shown)
+    dashes = theory.dashes(sheet.rows["force_law"])
+    slopes = colours if by == "alpha_deg" else None
+    for ax, part in zip(sheet.panels()[1], sheet.parts, strict=True):
+        here = shown[shown["scene_id"].isin(part["scene_id"])]
+        points = []
+        for (value,), group in split(here, by):
+            columns = PILE if by == "fraction" else DEM
+            is_joined = by == "fraction"
+            points.append(Points(group, colours[value], columns, are_joined=is_joined))
+        curves = _curves_of_part(part, by, colours, dashes)
+        diagram(ax, part, xlim, curves, points, slopes)
+    prepare(sheet, xlim)
+    return legends(sheet, by, {} if by == "force_law" else colours)
+
+
+def _curves_of_part(
+    part: pd.DataFrame,
+    by: str,
+    colours: Mapping[Any, str],
+    dashes: Mapping[str, theory.Dash],
+) -> Iterator[Curve]:
+    """The closed forms of a panel, in the colours of the laws or of the column `by`."""
+    criteria = set(part["criterion"].dropna())
+    going = theory.going_on(part) if GOES_ON in criteria else []
+
+    def name(each: Line | Going) -> str:
+        is_told = by == "force_law" or each.law not in theory.PAIR
+        law = labels.value("force_law", each.law) if is_told else "Eqs. 3, 5"
+        return f"closed form: {law}"
+
+    def look(each: Line | Going) -> tuple[str, theory.Dash, float]:
+        width = 1.6 if isinstance(each, Going) else 1.1
+        colour, dash = theory.look(each.law)
+        if by == "force_law":
+            return colour, dash, width
+        bed = dict(zip(theory.BED, each.bed, strict=True))
+        return colours.get(bed.get(by), "0.2"), dashes.get(each.law), width
+
+    return curves_of(theory.lines(part), going, criteria, name, look)
+
+
+def _join_piles(ax: Axes, group: pd.DataFrame, colour: str) -> None:
+    """Lines through piles that differ in the diameter alone; others are a scatter."""
+    joined = []
+    for _, series in split(group, *SERIES):
+        if series["d_m"].is_unique:
+            points = series.sort_values("reynolds")[["reynolds", "shields"]]
+            joined.append(np.vstack([points, GAP]))
+    if joined:
+        ax.plot(*np.concatenate(joined).T, color=colour, lw=0.6, zorder=2)
 
 
 def legends(sheet: Sheet, column: str, colours: Mapping[Any, str]) -> Canvas:
@@ -550,485 +726,3 @@ def single_grains(results: Results) -> pd.DataFrame:
     extra = [name for name in answers if name not in scenes or name in own]
     scenes = scenes[held(scenes)].drop(columns="criterion", errors="ignore")
     return scenes.merge(answers[extra], how="left", on="scene_id")
-
-
-def draw(results: Results) -> Iterator[Figure]:
-    """Draw the one diagram of a study: piles, single grains, laws and measurements.
-
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
-    Yields
-    ------
-    Figure
-        One figure, or none.
-    """
-    piles = shown_piles(results)
-    grains = _grains_on_the_least_slope(results)
-    lines = _lines(results)
-    if not lines and piles.empty and grains.empty:
-        return
-    scenes = results.scenes
-    panels = cache(partial(style.grid, [""], 3.5, *AXES))
-    sheet = Sheet("", "", [scenes], scenes, panels)
-    canvas, (ax,) = panels()
-    xlim = ends(scenes, piles, grains)
-    draw_published(ax, scenes.assign(alpha_deg=0.0), xlim)
-    points = _draw_answers(ax, grains, piles, results)
-    names = _draw_lines(ax, lines, pd.concat([grains, piles]))
-    prepare(sheet, xlim)
-    _overview_legends(canvas, ax)
-    text = caption(
-        "overview",
-        piles=about(piles),
-        grains=about(grains),
-        fractions=", ".join(f"{fraction:.0%}" for fraction in _fractions(piles)),
-        names="; ".join(names),
-        about={**about(scenes), "sloped": ""},
-    )
-    title = "Extended Shields diagram"
-    yield Figure(
-        NAME,
-        title,
-        text,
-        case_names(piles, grains),
-        canvas,
-        data=points,
-        leads=True,
-        tables=_tables(piles, grains),
-    )
-
-
-def _tables(piles: pd.DataFrame, grains: pd.DataFrame) -> tuple[str, ...]:
-    """The tables of the rows that are drawn."""
-    rows = {"pile_threshold": piles, "single_grain": grains}
-    return tuple(name for name, drawn in rows.items() if len(drawn))
-
-
-def _fractions(piles: pd.DataFrame) -> list[float]:
-    """The fractions of piles, rising."""
-    return sorted(set(piles.get("fraction", [])))
-
-
-def _draw_answers(
-    ax: Axes, grains: pd.DataFrame, piles: pd.DataFrame, results: Results
-) -> dict[str, list[list[str]]]:
-    """The points of single grains and of piles, and what the page says of each."""
-    shades = style.palette("alpha_deg", results.values("alpha_deg"))
-    points = _draw_kind(ax, grains, "single grain", DEM, "o", 2.4, shades, 0)
-    percents = ", ".join(f"{100 * fraction:g}" for fraction in _fractions(piles))
-    name = f"bed at n/N = {percents} %"
-    return points | _draw_kind(ax, piles, name, PILE, "s", 3.6, shades, len(points))
-
-
-def _overview_legends(canvas: Canvas, ax: Axes) -> None:
-    """Legends of the laws above the one diagram, of all else below it."""
-    samples = style.samples([ax])
-    of_laws = [one for one in samples if one.get_gid() == RESULT[0]]
-    others = [one for one in samples if one.get_gid() != RESULT[0]]
-    style.legends(canvas, of_laws, others)
-
-
-def _draw_lines(ax: Axes, lines: Sequence[Line], answers: pd.DataFrame) -> list[str]:
-    """The curves of what is answered, by its criteria; their names.
-
-    Where no curve of grains that go on is known, that of their pockets stands there.
-    """
-    names = []
-    going: list[theory.Going] = []
-    criteria = set(answers.get("criterion", []))
-    if GOES_ON in criteria:
-        going = theory.going_on(answers.assign(alpha_deg=0.0))
-    for curve in going:
-        _draw_going(ax, curve, curve.name, theory.look(curve.law)[0])
-        names.append(curve.name)
-    if going and criteria == {GOES_ON}:
-        return names
-    laws_so_far: list[str] = []
-    for line in lines:
-        # a law on another bed has a thinner line
-        width = 1.4 / (1 + laws_so_far.count(line.law))
-        name = line.name
-        if GOES_ON in criteria:
-            name = f"{name}: {theory.LEAVING}"
-        draw_line(ax, line, name, *theory.look(line.law), width)
-        laws_so_far.append(line.law)
-        names.append(name)
-    return names
-
-
-def _draw_going(ax: Axes, curve: theory.Going, label: str, colour: str) -> None:
-    """A curve of grains that go on, dotted where its law does not hold."""
-    points = np.array([curve.reynolds, curve.tau])
-    parts = {label: (curve.holds, GOING_DASH), DOTTED: (~curve.holds, ":")}
-    _draw_curve(ax, points, parts, {"color": colour, "lw": 1.6})
-
-
-def _grains_on_the_least_slope(results: Results) -> pd.DataFrame:
-    """The single grains of the one diagram."""
-    grains = _few_exact(single_grains(results))
-    grains = grains[drawable(grains, "reynolds", "shields_dem")]
-    is_least: pd.Series[bool] = grains["alpha_deg"] == grains["alpha_deg"].min()
-    return grains[is_least]
-
-
-def _few_exact(grains: pd.DataFrame) -> pd.DataFrame:
-    """Single grains, of which few that the closed form answered are points as well."""
-    if grains.empty or len(grains) > FEW:
-        return grains
-    is_exact = ~needs_run(grains)
-    exact = {
-        "shields_dem": "shields_closed_form",
-        "reynolds": "reynolds_closed_form",
-        "ustar_m_s": "ustar_closed_form_m_s",
-    }
-    filled = {
-        column: grains[column].where(~is_exact, grains[by])
-        for column, by in exact.items()
-    }
-    return grains.assign(**filled)
-
-
-def _draw_kind(
-    ax: Axes,
-    rows: pd.DataFrame,
-    name: str,
-    columns: Sequence[str],
-    shape: str,
-    size: float,
-    shades: Mapping[Any, str],
-    number: int,
-) -> dict[str, list[list[str]]]:
-    """Points of one kind, by slope; what the page says of each, by its group.
-
-    `number` is that of the first group: the page's script finds points by these names.
-    """
-    texts: dict[str, list[list[str]]] = {}
-    if rows.empty:
-        return texts
-    known = [*TOLD, "fraction"] if "fraction" in rows else [*TOLD]
-    telling = [*TOLD, *labels.varying(rows, *known)]
-    for (alpha,), part in split(rows, "alpha_deg"):
-        label = f"{name}, {labels.plain('alpha_deg', alpha)}"
-        marked = part.assign(**{SHAPE: shape, LABEL: label})
-        for line, drawn in draw_points(ax, marked, shades[alpha], columns, size):
-            group = f"{NAME}-{number + len(texts)}"
-            line.set_gid(group)
-            texts[group] = [
-                _texts(row, columns, telling) for _, row in marked[drawn].iterrows()
-            ]
-    return texts
-
-
-def shown_piles(results: Results) -> pd.DataFrame:
-    """List the thresholds of piles that the one diagram shows.
-
-    Parameters
-    ----------
-    results
-        The study.
-
-    Returns
-    -------
-    DataFrame
-        The thresholds at all fractions of few piles, and at one fraction of many.
-    """
-    rows = results.joined("pile_threshold")
-    if rows.empty:
-        return rows
-    if rows["scene_id"].nunique() > FEW:
-        rows = results.at_fraction
-    return rows[drawable(rows, "reynolds", "shields")]
-
-
-def _lines(results: Results) -> list[Line]:
-    """The closed form on a flat bed: the laws of piles on their least and largest z0/d.
-
-    Other laws have one line, on the bed that fits the measurements best; the two laws
-    of the paper are one model, on one bed.
-    """
-    flat = theory.lines(results.beds("pile").assign(alpha_deg=0.0))
-    beds = [line.bed for line in flat]
-    lines = [line for line in flat if line.bed in (beds[0], beds[-1])]
-    drawn = {line.law for line in lines}
-    others = [
-        line for line in theory.best(theory.ranked(results)) if line.law not in drawn
-    ]
-    bed_of_pair = next((line.bed for line in others if line.law in theory.PAIR), None)
-    near = [line for line in others if line.decades > 0]
-    chosen = near if near and len(others) > LINES else others
-    for line in chosen:
-        if bed_of_pair and line.law in theory.PAIR:
-            line = replace(line, bed=bed_of_pair)
-        lines.append(line)
-    return lines
-
-
-def _texts(row: pd.Series, columns: Sequence[str], telling: Sequence[str]) -> list[str]:
-    """What the page says of a point: scene, threshold, why it is not usable, case."""
-    value, low, high = (row[name] for name in columns[1:])
-    threshold = f"τ_c = {value:.4g}"
-    if pd.notna(low) or pd.notna(high):
-        threshold += f" ({labels.interval(low, high, 4, 'g')})"
-    if "fraction" in row:
-        threshold += f" at n/N = {row['fraction']:.0%}"
-    ustar = row["ustar0_m_s"] if "ustar0_m_s" in row else row["ustar_m_s"]
-    threshold += f", u*₀ = {ustar:.3g} m/s"
-    case = row["case"] if isinstance(row["case"], str) else ""
-    scene = ", ".join(labels.told(row, telling))
-    return [scene, threshold, str(row["why_not"]), case]
-
-
-def singles(results: Results) -> Iterator[Figure]:
-    """Draw Figs. 5 to 8: on a flat bed by entrainment angle or law, and on slopes.
-
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
-    Yields
-    ------
-    Figure
-        A figure for each.
-    """
-    grains = single_grains(results)
-    flat = grains[grains["alpha_deg"] == 0]
-    has_dem = bool(grains["shields_dem"].notna().any())
-    kind = "dem" if has_dem else "closed-form"
-    ending = "closed form and DEM" if has_dem else "closed form"
-    colours: dict[Any, str]
-    has_many_laws = len(set(theory.dashes(flat["force_law"]).values())) > theory.MANY
-    if has_many_laws:
-        colours = {law: theory.look(law)[0] for law in theory.drawn(flat["force_law"])}
-        for (ratio,), group in split(flat, "z0_over_d"):
-            written = labels.ratio_of(float(str(ratio)), "d")
-            title = f"Force laws on a horizontal bed, z₀ = {written}"
-            yield from _diagrams(
-                group, "force_law", colours, f"shields-{written}", title
-            )
-    elif len(flat):
-        colours = style.palette("beta_deg", results.values("beta_deg"))
-        title = f"One grain on a horizontal bed: {ending}"
-        yield from _diagrams(flat, "beta_deg", colours, f"{kind}-horizontal", title)
-    colours = style.palette("alpha_deg", results.values("alpha_deg"))
-    for (beta,), group in split(grains, "beta_deg"):
-        if (group["alpha_deg"] > 0).any():
-            name = f"{kind}-slope-beta{beta:g}"
-            title = f"One grain on a slope, β = {beta:g}°: {ending}"
-            yield from _diagrams(group, "alpha_deg", colours, name, title)
-
-
-def piles(results: Results) -> Iterator[Figure]:
-    """Make the extended Shields diagrams by slope, as Figs. 15 and 16 of the paper.
-
-    Parameters
-    ----------
-    results
-        The study.
-
-    Yields
-    ------
-    Figure
-        The figures for each z0/d.
-    """
-    every = results.joined("pile_threshold")
-    if every.empty:
-        return
-    reached = every[drawable(every, "reynolds", "shields")]
-    if reached.empty:
-        return
-    colours = style.palette("fraction", sorted(set(reached["fraction"])))
-    has_one_slope = reached["alpha_deg"].nunique() == 1
-    # the one diagram shows all of few piles on one slope
-    is_shown = has_one_slope and every["scene_id"].nunique() <= FEW
-    smoothest = reached["z0_over_d"].min()
-    for (ratio,), rows in split(reached, "z0_over_d"):
-        written = labels.ratio_of(float(str(ratio)), "d")
-        name = f"extended-shields-{written}"
-        title = f"Thresholds of beds by slope, z₀ = {written}"
-        for figure in _diagrams(rows, "fraction", colours, name, title):
-            fold = figure.fold or is_shown or ratio != smoothest
-            yield replace(figure, fold=fold)
-
-
-PANELS_BY = {
-    "fraction": "alpha_deg",
-    "force_law": "beta_deg",
-    "beta_deg": "z0_over_d",
-    "alpha_deg": "z0_over_d",
-}
-"""The column that parts panels, by the column that colours tell apart."""
-
-
-def _diagrams(
-    rows: pd.DataFrame, by: str, colours: Mapping[Any, str], name: str, title: str
-) -> Iterator[Figure]:
-    """Single grains with or without thresholds by DEM, or piles, and closed forms."""
-    columns = PILE if by == "fraction" else DEM
-    every = rows[rows[columns[1]].notna()]
-    # the closed form depends on nothing else that a panel does not show
-    known = "fraction" if by == "fraction" else "beta_deg"
-    choices, every = parted(every, *SHOWN, known)
-    # to part a hundred columns takes long
-    narrow = [*SHOWN, *columns, by, "regime", "usable", SHAPE, LABEL]
-    narrow = list(dict.fromkeys(narrow))
-    stem = name.replace("/", "").replace(" ", "")
-    for sheet in sheets(rows, [PANELS_BY[by], *choices], 2.5, *AXES):
-        shown = every[every["scene_id"].isin(sheet.rows["scene_id"])]
-        text = caption("diagram", by=by, about=about(sheet.rows), answers=about(shown))
-        is_further = bool(sheet.name)
-        yield Figure(
-            stem + sheet.name,
-            title + sheet.title,
-            text,
-            case_names(shown),
-            partial(_draw_diagram, sheet, shown, narrow, by, colours),
-            fold=is_further or by == "alpha_deg",
-            tables=("pile_threshold" if by == "fraction" else "single_grain",),
-        )
-
-
-def _draw_diagram(
-    sheet: Sheet,
-    shown: pd.DataFrame,
-    narrow: list[str],
-    by: str,
-    colours: Mapping[Any, str],
-) -> Canvas:
-    """The panels of a diagram: published curves, the closed form, points."""
-    xlim = ends(sheet.rows, shown)
-    dashes = theory.dashes(sheet.rows["force_law"])
-    for ax, part in zip(sheet.panels()[1], sheet.parts, strict=True):
-        draw_published(ax, part, xlim, colours if by == "alpha_deg" else None)
-        _draw_laws(ax, part, by, colours, dashes)
-        here = shown.loc[shown["scene_id"].isin(part["scene_id"]), narrow]
-        for (value,), group in split(here, by):
-            if by == "fraction":
-                _join_piles(ax, group, colours[value])
-            draw_points(ax, group, colours[value], PILE if by == "fraction" else DEM)
-    prepare(sheet, xlim)
-    return legends(sheet, by, {} if by == "force_law" else colours)
-
-
-def _draw_laws(
-    ax: Axes,
-    part: pd.DataFrame,
-    by: str,
-    colours: Mapping[Any, str],
-    dashes: Mapping[str, theory.Dash],
-) -> None:
-    """The closed form of each law by the criteria of the answers.
-
-    They are in the colours of the laws or of the column `by`.
-    """
-    criteria = set(part["criterion"].dropna())
-    going = theory.going_on(part) if GOES_ON in criteria else []
-    for curve in going:
-        name = labels.value("force_law", curve.law)
-        colour = _colour_of(curve, by, colours)
-        _draw_going(ax, curve, f"closed form: {name}, {theory.GOING}", colour)
-    if going and criteria == {GOES_ON}:
-        return
-    for line in theory.lines(part):
-        name = labels.value("force_law", line.law)
-        dash = theory.look(line.law)[1]
-        if by != "force_law":
-            dash = dashes[line.law]
-            if line.law in theory.PAIR:
-                name = "Eqs. 3, 5"
-        if GOES_ON in criteria:
-            name = f"{name}, {theory.LEAVING}"
-        draw_line(ax, line, f"closed form: {name}", _colour_of(line, by, colours), dash)
-
-
-def _colour_of(line: Line | theory.Going, by: str, colours: Mapping[Any, str]) -> str:
-    """The colour of a law, or of the value of the column `by` that its bed has."""
-    if by == "force_law":
-        return theory.look(line.law)[0]
-    bed = dict(zip(theory.BED, line.bed, strict=True))
-    return colours.get(bed.get(by), "0.2")
-
-
-def _join_piles(ax: Axes, group: pd.DataFrame, colour: str) -> None:
-    """Lines through piles that differ in the diameter alone; others are a scatter."""
-    joined = []
-    for _, series in split(group, *SERIES):
-        if series["d_m"].is_unique:
-            points = series.sort_values("reynolds")[["reynolds", "shields"]]
-            joined.append(np.vstack([points, GAP]))
-    if joined:
-        ax.plot(*np.concatenate(joined).T, color=colour, lw=0.6, zorder=2)
-
-
-def accuracy(results: Results) -> Iterator[Figure]:
-    """Draw u* of DEM over that of the closed form, for each increment of load steps.
-
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
-    Yields
-    ------
-    Figure
-        A figure for each page of panels.
-    """
-    dem = single_grains(results)
-    dem = dem[dem["ustar_m_s"].notna()]
-    if dem.empty:
-        return
-    exact = dem["ustar_closed_form_m_s"]
-    over = {
-        "value": dem["ustar_m_s"] / exact,
-        "low": dem["ustar_low_m_s"] / exact,
-        "high": dem["ustar_high_m_s"] / exact,
-    }
-    choices, rows = parted(dem.assign(**over), *SHOWN, "beta_deg", "load_increment")
-    colours = style.palette("alpha_deg", results.values("alpha_deg"))
-    keys = ["load_increment", *choices]
-    axes = labels.RE_AXIS, "u* of DEM over closed form"
-    for sheet in sheets(rows, keys, 2.1, *axes, columns=1, sharey=False):
-        text = caption(
-            "accuracy", about=about(sheet.rows), deviations=_deviations(sheet.rows)
-        )
-        yield Figure(
-            f"accuracy{sheet.name}",
-            f"DEM over closed form{sheet.title}",
-            text,
-            case_names(sheet.rows),
-            partial(_draw_accuracy, sheet, rows, colours),
-            fold=True,
-            tables=("single_grain",),
-        )
-
-
-def _deviations(rows: pd.DataFrame) -> str:
-    """How far DEM is off at most, where the force law holds and where it does not."""
-    far = (rows["value"] - 1).abs()
-    holds = valid(rows)
-    found = []
-    if holds.any():
-        found.append(f"{far[holds].max():.2%} where its law holds")
-    if not holds.all():
-        found.append(f"{far[~holds].max():.2%} where it does not")
-    return ", ".join(found)
-
-
-def _draw_accuracy(
-    sheet: Sheet, rows: pd.DataFrame, colours: Mapping[Any, str]
-) -> Canvas:
-    """The panels of u* of DEM over that of the closed form."""
-    _, axes = sheet.panels()
-    for ax, part in zip(axes, sheet.parts, strict=True):
-        ax.axhline(1, color="0.3", lw=0.8, zorder=1)
-        for (alpha,), group in split(part, "alpha_deg"):
-            draw_points(ax, group, colours[alpha], ("reynolds", "value", "low", "high"))
-        farthest = float(np.nanmax(np.abs(part[["value", "low", "high"]] - 1)))
-        ax.set(xscale="log", ylim=(1 - 1.6 * farthest, 1 + 1.6 * farthest))
-    for ax in axes:
-        style.plain_ticks(ax.xaxis)
-        shade_transition(ax, rows)
-    return legends(sheet, "alpha_deg", colours)

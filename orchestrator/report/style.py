@@ -7,7 +7,7 @@ from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from io import BytesIO
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 import matplotlib
 import numpy as np
@@ -91,10 +91,30 @@ DIAMETERS = (
 WATER = "#74aed6"
 AIR = "#8c6d46"
 BED = "#d9c9a3"
+EDGE = "#8d7f5c"
+"""The line on a bed."""
+ANSWER = "#c24e00"
+"""What is computed."""
+PALE = "#f7ddc8"
+"""The interval of what is computed."""
+FLOW = "#0072b2"
+"""The flow, and other models."""
+INK = "#1d1d1b"
+"""What was measured, or is computed with what was measured."""
+MEASURED: Any = (0, (4, 2))
+"""Dash of such lines."""
+NONE = "#767676"
+"""What is out of range, or not usable."""
+RANGE = "#d8d3c7"
+"""A range of measurements, and flow that runs back."""
 Panel = TypeVar("Panel")
 Look = dict[str, Any]
 """Properties of an artist."""
 NOTE: Look = {"fontsize": 6.5, "color": "0.35", "gid": "note"}
+
+
+Place = Literal["lead", "under", "", "folded"]
+"""Where a page has a figure: below its card, below that, among all, or on demand."""
 
 
 @dataclass(frozen=True)
@@ -117,14 +137,10 @@ class Figure:
         What a page shows, SVG or PNG; empty until it is made.
     data
         Data for the page's script, a pointer or a slider; None if there are none.
-    fold
-        Whether it is drawn on demand alone.
-    leads
-        Whether it is at the page's head.
-    wide
-        Whether it has the whole width of the page.
-    number
-        A number that others gave it, such as that of the paper.
+    place
+        Where the page of a study has it; the first of several that lead does.
+    follows
+        The figure of the paper that it follows, such as ``Fig. 15``; mostly none.
     part
         Its width over that of the page.
     tables
@@ -138,10 +154,8 @@ class Figure:
     drawing: Canvas | Callable[[], Canvas] | None
     image: bytes = b""
     data: Any = None
-    fold: bool = False
-    leads: bool = False
-    wide: bool = False
-    number: str = ""
+    place: Place = ""
+    follows: str = ""
     part: float = 1.0
     tables: tuple[str, ...] = ()
 
@@ -421,6 +435,20 @@ def plain_ticks(axis: Axis) -> None:
     decades = 3.5 if axis is axis.axes.yaxis else 2.3
     has_room = high < 10**decades * low
     axis.set_minor_formatter("{x:g}" if has_room else NullFormatter())
+
+
+def log_sizes(ax: Axes) -> None:
+    """Set plain numbers at 1, 2 and 5 on a logarithmic x axis of sizes.
+
+    Parameters
+    ----------
+    ax
+        The panel.
+    """
+    ax.set_xscale("log")
+    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.xaxis.set_major_formatter("{x:g}")
+    ax.xaxis.set_minor_formatter(NullFormatter())
 
 
 def saved(figure: Figure, folder: Folder, *, png: bool = False) -> Figure:

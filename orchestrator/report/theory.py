@@ -344,7 +344,7 @@ class Going(NamedTuple):
     Attributes
     ----------
     law, bed, name
-        The force law, the bed, and both in words.
+        The force law, the bed, and both in words, with the fluid if there are several.
     reynolds, tau
         Re* and tau at the thresholds, shape (n,).
     holds
@@ -396,7 +396,7 @@ def going_on(rows: pd.DataFrame) -> list[Going]:
             within = " in each fluid"
         elif len(fluids) > 1:
             within = f" in {fluid(first['rho_f_kg_m3'], first['nu_m2_s'])}"
-        name = f"{line.name}{within}: {GOING}"
+        name = f"{line.name}{within}"
         holds = line.holds(at.reynolds)
         found.append(Going(line.law, bed, name, at.reynolds, at.shields, holds))
     return found
@@ -565,6 +565,22 @@ def best(listed: Sequence[Line]) -> list[Line]:
     for line in listed:
         firsts.setdefault(line.law, line)
     return list(firsts.values())
+
+
+def are_many(results: Results) -> bool:
+    """Say whether a study compares more force laws than dashes tell apart.
+
+    Parameters
+    ----------
+    results
+        The study.
+
+    Returns
+    -------
+    bool
+        Whether it does.
+    """
+    return len(best(ranked(results))) > MANY
 
 
 def ranges(chosen: BoolArray) -> list[tuple[float, float]]:

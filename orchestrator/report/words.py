@@ -1,23 +1,18 @@
 """What a page and a terminal say: the card, its table, remarks, and all other words."""
 
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import zip_longest
-from typing import Any
-from urllib.parse import quote
 
-import numpy as np
 import pandas as pd
 
 from orchestrator.errors import OrchestratorError
-from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.report import answers, remarks, sheets, theory
 from orchestrator.report.card import Card, remark_lines
 from orchestrator.report.card import lines as card_lines
-from orchestrator.report.page import Guest, versions
-from orchestrator.report.results import Results, valid
+from orchestrator.report.page import Guest
+from orchestrator.report.results import Results
 from orchestrator.report.sheets import Sheet
-from orchestrator.runs import case
 from orchestrator.tables import COLUMNS
 
 MOST_LETTERS = 46
@@ -164,132 +159,3 @@ def _as_lines(table: pd.DataFrame) -> Iterator[str]:
         ]
         for line in zip_longest(*parts, fillvalue=""):
             yield "  ".join(map(str.ljust, line, widths)).rstrip()
-
-
-def flow_at(row: pd.Series, ustar: float) -> str:
-    """Write a friction velocity with speeds that are measured.
-
-    Parameters
-    ----------
-    row
-        A threshold with the columns of its scene.
-    ustar
-        Undisturbed friction velocity, m/s.
-
-    Returns
-    -------
-    str
-        The velocity with the speeds of the wind, or with that of a channel.
-    """
-    depth = float(row["depth_m"] or np.nan)
-    speeds = measurable_speeds(
-        ustar,
-        roughness=row["z0_m"],
-        fluid_density=row["rho_f_kg_m3"],
-        viscosity=row["nu_m2_s"],
-        depth=depth,
-        closed=row["flow_top"] == "closed channel",
-    )
-    told = []
-    for column, label in sheets.SPEEDS.items():
-        if speeds[column] > 0:
-            told.append(f"{label} {speeds[column]:#.3g} m/s")
-    if depth > 0:
-        told.append(f"depth {depth:g} m")
-    velocity = f"u*₀ = {ustar:#.3g} m/s"
-    return f"{velocity} ({', '.join(told)})" if told else velocity
-
-
-def counts(results: Results) -> dict[str, Any]:
-    """Count what a reader must know before using this study's results.
-
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
-    Returns
-    -------
-    dict of str to object
-        Counts by the names that the page's template has for them; 0 is no remark.
-    """
-    scenes = results.scenes
-    thresholds = results.joined("pile_threshold")
-    outside = scenes[~valid(scenes)]
-    is_paper = outside["force_law"].isin(theory.PAIR)
-    told: dict[str, Any] = {
-        "outside": len(outside),
-        "transition": (is_paper & (outside["regime"] == "transition")).sum(),
-        "thresholds": len(thresholds),
-        "unreached": 0,
-    }
-    if len(thresholds):
-        told["unreached"] = thresholds["shields"].isna().sum()
-    lost = ("carried_off", "fallen_upstream")
-    curve = results.tables.get("pile_curve", pd.DataFrame())
-    of_piles = curve.reindex(columns=["scene_id", *lost]).groupby("scene_id").max()
-    for name in lost:
-        most = of_piles[name]
-        told[name] = ((most > 0).sum(), most.max())
-    return told
-
-
-def contents(
-    results: Results, failures: Mapping[str, str], guests: Sequence[Guest] = ()
-) -> dict[str, Any]:
-    """Collect the words and numbers of the page beside its figures.
-
-    Parameters
-    ----------
-    results
-        The study with its tables.
-    failures
-        The cases that failed, with why.
-    guests
-        Others that add to the page.
-
-    Returns
-    -------
-    dict of str to object
-        By the names of the page's template.
-    """
-    from orchestrator.report import flows  # imports what draws
-
-    root = results.cases
-    cases = results.plan.cases
-    links = {}
-    for name in cases:
-        if (root / name).is_dir():
-            links[name] = quote(f"{root.name}/{name}/")
-    scenes = results.scenes
-    mixtures = [pile.scene.grain.sizes for pile in results.plan.piles.values()]
-    eq10 = None
-    if results.flows:
-        eq10 = flows.eq10_over_wall(results, tuple(results.flows))
-    has_strips = scenes["width"].any()
-    # what a guest lists it has as a section of its own
-    first = sheet(results)
-    short = None if answers.is_of_hills(results) else sheets.short(results)
-    is_same = first is None or short is None or first.frame.equals(short.frame)
-    return {
-        "card": card(results, guests),
-        "sheet": first,
-        "remarks": remarks.remarks(results),
-        "further": None if is_same else short,
-        "piles": sheets.piles(results),
-        "fidelities": sheets.fidelities(results),
-        "counts": counts(results),
-        "force_laws": sheets.force_laws(results),
-        "parameters": sheets.parameters(results),
-        "results": results,
-        "title": results.study.title,
-        "measured": theory.section(results),
-        "programs": versions(case.programs(root, cases)),
-        "failures": failures,
-        "links": links,
-        "paper_pair": scenes["force_law"].isin(theory.PAIR).any(),
-        "eq10": eq10,
-        "methods": set(scenes["method"]),
-        "mixed": any(sizes is not None for sizes in mixtures),
-        "strips": has_strips,
-    }

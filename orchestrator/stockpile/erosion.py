@@ -30,8 +30,8 @@ from orchestrator.physics.threshold import thresholds_of
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.report import labels, style
 from orchestrator.report.card import Card, Number, Worth
-from orchestrator.report.flows import USTAR
-from orchestrator.report.page import Section
+from orchestrator.report.page import IN_SENTENCES, Limits, Paragraphs, Section, Table
+from orchestrator.report.solved import USTAR
 from orchestrator.report.style import Figure
 from orchestrator.study import fields
 from orchestrator.study.closed_form import single_grain
@@ -466,10 +466,14 @@ def _results(found: Sequence[Pile], winds: Sequence[float], source: str) -> Resu
     drawing = picture(found[:DRAWN], winds)
     figure = Figure("erosion", "Stress and loss", caption, (), drawing)
     told = "\n\n".join([*sentences(found, winds, source), TEXTS["sure"]])
+    in_sentences = Paragraphs(told, fold=IN_SENTENCES)
+    parts = Paragraphs(TEXTS["rows"], "lead")
+    limits = Limits(TEXTS["limits"].split("\n\n"))
+    sources = Paragraphs(TEXTS["sources"], "lead")
     sections = [
-        Section("", told, [figure], card=card(found, winds, source)),
-        Section("Parts", TEXTS["rows"], (), [table], TEXTS["limits"].split("\n\n")),
-        Section("The tables of AP-42", TEXTS["sources"], (), [AREAS, MATERIALS]),
+        Section("", [card(found, winds, source), figure, in_sentences]),
+        Section("Parts", [parts, limits, Table.of(table)]),
+        Section("The tables of AP-42", [sources, *map(Table.of, (AREAS, MATERIALS))]),
     ]
     return {"erosion": table}, sections
 

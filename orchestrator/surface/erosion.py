@@ -11,7 +11,7 @@ from orchestrator.digits import number
 from orchestrator.experiment import Experiment, Results, page_texts
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.report.card import Card, Number, Worth
-from orchestrator.report.page import Section
+from orchestrator.report.page import IN_SENTENCES, Limits, Paragraphs, Section, Table
 from orchestrator.report.style import Figure
 from orchestrator.stockpile import erosion
 from orchestrator.surface import cards, onset
@@ -319,12 +319,15 @@ def sections(found: Sequence[Heaps], source: str) -> list[Section]:
     figure = Figure("erosion", "Stress and loss", own["erosion"], (), drawing)
     said = [line for heaps in found for line in sentences(heaps, source)]
     told = "\n\n".join([*said, own["erosion_sure"]])
-    limits = own["erosion_limits"].split("\n\n")
+    in_sentences = Paragraphs(told, fold=IN_SENTENCES)
+    parts = Paragraphs(texts["rows"], "lead")
+    limits = Limits(own["erosion_limits"].split("\n\n"))
+    sources = Paragraphs(texts["sources"], "lead")
     tables = [erosion.AREAS, erosion.MATERIALS]
     return [
-        Section("", told, [figure], card=card(found, source)),
-        Section("Parts", texts["rows"], (), [rows(found)], limits),
-        Section("The tables of AP-42", texts["sources"], (), tables),
+        Section("", [card(found, source), figure, in_sentences]),
+        Section("Parts", [parts, limits, Table.of(rows(found))]),
+        Section("The tables of AP-42", [sources, *map(Table.of, tables)]),
     ]
 
 

@@ -5,7 +5,6 @@ the closed form the threshold of a grain on each of its faces.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -21,7 +20,7 @@ from orchestrator.experiment import Experiment, Results, Runs, page_texts
 from orchestrator.flow.run import SPEED_HEIGHT, WALL_STRESS
 from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.velocity import log_law_ustar
-from orchestrator.report.page import Section
+from orchestrator.report.page import IN_SENTENCES, Element, Paragraphs, Section, Table
 from orchestrator.report.style import Figure
 from orchestrator.stockpile.erosion import given_threshold
 from orchestrator.study.scene import (
@@ -393,8 +392,10 @@ def sections(found: Sequence[Answer], source: str) -> list[Section]:
     if len(found) == 1:
         table = table.drop(columns="surface")  # the card names it
     card = cards.card(found, source)
-    listed[0] = replace(listed[0], tables=[table], card=card)
-    return [*listed, Section("How sure it is", words["sure"])]
+    first, *others = listed
+    figure, told = first.content
+    sure = Section("How sure it is", [Paragraphs(words["sure"], "lead")])
+    return [Section("", [card, figure, told, Table.of(table)]), *others, sure]
 
 
 def _texts(stream: Stream) -> dict[str, str]:
@@ -433,10 +434,11 @@ def _sections(answer: Answer, end: str, source: str) -> Iterator[Section]:
     least = [maps.Map(title, answer.maps[LEAST], from_deg, mark)]
     drawing = maps.figure(answer.grid, least, f"{stream.at}, m/s, at which it moves")
     text = words["least"]
-    yield Section(
-        "", told, [Figure(f"least{end}", "Where motion starts", text, (), drawing)]
-    )
-    figures = [_figure(answer, RATIO, f"stress{end}", "Stress", words["stress"])]
+    figure = Figure(f"least{end}", "Where motion starts", text, (), drawing)
+    yield Section("", [figure, Paragraphs(told, fold=IN_SENTENCES)])
+    figures: list[Element] = [
+        _figure(answer, RATIO, f"stress{end}", "Stress", words["stress"])
+    ]
     if several:
         title = f"{stream.word.capitalize()} from each direction"
         figures.append(_figure(answer, MOVES, f"winds{end}", title, words["winds"]))
@@ -447,7 +449,7 @@ def _sections(answer: Answer, end: str, source: str) -> Iterator[Section]:
         drawing = maps.figure(answer.grid, hours, "hours a year", colours="magma")
         text = words["hours"]
         figures.append(Figure(f"hours{end}", "Hours of motion", text, (), drawing))
-    yield Section(answer.name, "", figures)
+    yield Section(answer.name, figures)
 
 
 def _figure(answer: Answer, column: str, name: str, title: str, text: str) -> Figure:

@@ -28,7 +28,7 @@ from orchestrator.flow.foam import BED_FLOW
 from orchestrator.flow.run import WALL_STRESS
 from orchestrator.flow.stress import WallStress
 from orchestrator.physics.velocity import log_law_speed
-from orchestrator.report.page import Section
+from orchestrator.report.page import Paragraphs, Section, Table
 from orchestrator.runs.case import Case
 from orchestrator.study.method import FlowMethod
 from orchestrator.surface import mesh
@@ -523,8 +523,8 @@ def section(table: pd.DataFrame) -> Section:
         All rows but those of single masts.
     """
     few = table[table["quantity"] != AT_MAST]
-    text = page_texts(__file__, "surface")["truth"]
-    return Section("Beds in three dimensions", text, (), [few])
+    text = Paragraphs(page_texts(__file__, "surface")["truth"], "lead")
+    return Section("Beds in three dimensions", [text, Table.of(few)])
 
 
 def stored() -> pd.DataFrame:

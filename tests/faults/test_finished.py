@@ -7,6 +7,7 @@ import shutil
 import subprocess
 from argparse import Namespace
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,7 @@ import orchestrator as face
 from orchestrator import cli, plan
 from orchestrator.commands.study import finished
 from orchestrator.errors import InputError
-from orchestrator.report import shields
+from orchestrator.report.figures import shields
 from orchestrator.report.results import Results
 from orchestrator.report.style import Figure
 from orchestrator.runs import case
@@ -268,8 +269,8 @@ def test_a_figure_that_failed_is_drawn_the_next_time(
         raise MemoryError("for this test")
 
     words = ["study", str(file), "--out", str(out)]
-    draw = shields.draw
-    monkeypatch.setattr(shields, "draw", fail)
+    figure = shields.FIGURE
+    monkeypatch.setattr(shields, "FIGURE", replace(figure, draws=fail))
     for _ in range(2):
         assert cli.main(words) == 1
         printed = capsys.readouterr()
@@ -279,7 +280,7 @@ def test_a_figure_that_failed_is_drawn_the_next_time(
         assert "MemoryError: for this test" in (out / "report.html").read_text()
         assert not (out / "figures" / "shields.svg").exists()
         assert not _is_finished(file, out)
-    monkeypatch.setattr(shields, "draw", draw)
+    monkeypatch.setattr(shields, "FIGURE", figure)
     assert cli.main(words) == 0
     assert "no solver was started" in capsys.readouterr().err
     assert "MemoryError" not in (out / "report.html").read_text()

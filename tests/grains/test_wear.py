@@ -9,7 +9,7 @@ import pytest
 from orchestrator.grains import pile as wear
 from orchestrator.grains.loads import Geometry
 from orchestrator.grains.pile import Pile, Worn
-from orchestrator.report import bed
+from orchestrator.report.figures import bed
 from orchestrator.report.results import Results
 from orchestrator.study.parts import Grain
 from orchestrator.study.profile import Profile

@@ -11,10 +11,13 @@ from orchestrator.physics.grain import Grain
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.threshold import thresholds_of
 from orchestrator.physics.velocity import measurable_speeds
-from orchestrator.report import answers, drawing, head, head_grain, shields, single
+from orchestrator.report import answers, figures, single, units
 from orchestrator.report.card import Card, Number, Worth, lines
+from orchestrator.report.figures import fractions
+from orchestrator.report.figures import grain as of_one
+from orchestrator.report.figures import shields as overview
 from orchestrator.report.results import Results
-from tests.report.conftest import changed, copies, legend_of, only
+from tests.report.conftest import axes_of, changed, copies, legend_of, only
 
 WIND = Number(13.44, "m/s", "wind", low=9.947, high=13.44, measured=9.683)
 WORTH = Worth("care", "usable, with a correction", "Take the measured value.")
@@ -102,7 +105,7 @@ def test_a_grain_that_is_within_what_was_measured_needs_no_correction(
 
 def test_an_air_study_shows_what_was_measured_in_air(results: Results) -> None:
     air = copies(results, {"rho_f_kg_m3": 1.2, "reynolds": 10.0})
-    (figure,) = shields.draw(air)
+    (figure,) = overview.draw(air)
     said = legend_of(figure)
     assert "air: measured at 3 sites in the field" in said
     assert not [label for label in said if "water" in label]
@@ -110,26 +113,42 @@ def test_an_air_study_shows_what_was_measured_in_air(results: Results) -> None:
     assert figure.canvas
     assert all(len(one.texts) <= 7 for one in figure.canvas.legends)
     # the paper's own gas stands beside water, as in the paper
-    (paper,) = shields.draw(only(results, "pile"))
+    (paper,) = overview.draw(only(results, "pile"))
     assert [label for label in legend_of(paper) if "water" in label]
 
 
-def test_pictures_are_drawn_for_two_widths_in_the_colours_of_the_page(
-    results: Results,
-) -> None:
+def test_one_bed_has_its_picture_and_its_growth_at_the_head(results: Results) -> None:
     heap = only(results, "pile")
-    assert head.of(heap) is None
-    chosen = head.below(heap)
-    assert chosen is not None
-    html = drawing.written(chosen)
-    assert html.count("<svg") == 2
-    assert 'class="draw wide"' in html
-    assert 'class="draw narrow"' in html
-    assert "var(--answer)" in html
-    assert "#c24e00" not in html
+    places: dict[str, str] = {}
+    for kind in figures.kinds():
+        places |= {figure.name: figure.place for figure in kind.draw(heap)}
+    assert places["bed-alpha15"] == "lead"
+    assert places["share"] == "under"
+    assert not {"where", "sweep", "sizes", "grain", "laws"} & places.keys()
     place = answers.card(heap).numbers[0]
     row = heap.joined("pile_threshold").iloc[0]
     assert place.value == pytest.approx(1e3 * row["first_x_m"])
+
+
+def test_the_growth_of_motion_passes_through_the_answer(results: Results) -> None:
+    heap = only(results, "pile")
+    (figure, *_) = fractions.FIGURE.draw(heap)
+    (ax,) = axes_of(figure)
+    computed, measured, card = ax.lines
+    row = heap.exemplars.iloc[0]
+    curve = heap.tables["pile_curve"]
+    told = single.quantity(row)
+    assert np.asarray(computed.get_xdata()) == pytest.approx(
+        units.of_row(row, curve["ustar0_m_s"], told)
+    )
+    assert np.asarray(computed.get_ydata()).tolist() == curve["fraction_moved"].tolist()
+    ratio = units.measured_over_computed(row)
+    assert np.asarray(measured.get_xdata()) == pytest.approx(
+        units.of_row(row, ratio * curve["ustar0_m_s"], told)
+    )
+    ((flow, part),) = np.asarray(card.get_xydata(), float)
+    assert flow == pytest.approx(answers.card(heap).numbers[2].value)
+    assert part == row["fraction"]
 
 
 def test_motion_starts_within_the_interval_of_its_place(results: Results) -> None:
@@ -201,16 +220,15 @@ def test_the_answer_of_a_picture_is_that_of_the_card() -> None:
 
 
 @pytest.mark.parametrize("measured", [0.7, 1.0, 1.4])
-@pytest.mark.parametrize("narrow", [False, True])
 def test_labels_of_the_picture_of_a_grain_lie_on_no_points(
-    results: Results, measured: float, narrow: bool
+    results: Results, measured: float
 ) -> None:
     grain = only(results, "grain").joined("single_grain").iloc[0].copy()
     # of this roughness the thresholds of grains that go on are tabulated
     grain["z0_m"] = grain["d_m"] / 30
     grain["ustar0_m_s"] = grain["ustar_m_s"]
     grain["measured_level_ustar_m_s"] = measured * grain["ustar0_m_s"]
-    canvas = head_grain.of_grain(grain).draw(narrow)
+    canvas = of_one.of_grain(grain)
     canvas.draw_without_rendering()
     for ax in canvas.axes:
         labels = [text for text in ax.texts if text.get_text()]

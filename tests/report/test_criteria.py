@@ -7,6 +7,8 @@ import pytest
 from matplotlib.axes import Axes
 
 from orchestrator.report import shields, theory
+from orchestrator.report.figures import one_grain
+from orchestrator.report.figures import shields as overview
 from orchestrator.report.results import Results
 from tests import small_study
 from tests.report.conftest import axes_of
@@ -41,7 +43,7 @@ def test_the_curve_of_grains_that_go_on_passes_through_their_answers(
     number: int, tmp_path: Path
 ) -> None:
     made = results(tmp_path, '["goes on"]')
-    figures = [*shields.draw(made), *shields.singles(made)]
+    figures = [*overview.draw(made), *one_grain.FIGURE.draw(made)]
     (ax,) = axes_of(figures[number])
     ((name, (x, y)),) = curves(ax).items()
     assert theory.GOING in name
@@ -55,7 +57,7 @@ def test_the_curve_of_grains_that_go_on_passes_through_their_answers(
 
 def test_each_criterion_has_a_curve_of_its_own_with_its_name(tmp_path: Path) -> None:
     made = results(tmp_path, '["leaves", "goes on"]')
-    (figure,) = shields.draw(made)
+    (figure,) = overview.draw(made)
     (ax,) = axes_of(figure)
     found = curves(ax)
     assert sorted(name.partition(": ")[2] for name in found) == [
@@ -71,7 +73,7 @@ def test_beds_that_no_table_holds_have_the_curve_of_their_pockets(
 ) -> None:
     made = results(tmp_path, '["goes on"]', roughness="d/10")
     assert theory.going_on(made.joined("single_grain")) == []
-    (figure,) = shields.draw(made)
+    (figure,) = overview.draw(made)
     (ax,) = axes_of(figure)
     (name,) = curves(ax)
     assert theory.LEAVING in name

@@ -13,7 +13,17 @@ from matplotlib.colors import to_hex
 from matplotlib.container import ErrorbarContainer
 from matplotlib.lines import Line2D
 
-from orchestrator.report import bed, flows, piles, poured, shields, style
+from orchestrator.report import shields, style
+from orchestrator.report.figures import (
+    accuracy,
+    bed,
+    beds,
+    fractions,
+    hiding,
+    one_grain,
+    stress,
+)
+from orchestrator.report.figures import shields as overview
 from orchestrator.report.results import Results
 from orchestrator.report.style import Figure
 from orchestrator.study import study
@@ -24,13 +34,15 @@ Points = set[tuple[float, float]]
 
 
 def pile_figures(results: Results) -> Iterator[Figure]:
-    yield from piles.fractions(results)
-    yield from shields.piles(results)
+    for figure in fractions.FIGURE.draw(results):
+        if figure.name.startswith("fractions-alpha"):
+            yield figure
+    yield from beds.FIGURE.draw(results)
 
 
 def single_figures(results: Results) -> Iterator[Figure]:
-    yield from shields.singles(results)
-    yield from shields.accuracy(results)
+    yield from one_grain.FIGURE.draw(results)
+    yield from accuracy.FIGURE.draw(results)
 
 
 def drawn(figures: Iterable[Figure]) -> dict[str, list[Axes]]:
@@ -64,8 +76,8 @@ def test_study_has_the_figures_of_its_beds(results: Results) -> None:
     names = {"dem-horizontal", "dem-slope-beta60", "accuracy"}
     one = only(results, "grain")
     assert {figure.name for figure in single_figures(one)} == names
-    assert [figure.name for figure in shields.draw(one)] == [shields.NAME]
-    assert list(pile_figures(one)) == list(flows.stress(one)) == []
+    assert [figure.name for figure in overview.draw(one)] == [overview.NAME]
+    assert list(pile_figures(one)) == list(stress.FIGURE.draw(one)) == []
     heap = only(results, "pile")
     assert list(single_figures(heap)) == []
     assert [figure.name for figure in pile_figures(heap)] == [
@@ -142,7 +154,8 @@ def test_fractions_are_those_of_the_holds(
 
 def test_captions_of_fractions_say_what_is_drawn(results: Results) -> None:
     of_stress, of_reynolds = (
-        next(draw(results)) for draw in (piles.fractions, piles.fractions_by_reynolds)
+        next(one for one in fractions.FIGURE.draw(results) if one.name.startswith(name))
+        for name in ("fractions-alpha", "fractions-reynolds")
     )
     for figure, x in ((of_stress, "τ"), (of_reynolds, "Re*")):
         said = " ".join(figure.caption.split())
@@ -173,16 +186,16 @@ def test_extended_diagram_shows_each_fraction_that_was_reached(
 
 def test_friction_velocity_is_that_of_the_flow(results: Results) -> None:
     table = results.tables["wall_stress"]
-    top, profile = drawn(flows.stress(results))["wall-stress"]
-    for name in flows.ESTIMATES:
+    top, below = drawn(stress.FIGURE.draw(results))["wall-stress"]
+    for name in stress.ESTIMATES:
         (line,) = marked(top, name)
         assert (
             np.asarray(line.get_ydata()).tolist()
             == table[f"ustar_over_ustar0_{name}"].tolist()
         )
         assert line.get_xdata() == pytest.approx(table["x_m"] / 0.01)
-    (bed,) = marked(profile, "bed")
-    assert np.max(bed.get_ydata()) == pytest.approx(1, abs=0.05)
+    (line,) = marked(below, "bed")
+    assert np.max(line.get_ydata()) == pytest.approx(1, abs=0.05)
     assert [c for c in top.collections if c.get_gid() == "reversed flow"]
 
 
@@ -194,8 +207,8 @@ def test_closed_form_is_drawn_before_there_are_results(results: Results) -> None
     assert {figure.name for figure in single_figures(empty)} == names
     assert (
         list(pile_figures(empty))
-        == list(flows.stress(empty))
-        == list(bed.draw(empty))
+        == list(stress.FIGURE.draw(empty))
+        == list(bed.FIGURE.draw(empty))
         == []
     )
 
@@ -204,8 +217,8 @@ def test_figures_have_at_most_six_panels_and_numbers_under_each_column(
     results: Results,
 ) -> None:
     several = copies(results, *({"averaging_length": i + 1.0} for i in range(7)))
-    figures = [*piles.fractions(several), *shields.piles(several)]
-    assert [bool(figure.fold) for figure in figures] == [False, True, True, True]
+    figures = [*pile_figures(several)]
+    assert [figure.place for figure in figures] == ["", "folded", "folded", "folded"]
     for figure in figures:
         axes = axes_of(figure)
         assert 0 < len(axes) <= style.PANELS
@@ -234,7 +247,7 @@ def test_a_threshold_without_a_place_on_a_logarithmic_axis_costs_no_figure(
     ] = value
     curve.loc[curve.index[: 3 if rows == 1 else None], ["shields", "reynolds"]] = value
     heap = only(changed(results, pile_threshold=own, pile_curve=curve), "pile")
-    assert len(drawn([*shields.draw(heap), *pile_figures(heap)])) == (
+    assert len(drawn([*overview.draw(heap), *pile_figures(heap)])) == (
         3 if rows == 1 else 1
     )
 
@@ -244,11 +257,11 @@ def test_flows_by_two_models_have_a_panel_each(results: Results) -> None:
     pile = two.plan.piles["copy 0"]
     model = {"method.flow.turbulence_model": "RNGkEpsilon"}
     other = replace(pile, scene=study.changed(pile.scene, model))
-    stress = two.tables["wall_stress"]
-    theirs = stress.assign(flow_case=other.flow.name)
-    both = changed(two, wall_stress=pd.concat([stress, theirs], ignore_index=True))
+    own = two.tables["wall_stress"]
+    theirs = own.assign(flow_case=other.flow.name)
+    both = changed(two, wall_stress=pd.concat([own, theirs], ignore_index=True))
     plan = replace(two.plan, piles={"copy 0": pile, "copy 1": other})
-    (figure,) = flows.stress(replace(both, plan=plan))
+    (figure,) = stress.FIGURE.draw(replace(both, plan=plan))
     titles = [ax.get_title(loc="left") for ax in axes_of(figure)]
     models = [title.rpartition(", ")[2] for title in titles if title]
     assert models == ["RNG k-ε", "k-ε"]
@@ -270,7 +283,7 @@ def test_a_class_whose_interval_ends_at_its_threshold_is_drawn() -> None:
     )
     with style.settings():
         ax = plt.figure().subplots()
-        poured._draw_classes(ax, rows, "C0")
+        hiding._draw_classes(ax, rows, "C0")
     (bars,) = ax.containers
     assert isinstance(bars, ErrorbarContainer)
     assert bars.has_yerr

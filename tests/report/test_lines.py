@@ -12,6 +12,7 @@ from orchestrator.physics.measured import BUFFINGTON_MONTGOMERY
 from orchestrator.physics.onset import of_grains
 from orchestrator.physics.threshold import shields_at
 from orchestrator.report import shields, theory
+from orchestrator.report.figures import shields as overview
 from orchestrator.report.results import Results
 from orchestrator.report.theory import Bed, Line
 
@@ -137,7 +138,7 @@ def several(results: Results, bed: pd.DataFrame) -> Results:
 
 
 def test_many_laws_have_colours_of_their_own(several: Results) -> None:
-    (figure,) = shields.draw(several)
+    (figure,) = overview.draw(several)
     assert figure.canvas is not None
     (ax,) = figure.canvas.axes
     lines = [line for line in ax.lines if line.get_gid() == shields.RESULT[0]]

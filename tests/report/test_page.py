@@ -18,9 +18,10 @@ import pytest
 import orchestrator
 from orchestrator import gallery, tables
 from orchestrator.errors import InputError, OrchestratorError
-from orchestrator.report import bed, remarks, style
 from orchestrator.report import page as page_module
-from orchestrator.report.page import Section
+from orchestrator.report import remarks, style
+from orchestrator.report.figures import bed
+from orchestrator.report.page import Limits, Paragraphs, Section, Table
 from orchestrator.report.results import Results
 from orchestrator.report.style import Figure
 from orchestrator.runs.files import Folder
@@ -76,7 +77,7 @@ def test_page_needs_nothing_else(html: str, parsed: Page) -> None:
     kinds = [src.split(",")[0] for src in parsed.all("img", "src")]
     folded = html.count("<code>python -m orchestrator report DIR --all</code>")
     assert (set(kinds), folded) == ({"data:image/svg+xml;utf8"}, 1)
-    assert "6 more figures, drawn on demand" in parsed.text
+    assert "5 more figures, drawn on demand" in parsed.text
     assert not {"link", "iframe", "object"} & {tag for tag, _ in parsed.tags}
     scripts = [values for tag, values in parsed.tags if tag == "script"]
     assert [one.get("type") for one in scripts] == [
@@ -290,11 +291,14 @@ def test_page_of_an_experiment_holds_all_of_its_sections(tmp_path: Path) -> None
     table = pd.DataFrame(
         {"level": ["a", "b"], "tau_c": [0.123456, np.nan], "same": [True, False]}
     )
+    text = Paragraphs("One V_f.\n\nAnother <b>paragraph</b>.")
     sections = [
-        Section("What was run", "One V_f.\n\nAnother <b>paragraph</b>.", figures[:1]),
-        Section("Found", "", figures[1:], [table], ["No more than <this>."]),
+        Section("What was run", [figures[0], text]),
+        Section(
+            "Found", [Limits(["No more than <this>."]), figures[1], Table.of(table)]
+        ),
     ]
-    page_module.write(
+    page_module.write_experiment(
         SPEED, sections, Folder(tmp_path), "page.html", {"liggghts": "3.8"}
     )
     parsed = Page((tmp_path / "page.html").read_text(encoding="utf-8"))

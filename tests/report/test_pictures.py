@@ -1,4 +1,4 @@
-"""Pictures of flow, mesh, bed and hills, from their study file to what is drawn."""
+"""Pictures of flow, bed and hills, from their study file to what is drawn."""
 
 import shutil
 from dataclasses import replace
@@ -10,8 +10,10 @@ import pytest
 from orchestrator.bed import packing
 from orchestrator.grains.pile import Pile
 from orchestrator.physics.threshold import thresholds_of
-from orchestrator.report import along, answers, bed, flows
-from orchestrator.report.bed import Steps
+from orchestrator.report import answers, single, solved, units
+from orchestrator.report.figures import bed, flow, where
+from orchestrator.report.figures import hills as measured_hills
+from orchestrator.report.figures.bed import Steps
 from orchestrator.report.results import FRACTION, Results
 from orchestrator.study import methods
 from orchestrator.study.closed_form import single_grain
@@ -105,8 +107,8 @@ def steps(results: Results, pile: Pile) -> Steps:
 
 
 def test_field_is_that_of_the_flow(results: Results, pile: Pile) -> None:
-    (figure,) = flows.flow(results)
-    velocity = flows.over_u_e(pile, results.cases, (-0.02, 0.1, 0.0, 0.03), 1.0, 240)
+    (figure,) = flow.FIGURE.draw(results)
+    velocity = solved.over_u_e(pile, results.cases, (-0.02, 0.1, 0.0, 0.03), 1.0, 240)
     speed = np.linalg.norm(velocity, axis=-1)
     assert 0.7 < speed[-1].min() < speed[-1].max() < 1.2
     # outside: the triangle of the pile, 0.01 m high and 2 · 0.01/tan 15° wide
@@ -121,7 +123,7 @@ def test_field_is_that_of_the_flow(results: Results, pile: Pile) -> None:
     # |u|/U_e is 1 at 10 h far upstream; at the lid it is a quarter more
     window = (-60.0, -59.0, 10.0, 10.1)
     far = np.linalg.norm(
-        flows.over_u_e(pile, results.cases, window, pile.bed.height), axis=-1
+        solved.over_u_e(pile, results.cases, window, pile.bed.height), axis=-1
     )
     assert np.nanmean(far) == pytest.approx(1, abs=0.02)
 
@@ -132,7 +134,7 @@ def test_a_flow_that_was_run_again_is_read_again(
     window = (-0.02, 0.1, 0.0, 0.03)
     here, fresh = tmp_path / "here", tmp_path / "fresh"
     shutil.copytree(results.cases / pile.flow.name, here / pile.flow.name)
-    before = flows.over_u_e(pile, here, window, 1.0, 60)
+    before = solved.over_u_e(pile, here, window, 1.0, 60)
     # another mesh: higher cells from the bed upwards
     points = here / pile.flow.name / "constant" / "polyMesh" / "points"
     head, rows = points.read_text().split("\n(\n")
@@ -142,28 +144,15 @@ def test_a_flow_that_was_run_again_is_read_again(
     rows = "\n".join("({} {} {})".format(*corner) for corner in corners.tolist())
     points.write_text(f"{head}\n(\n{rows}\n){end}")
     shutil.copytree(here, fresh)
-    after = flows.over_u_e(pile, here, window, 1.0, 60)
-    np.testing.assert_array_equal(after, flows.over_u_e(pile, fresh, window, 1.0, 60))
+    after = solved.over_u_e(pile, here, window, 1.0, 60)
+    np.testing.assert_array_equal(after, solved.over_u_e(pile, fresh, window, 1.0, 60))
     assert not np.array_equal(after, before, equal_nan=True)
-
-
-def test_mesh_is_that_of_the_flow(
-    results: Results, pile: Pile, capfd: pytest.CaptureFixture[str]
-) -> None:
-    edges = flows.read_edges(results.cases / pile.flow.name)
-    assert capfd.readouterr().err == ""  # VTK cannot read the fields at the start
-    table = results.tables["wall_stress"]
-    faces = len(table)
-    assert edges[..., 1].max() == pytest.approx(pile.flow.lid * pile.bed.height)
-    middles = {(round(x, 5), round(z, 5)) for x, z in edges.mean(axis=1)}
-    line = zip(table["x_m"].round(5), table["z_m"].round(5), strict=True)
-    assert len(middles.intersection(line)) > 0.9 * faces
 
 
 def test_the_slider_has_every_place_of_every_load_step(
     results: Results, steps: Steps
 ) -> None:
-    (figure,) = bed.draw(results)
+    (figure,) = bed.FIGURE.draw(results)
     data, curve, counts = (
         figure.data,
         results.tables["pile_curve"],
@@ -194,7 +183,7 @@ def test_grains_that_go_on_by_dem_are_drawn_at_the_flows_at_which_they_have_gone
     assert len(steps.places) == len(steps.flow) == len(steps.totals)
     assert steps.flow.tolist() == pile.motion(results.cases).flow.tolist()
     assert steps.totals[-1] == pile.packing.count
-    (figure,) = bed.draw(results)
+    (figure,) = bed.FIGURE.draw(results)
     assert figure.data["step"] == "flow"
 
 
@@ -275,14 +264,17 @@ def test_each_form_of_a_train_has_its_thresholds(train: Results) -> None:
 
 
 def test_the_map_shows_every_grain_at_its_place(train: Results) -> None:
-    (figure,) = along.draw(train)
-    grains = train.tables["pile_grain"]
-    artists = (artist for axes in axes_of(figure) for artist in axes.collections)
-    (dots,) = (artist for artist in artists if artist.get_gid() == "thresholds")
-    shown = np.asarray(dots.get_offsets())
-    goes = grains[grains["ustar0_m_s"].notna()]
-    np.testing.assert_allclose(shown[:, 0], goes["x_m"])
-    np.testing.assert_allclose(shown[:, 1], goes["ustar0_m_s"])
+    (figure,) = where.FIGURE.draw(train)
+    grains = train.tables["pile_grain"].sort_values("x_m")
+    goes = grains[np.isfinite(grains["ustar0_m_s"])]
+    lines = [line for ax in axes_of(figure) for line in ax.lines]
+    (shown,) = (line for line in lines if line.get_gid() == "thresholds")
+    x, told = np.asarray(shown.get_xydata(), float).T
+    known = np.isfinite(x)
+    np.testing.assert_allclose(x[known], goes["x_m"])
+    row = train.joined("pile_threshold").iloc[0]
+    at = units.of_row(row, goes["ustar0_m_s"], single.quantity(row))
+    np.testing.assert_allclose(told[known], at)
 
 
 def test_a_steep_hill_separates_where_it_was_measured_to(hills: Results) -> None:
@@ -296,7 +288,7 @@ def test_a_steep_hill_separates_where_it_was_measured_to(hills: Results) -> None
 
 
 def test_computed_stands_beside_measured(hills: Results) -> None:
-    (figure,) = flows.hills(hills)
+    (figure,) = measured_hills.FIGURE.draw(hills)
     assert figure.canvas
     lines = [line for axes in figure.canvas.axes for line in axes.lines]
     (measured_,) = (line for line in lines if line.get_gid() == "measured")

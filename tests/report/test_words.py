@@ -7,7 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.report import answers, bed, labels, remarks, sheets, shields
+from orchestrator.report import answers, labels, remarks, sheets, shields
+from orchestrator.report.figures import bed
+from orchestrator.report.figures import shields as overview
 from orchestrator.report.results import Results
 from orchestrator.report.shields import LABEL, SHAPE
 from orchestrator.study import fields
@@ -121,7 +123,7 @@ def test_the_picture_is_of_the_scene_that_the_sentence_is_about(
         study = copies(results, *both)
         row, _ = next(bed.chosen(study))
         assert row["rho_f_kg_m3"] == 1e3
-        (figure,) = bed.draw(study)
+        (figure,) = bed.FIGURE.draw(study)
         assert "1000 kg/m³" in figure.title
         first = answers.card(study).numbers[0]
         assert (first.unit, "ρ_f = 1000 kg/m³" in first.meaning) == ("Pa", True)
@@ -232,7 +234,7 @@ def test_an_interval_without_an_end_is_written_so(results: Results) -> None:
     assert sheet is not None
     lows = [f"above {low:#.3g}" for low in thresholds["shields_low"]]
     assert sheet.frame[sheets.TAU_INTERVAL].tolist() == ["—", *lows]
-    (figure,) = shields.draw(study)
+    (figure,) = overview.draw(study)
     said = " ".join(text[1] for group in figure.data.values() for text in group)
     assert all(f"(above {low:.4g})" in said for low in thresholds["shields_low"])
     # a range of several is open as the widest of them
@@ -271,7 +273,7 @@ def test_no_interval_is_one_bare_number() -> None:
 
 
 def test_every_point_says_its_scene_interval_and_case(results: Results) -> None:
-    (figure,) = shields.draw(results)
+    (figure,) = overview.draw(results)
     assert figure.canvas is not None
     (ax,) = figure.canvas.axes
     drawn = {line.get_gid(): line for line in ax.lines}
@@ -291,7 +293,7 @@ def test_the_lines_beside_piles_have_the_roughness_of_the_piles(
     results: Results,
 ) -> None:
     """Single grains on d/10 fit the measurements better; the piles are on d/30."""
-    (figure,) = shields.draw(results)
+    (figure,) = overview.draw(results)
     lines = [text for text in legend_of(figure) if text.startswith("Eq.")]
     assert len(lines) == 2
     assert all(text.endswith("β = 60°, z₀ = d/30") for text in lines)

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from math import cos, pi, radians, tan
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import pandas as pd
@@ -13,11 +14,13 @@ from orchestrator.errors import InputError
 from orchestrator.experiment import Experiment, Results, Runs
 from orchestrator.flow.run import WALL_STRESS
 from orchestrator.report.card import Card
+from orchestrator.report.page import Paragraphs, Section, Table
 from orchestrator.surface import cards, erosion, pipeline
 from orchestrator.surface.raster import geotiff
 from orchestrator.surface.stress import SurfaceStress, faces_of
 from orchestrator.surface.study import SurfaceStudy
 
+Kind = TypeVar("Kind")
 EAST, NORTH = 431_200.0, 5_571_000.0
 SLOPE = 36.0
 ONE = ((24.0, 26.0, 7.0),)
@@ -136,6 +139,12 @@ def test_grains_feel_the_fall_that_the_flow_does_not(tmp_path: Path) -> None:
     assert ratio.to_numpy() == pytest.approx(by_hand, abs=0.01)
 
 
+def only(section: Section, kind: type[Kind]) -> Kind:
+    """The one element of a kind in a section."""
+    (found,) = (each for each in section.content if isinstance(each, kind))
+    return found
+
+
 def test_directions_that_the_interval_does_not_tell_apart_are_a_tie(
     tmp_path: Path,
 ) -> None:
@@ -144,15 +153,14 @@ def test_directions_that_the_interval_does_not_tell_apart_are_a_tie(
     strengths = {0.0: 0.97, 90.0: 1.0, 180.0: 0.7}
     experiment = pipeline.experiment(study)
     _, sections = answered(study, experiment, tmp_path / "cases", strengths.__getitem__)
-    card = sections[0].card
-    assert card is not None
+    card = only(sections[0], Card)
     assert "2 heaps of " in card.scene
     first = card.numbers[0]
     assert first.meaning.startswith("wind at 10 m from 90° in which motion starts")
     assert "0° is not told from it within the interval" in first.note
     assert "180°" not in first.note
-    assert "From 180° motion starts at" in sections[0].text
-    assert "within the interval" not in sections[0].text
+    assert "From 180° motion starts at" in only(sections[0], Paragraphs).text
+    assert "within the interval" not in only(sections[0], Paragraphs).text
 
 
 def test_a_tie_of_all_directions_has_no_worst() -> None:
@@ -172,13 +180,12 @@ def test_the_page_has_places_to_a_part_of_a_cell(tmp_path: Path) -> None:
     study = study_of(tmp_path, directions=[0.0, 90.0])
     experiment = pipeline.experiment(study)
     made, sections = answered(study, experiment, tmp_path / "cases")
-    (shown,) = sections[0].tables
+    shown = only(sections[0], Table).frame
     for place, exact in zip(
         shown["first at x, m"], made["directions"]["x_m"], strict=True
     ):
         assert place == f"{exact:.1f}"
-    card = sections[0].card
-    assert card is not None
+    card = only(sections[0], Card)
     assert card.numbers[0].note.startswith("first at x = 4312")
 
 
@@ -196,9 +203,8 @@ def eroded(
     study = study_of(folder, cones, directions=directions, more=COAL + more)
     experiment = erosion.experiment(study)
     made, sections = answered(study, experiment, folder / "cases", strength)
-    card = sections[0].card
-    assert card is not None
-    return made["erosion"], card, sections[0].text
+    card = only(sections[0], Card)
+    return made["erosion"], card, only(sections[0], Paragraphs).text
 
 
 def test_each_heap_is_a_pile_of_ap42(tmp_path: Path) -> None:
@@ -233,7 +239,7 @@ def test_a_low_heap_alone_is_flat_ground_to_ap42(tmp_path: Path) -> None:
     study = guests.load(tmp_path / "heaps.toml", None)
     experiment = erosion.experiment(study)
     made, sections = answered(study, experiment, tmp_path / "cases")
-    told = sections[0].text.split("\n\n")
+    told = only(sections[0], Paragraphs).text.split("\n\n")
     assert "flat ground" not in told[0]
     assert "by AP-42, to which it is flat ground, " in told[1]
     rows = made["erosion"]

@@ -11,16 +11,15 @@ import pytest
 from orchestrator import face
 from orchestrator.report import (
     answers,
-    head_share,
     labels,
     sheets,
-    shields,
     single,
     style,
     subjects,
 )
 from orchestrator.report.card import lines
-from orchestrator.report.results import Results, seeds_as_one
+from orchestrator.report.figures import shields as overview
+from orchestrator.report.results import Results, seeds_as_one, seeds_of
 from orchestrator.tables.quoted import MEASURED, NUMERICAL, SEEDS, of_classes, quoted
 from tests import small_study
 
@@ -176,7 +175,7 @@ def test_card_table_figure_and_csv_have_one_interval(tmp_path: Path, text: str) 
     assert frame[head].iloc[0] == labels.interval(low, high)
     # the bars and what the page says of a point
     with style.settings():
-        (figure,) = shields.draw(results)
+        (figure,) = overview.draw(results)
     assert figure.canvas is not None
     bars = [
         np.asarray(line.get_ydata())
@@ -256,7 +255,7 @@ def test_two_beds_of_which_one_does_not_reach_the_fraction_stay_two(
     assert re.search(r"4 of 8 +- +- +thresholds are usable", said)
     # nor is the lost bed drawn as one that differs in chance alone
     row = results.exemplars.iloc[0]
-    assert len(head_share._curves(row, results)) == 1
+    assert seeds_of(row, results.at_fraction) == []
 
 
 def test_the_interval_of_a_size_class_holds_that_of_its_bed() -> None:

@@ -1,6 +1,7 @@
-"""The picture of one grain: its threshold by force law and by size."""
+"""One grain: its threshold by force law and by size."""
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -11,32 +12,57 @@ from matplotlib.figure import Figure as Canvas
 from orchestrator.physics import saltation
 from orchestrator.physics.curves import shao_lu, soulsby_whitehouse
 from orchestrator.physics.grain import Grain
-from orchestrator.report import answers, single
-from orchestrator.report.drawing import (
+from orchestrator.report import answers, sheets, single, style, theory, units
+from orchestrator.report.figures import Kind
+from orchestrator.report.results import Results, case_names
+from orchestrator.report.style import (
     ANSWER,
     FLOW,
-    GROUND,
     INK,
-    LINE,
+    MEASURED,
     NONE,
-    SMALL,
-    TEXT,
-    Head,
-    figure,
-    log_sizes,
-    margins,
+    RANGE,
+    Figure,
+    Look,
 )
-from orchestrator.report.style import Look
 from orchestrator.report.subjects import Quantity, is_gas
 from orchestrator.study.criterion import GOES_ON
 from orchestrator.tables.quoted import of_rows
 
 FEW = 13
 """Sizes of the curve of a grain that goes on where no table holds it."""
+CAPTION = (
+    "By law: orange, the answer; blue discs, other laws that hold; grey rings, laws "
+    "outside their range. By size: the same law, each size on its like. Dashed: "
+    "measured; shaded: the range of the sites in the field, or of 80 % of the flumes."
+)
 
 
-def of_grain(row: pd.Series) -> Head:
+def draw(results: Results) -> Iterator[Figure]:
     """Draw the threshold by every law, and by the law that answers for other sizes.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Yields
+    ------
+    Figure
+        One figure, of a study of one grain.
+    """
+    grains = sheets.single_grains(results)
+    is_one = results.joined("pile_threshold").empty and answers.is_one_grain(grains)
+    if is_one and not theory.are_many(results):
+        row = grains.iloc[0]
+        told = single.quantity(row)
+        title = f"The {told.name} that moves the grain, by force law and by size"
+        cases = case_names(grains)
+        yield Figure("grain", title, CAPTION, cases, of_grain(row), place="lead")
+
+
+def of_grain(row: pd.Series) -> Canvas:
+    """Draw the two panels of a grain.
 
     Parameters
     ----------
@@ -45,16 +71,10 @@ def of_grain(row: pd.Series) -> Head:
 
     Returns
     -------
-    Head
-        The picture.
+    matplotlib.figure.Figure
+        The drawing.
     """
     told = single.quantity(row)
-    title = f"The {told.name} that moves the grain, by force law and by size"
-    caption = (
-        "By law: orange, the answer; blue discs, other laws that hold; grey rings, "
-        "laws outside their range. By size: the same law, each size on its like."
-    )
-
     here = _other_sizes(row, 61)
     is_tabulated = saltation.is_tabulated(Grain.of_table(here))
     if row["criterion"] == GOES_ON and not is_tabulated.all():
@@ -63,24 +83,14 @@ def of_grain(row: pd.Series) -> Head:
     d = here["d_m"].to_numpy()
     found = of_rows(here)
     ustar = np.where(found["holds"], found["ustar"], np.nan)
-    computed = _told_by(here, ustar, told)
-    measured = _told_by(here, _curve(row, d), told)
+    computed = units.of_rows(here, ustar, told)
+    measured = units.of_rows(here, _curve(row, d), told)
     curves = pd.DataFrame({"mm": 1e3 * d, "computed": computed, "measured": measured})
-
-    def draw(narrow: bool) -> Canvas:
-        canvas = figure(narrow, 470 if narrow else 320)
-        shape = (2, 1) if narrow else (1, 2)
-        axes = canvas.subplots(*shape)
-        margins(canvas, 112, 10, 24, 28)
-        if narrow:
-            canvas.subplots_adjust(hspace=0.28)
-        else:
-            canvas.subplots_adjust(wspace=0.16)
-        _by_law(axes[0], row, told)
-        _by_size(axes[1], row, curves, told, narrow)
-        return canvas
-
-    return Head(draw, title, caption)
+    canvas = style.canvas(2.6)
+    left, right = canvas.subplots(1, 2)
+    _by_law(left, row, told)
+    _by_size(right, row, curves, told)
+    return canvas
 
 
 def _other_sizes(row: pd.Series, count: int) -> pd.DataFrame:
@@ -99,11 +109,10 @@ def _by_law(ax: Axes, row: pd.Series, told: Quantity) -> None:
     found.sort(key=lambda one: (one[0], one[1] if one[0] else -one[1]))
     asked = str(row["force_law"])
     measured = single.in_unit(row, single.measured_ustar(row, row["ustar0_m_s"]), told)
-    ax.grid(visible=True, axis="y")
     for place, (holds, value, name) in enumerate(found):
-        look: Look = {"ms": 6, "mew": 1.3}
+        look: Look = {"ms": 4.5, "mew": 1.0}
         if name == asked:
-            look |= {"ms": 9, "color": ANSWER}
+            look |= {"ms": 7, "color": ANSWER}
             is_left = value < measured
             ax.annotate(
                 f"{value:.3g}",
@@ -127,20 +136,20 @@ def _by_law(ax: Axes, row: pd.Series, told: Quantity) -> None:
     most = max(*shown, measured)
     ax.set_xlim(0.6 * least, 1.25 * most)
     ax.set_ylim(-0.6, len(found) - 0.2)
-    ax.set_title(f"{told.name.capitalize()} by force law, {told.unit}", x=-0.2)
+    ax.set_xlabel(f"{told.name} by force law, {told.unit}")
 
 
 def _measured_lines(ax: Axes, row: pd.Series, told: Quantity) -> None:
     """A dashed line where the threshold was measured, and the field's range."""
     ustar = float(row["ustar0_m_s"])
     measured = single.in_unit(row, single.measured_ustar(row, ustar), told)
-    ax.axvline(measured, color=INK, lw=1.4, ls=(0, (4, 2)), zorder=1)
+    ax.axvline(measured, color=INK, lw=1.1, ls=MEASURED, zorder=1)
     name = "wind tunnels" if is_gas(float(row["rho_f_kg_m3"])) else "flumes"
     look: Look = {
         "xycoords": ax.get_xaxis_transform(),
         "textcoords": "offset points",
         "va": "top",
-        "fontsize": SMALL,
+        "fontsize": 7,
     }
     ax.annotate(name, (measured, 1.0), xytext=(4, 0), **look)
     if not row["measured_rows"] > 0:
@@ -150,7 +159,7 @@ def _measured_lines(ax: Axes, row: pd.Series, told: Quantity) -> None:
         ratio = math.sqrt(float(theta) / _measured_theta(row))
         at = single.measured_ustar(row, ustar) * ratio
         ends.append(single.in_unit(row, at, told))
-    ax.axvspan(*ends, color=LINE, lw=0, zorder=0)
+    ax.axvspan(*ends, color=RANGE, lw=0, zorder=0)
     sites = "field" if is_gas(float(row["rho_f_kg_m3"])) else "80 %"
     ax.annotate(sites, (ends[0], 1.0), xytext=(-4, 0), ha="right", **look)
 
@@ -163,24 +172,22 @@ def _measured_theta(row: pd.Series) -> float:
     return density * ustar**2 / (weight * float(row["d_m"]))
 
 
-def _by_size(
-    ax: Axes, row: pd.Series, curves: pd.DataFrame, told: Quantity, narrow: bool
-) -> None:
+def _by_size(ax: Axes, row: pd.Series, curves: pd.DataFrame, told: Quantity) -> None:
     """The threshold by size: by the law where it holds, and by the published curve."""
     size = float(row["d_m"])
     mm, computed, measured = curves.to_numpy().T
-    ax.plot(mm, computed, color=ANSWER, lw=2)
-    ax.plot(mm, measured, color=INK, lw=1.2, ls=(0, (4, 2)))
+    ax.plot(mm, computed, color=ANSWER, lw=1.5)
+    ax.plot(mm, measured, color=INK, lw=1.1, ls=MEASURED)
     value = single.in_unit(row, float(row["ustar0_m_s"]), told)
-    ax.plot([1e3 * size], [value], "o", color=ANSWER, ms=8, mec=GROUND)
+    ax.plot([1e3 * size], [value], "o", color=ANSWER, ms=6, mec="white")
     # both curves rise to the right: what is below them is free there
     is_below = value < measured[len(measured) // 2]
-    below: Look = {"textcoords": "offset points", "fontsize": TEXT}
+    below: Look = {"textcoords": "offset points"}
     below |= {"xytext": (8, -6), "va": "top"}
     above = {**below, "xytext": (-8, 6), "va": "bottom", "ha": "right"}
     bold: Look = {"color": ANSWER, "weight": "bold"}
     ax.annotate(
-        f"{value:.3g}" if narrow else f"this grain: {value:.3g}",
+        f"this grain: {value:.3g}",
         (1e3 * size, value),
         **(below if is_below else above),
         **bold,
@@ -188,17 +195,9 @@ def _by_size(
     name = "wind tunnels" if is_gas(float(row["rho_f_kg_m3"])) else "flumes"
     at = 11 * len(mm) // 15
     ax.annotate(name, (mm[at], measured[at]), **(above if is_below else below))
-    log_sizes(ax)
-    ax.set_ylim(0, None)
-    long = f"The same for other sizes (mm), {told.unit}"
-    ax.set_title(f"By size (mm), {told.unit}" if narrow else long)
-
-
-def _told_by(rows: pd.DataFrame, ustar: Any, told: Quantity) -> list[float]:
-    """Friction velocities of rows (m/s) in the unit of a quantity."""
-    records = rows.to_dict("records")
-    pairs = zip(records, ustar, strict=True)
-    return [single.in_unit(row, float(one), told) for row, one in pairs]
+    style.log_sizes(ax)
+    ax.set(ylim=(0, None), xlabel="the same for other sizes, mm")
+    ax.set_ylabel(f"{told.name}, {told.unit}")
 
 
 def _curve(row: pd.Series, d: Any) -> Any:
@@ -207,3 +206,6 @@ def _curve(row: pd.Series, d: Any) -> Any:
     if is_gas(float(row["rho_f_kg_m3"])):
         return shao_lu(grain)
     return grain.ustar_at(soulsby_whitehouse(grain.dimensionless_diameter))
+
+
+FIGURE = Kind(order=20, draws=draw, needs=("single_grain",))

@@ -1,7 +1,7 @@
 """The picture of a bed with its grains and the flow, with a slider over the flow."""
 
 import base64
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -17,10 +17,12 @@ from orchestrator.digits import percent
 from orchestrator.grains import motion
 from orchestrator.grains import pile as piles
 from orchestrator.grains.pile import Pile
-from orchestrator.report import flows, labels, single
-from orchestrator.report.page import caption, fill
+from orchestrator.report import labels, single, solved, units
+from orchestrator.report.figures import Kind
+from orchestrator.report.page import fill, written
 from orchestrator.report.results import FRACTION, Results, split
 from orchestrator.report.style import Figure
+from orchestrator.runs.case import Case
 from orchestrator.solvers.dem import ENGINE
 from orchestrator.study import fields
 from orchestrator.types import FloatArray, IntArray
@@ -38,6 +40,18 @@ SHIFT = 0.02
 """Grains that have moved by less since they were last drawn stay, d."""
 BARS = (1, 2, 5, 10, 20, 50, 100)
 """Lengths of the bar of scale, d."""
+CAPTION = """\
+After Fig. 13 of the paper. Grains {% if width %}of all rows of a strip of {{
+"%g"|format(width) }} d, from the side, {% endif %} {% if by_dem %} at the end of a load
+step. Orange: has moved, by {{ criterion }} downstream along the bed. Pale orange: has
+left the box; drawn at its first place. {% else %} as they were packed. Orange: has
+moved at this flow, by {{ method }}, a method without dynamics. {% endif %} Pale yellow:
+exposed, has not moved. Beige: mobile, under the exposed grains. Grey: fixed. {% if flow
+%} The shade of blue is the speed of the flow by OpenFOAM over the bed without grains,
+relative to that of the approaching flow at 10 h. {% endif %} {% if update %} Blue line:
+the bed line, drawn anew after each {{ "%.0f"|format(100 * update) }} % of the grains.
+Pale: has gone; drawn at its first place. {% endif %} d is one diameter. {{ properties
+}}. {{ part }}"""
 
 
 @dataclass(frozen=True)
@@ -190,7 +204,8 @@ def _stops(moved: motion.Motion) -> IntArray:
 def chosen(results: Results) -> Iterator[tuple[pd.Series, Pile]]:
     """List the thresholds that the sentences are about, one for each slope.
 
-    Where the files of a pile were pruned, the next one has its place.
+    Poured beds have one for each slope and method, whose grains go otherwise. Where the
+    files of a pile were pruned, the next one has its place.
 
     Parameters
     ----------
@@ -204,8 +219,13 @@ def chosen(results: Results) -> Iterator[tuple[pd.Series, Pile]]:
     pile : Pile
         The pile that shows it.
     """
-    for _, rows in split(results.exemplars, "alpha_deg"):
-        for _, row in rows.iterrows():
+    rows = results.exemplars
+    if rows.empty:
+        return
+    is_poured = rows["packing"] == "poured"
+    rows = rows.assign(by=rows["method"].where(is_poured, ""))
+    for _, alike in split(rows, "alpha_deg", "by"):
+        for _, row in alike.iterrows():
             shown = results.shown(str(row["scene_id"]))
             if shown and shown[0].length:
                 yield row, shown[0]
@@ -225,28 +245,46 @@ def draw(results: Results) -> Iterator[Figure]:
     Figure
         By rising slope; the first stands for the study.
     """
-    if results.exemplars.empty:
-        return
     telling = labels.varying(results.exemplars, "alpha_deg", "d_m")
-    for number, (row, pile) in enumerate(chosen(results)):
+    seen: set[str] = set()
+    for row, pile in chosen(results):
         steps = read(pile, results.cases)
         shown = steps.first(FRACTION)
         share = percent(steps.totals[shown] / pile.packing.count)
         told = ", ".join(labels.told(row, ["alpha_deg", "d_m", *telling]))
-        image = _svg(steps, shown, results.cases).encode()
         told_by = single.quantity(row)
-        flows = [single.in_unit(row, flow, told_by) for flow in steps.flow.tolist()]
+        flows = units.of_row(row, steps.flow, told_by)
+        name = f"bed-alpha{pile.bed.slope_deg:g}"
+        if name in seen:
+            name = f"{name}-{row['method']}"
         yield Figure(
-            name=f"bed-alpha{pile.bed.slope_deg:g}",
+            name=name,
             title=f"The bed when {share} of its grains have moved, {told}",
             caption=words(results, pile),
             cases=tuple(run.name for run in reversed(pile.runs)),
             drawing=None,
-            image=image,
-            data=data(steps, shown, np.array(flows), told_by.unit),
-            fold=number > 0,
-            leads=number == 0,
+            image=_svg(steps, shown, results.cases).encode(),
+            data=data(steps, shown, flows, told_by.unit),
+            place="" if seen else "lead",
+            follows="Fig. 13",
         )
+        seen.add(name)
+
+
+def files(results: Results) -> Sequence[Case]:
+    """List the cases of the beds that are drawn.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Returns
+    -------
+    list of Case
+        The cases.
+    """
+    return [run for _, pile in chosen(results) for run in pile.runs]
 
 
 def words(results: Results, pile: Pile) -> str:
@@ -272,8 +310,8 @@ def words(results: Results, pile: Pile) -> str:
         used = fields.COLUMNS[column].used(pile.scene)
         if used is not None:
             properties.append(labels.plain(column, used))
-    return caption(
-        "bed",
+    return written(
+        CAPTION,
         width=pile.bed.width,
         by_dem=_follows_dem(pile),
         flow=bool(pile.model.cases),
@@ -355,7 +393,7 @@ def _paths(steps: Steps) -> list[list[Any]]:
     return paths
 
 
-def window(pile: Pile) -> tuple[flows.Window, str]:
+def window(pile: Pile) -> tuple[solved.Window, str]:
     """Choose what of a bed the picture shows.
 
     Parameters
@@ -393,7 +431,7 @@ def _svg(steps: Steps, shown: int, cases: Path) -> str:
     lines = [path for stop, path in paths if stop <= shown]
     first = paths[0][1].removeprefix("M")
     return fill(
-        "bed.svg.j2",
+        "figures/bed.svg.j2",
         left=left,
         right=right,
         top=top,
@@ -440,9 +478,9 @@ def _circles(centres: FloatArray, radii: FloatArray) -> list[tuple[str, str, str
     return [(f"{x:.2f}", f"{y:.2f}", f"{r:.3g}") for x, y, r in rows.tolist()]
 
 
-def _flow(pile: Pile, cases: Path, frame: flows.Window) -> str:
+def _flow(pile: Pile, cases: Path, frame: solved.Window) -> str:
     """The flow's speed as a pale picture, PNG in base64."""
-    velocity = flows.over_u_e(pile, cases, frame, pile.scene.grain.diameter)
+    velocity = solved.over_u_e(pile, cases, frame, pile.scene.grain.diameter)
     speed = np.linalg.norm(velocity, axis=-1)[::-1]
     is_outside = np.isnan(speed)
     levels = np.where(is_outside, 255, 254 * np.clip(np.nan_to_num(speed), 0, 1))
@@ -452,3 +490,6 @@ def _flow(pile: Pile, cases: Path, frame: flows.Window) -> str:
     out = BytesIO()
     picture.save(out, "PNG", transparency=255)
     return base64.b64encode(out.getvalue()).decode("ascii")
+
+
+FIGURE = Kind(order=50, draws=draw, needs=("pile_threshold",), files=files)

@@ -1,0 +1,68 @@
+"""Beds: Shields diagrams by slope, as Figs. 15 and 16 of the paper."""
+
+from collections.abc import Iterator
+
+from orchestrator.report import labels, shields, style
+from orchestrator.report.figures import Kind
+from orchestrator.report.figures.shields import FEW
+from orchestrator.report.page import written
+from orchestrator.report.results import Results, case_names, drawable, split
+from orchestrator.report.style import Figure
+
+CAPTION = """\
+{% from "captions.j2" import laws, protocol, hollow, low_regime, references %} After
+Figs. 15 and 16 of the paper. A marker shows the mean wall stress over the grains that
+had moved when they first were the fraction n/N of the counted ones; Re* is that of this
+stress. A fraction that was not reached has no marker. Thin lines join beds that differ
+in d alone. A bar holds the step between two flows and the resolution of the count,
+which is half a grain. A bar leaves the frame where half a grain more was not reached.
+Black: the closed form of one grain at the same slope, entrainment angle and z₀/d. A
+line ends where its force law does. It is dotted where this study has grains beyond the
+law {%- if about.pair %}; the Re* of such a grain can lie outside the shaded range by
+one of the two laws{% endif %}. Force laws: {{ laws(about) }}. {{ protocol(answers) }}
+{{ hollow(answers) }} {{ low_regime(about) }} {{ references(about) }}"""
+FOLLOWED = {"d/10": "Fig. 15", "d/30": "Fig. 16"}
+"""Figures of the paper, by the roughness."""
+
+
+def draw(results: Results) -> Iterator[Figure]:
+    """Make the extended Shields diagrams by slope.
+
+    Parameters
+    ----------
+    results
+        The study.
+
+    Yields
+    ------
+    Figure
+        The figures for each z0/d.
+    """
+    every = results.joined("pile_threshold")
+    reached = every[drawable(every, "reynolds", "shields")]
+    if reached.empty:
+        return
+    colours = style.palette("fraction", sorted(set(reached["fraction"])))
+    has_one_slope = reached["alpha_deg"].nunique() == 1
+    # the one diagram shows all of few piles on one slope
+    is_shown = has_one_slope and every["scene_id"].nunique() <= FEW
+    smoothest = reached["z0_over_d"].min()
+    for (ratio,), rows in split(reached, "z0_over_d"):
+        written_ = labels.ratio_of(float(str(ratio)), "d")
+        stem = f"extended-shields-{written_}".replace("/", "").replace(" ", "")
+        for sheet, shown, drawing in shields.panels(rows, "fraction", colours):
+            is_further = bool(sheet.name)
+            is_folded = is_further or is_shown or ratio != smoothest
+            about = shields.about(sheet.rows)
+            yield Figure(
+                stem + sheet.name,
+                f"Thresholds of beds by slope, z₀ = {written_}{sheet.title}",
+                written(CAPTION, about=about, answers=shields.about(shown)),
+                case_names(shown),
+                drawing,
+                place="folded" if is_folded else "",
+                follows="" if is_further else FOLLOWED.get(written_, ""),
+            )
+
+
+FIGURE = Kind(order=110, draws=draw, needs=("pile_threshold",))

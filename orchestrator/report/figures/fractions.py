@@ -1,0 +1,234 @@
+"""The part of the grains that has moved, against the flow, its stress, or its Re*."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Canvas
+
+from orchestrator.digits import percent
+from orchestrator.report import (
+    answers,
+    labels,
+    sheets,
+    shields,
+    single,
+    style,
+    theory,
+    units,
+)
+from orchestrator.report.figures import Kind
+from orchestrator.report.page import written
+from orchestrator.report.results import Results, case_names, drawable, seeds_of, split
+from orchestrator.report.style import ANSWER, INK, MEASURED, Figure, Look
+
+Along = Literal["shields", "reynolds"]
+SHOWN_UP_TO = 0.9
+"""n/N up to which the axis of the stress holds every curve."""
+MARKERS = 30
+"""Largest number of markers of a curve: peeling gives one for each grain."""
+AXES: Mapping[Along, str] = {"shields": labels.TAU_AXIS, "reynolds": labels.RE_AXIS}
+ENDINGS: Mapping[Along, tuple[str, str, str]] = {
+    "shields": ("", "", "Fig. 14, right"),
+    "reynolds": ("-reynolds", " against Re*", "Fig. 14, left"),
+}
+"""Endings of names and titles, and the figure of the paper."""
+COMPUTED: Look = {"label": "computed", "color": ANSWER, "lw": 1.5}
+BESIDE: Look = {
+    "label": "with the measured threshold",
+    "color": INK,
+    "lw": 1.0,
+    "ls": MEASURED,
+}
+SLOPE_OF_PAPER = 15.0
+"""Slope of the pile of Fig. 14, degrees."""
+OF_THE_CARD = """\
+How the part that has moved grows with the {{ told }}. {% if seeds %}Thin: other beds
+that differ in chance alone; disc: their mean.{% endif %} {% if measured %}Dashed: with
+the measured threshold of one grain.{% endif %}"""
+CAPTION = """\
+{% from "captions.j2" import laws, protocol, hollow, low_regime %} After Fig. 14 of the
+paper. Each marker is a flow: the fraction of the N(d) exposed grains that had moved,
+against {{ {"shields": "τ", "reynolds": "Re*"}[along] }} of the mean wall stress over
+these grains, as in the paper. The mean falls where the next grains to move feel less
+stress. Above n/N = 90 % a curve may leave the frame. Forces: {{ laws(about, "Between
+the two") }}. {{ protocol(about) }} {{ hollow(about) }} {{ low_regime(about) }}"""
+
+
+def draw(results: Results) -> Iterator[Figure]:
+    """Draw the part that has moved of the bed of the card, and of all beds.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Yields
+    ------
+    Figure
+        That of the card, then those of each slope: against the Shields number as the
+        right half of Fig. 14 of the paper, against Re* as the left one.
+    """
+    yield from _of_the_card(results)
+    yield from _of_all(results, "shields")
+    yield from _of_all(results, "reynolds")
+
+
+def _of_the_card(results: Results) -> Iterator[Figure]:
+    """The curve of one bed against the flow that its card tells."""
+    rows = results.exemplars
+    is_other = theory.are_many(results) or answers.is_of_hills(results)
+    if rows.empty or is_other or sheets.sizes(results) is not None:
+        return
+    if answers.are_several_beds(results.at_fraction):
+        return
+    row = rows.iloc[0]
+    told = single.quantity(row).name
+    others = seeds_of(row, results.at_fraction)
+    has_measured = not single.is_level(row)
+    title = f"The part of the grains that has moved, against the {told}"
+    text = written(OF_THE_CARD, told=told, seeds=others, measured=has_measured)
+    cases = tuple(run.name for run in results.plan.piles[str(row["scene_id"])].runs)
+    drawing = _draw_card(row, others, results.tables["pile_curve"])
+    yield Figure("share", title, text, cases, drawing, place="under")
+
+
+def _draw_card(row: pd.Series, others: Sequence[str], table: pd.DataFrame) -> Canvas:
+    """The curves of a bed and of those that differ in chance alone, and its answer."""
+    told = single.quantity(row)
+    canvas = style.canvas(1.7)
+    ax = canvas.subplots()
+    table = table[np.isfinite(table["ustar0_m_s"]) & (table["ustar0_m_s"] > 0)]
+    alike: Look = {"label": "beds that differ in chance", "color": ANSWER, "lw": 0.6}
+    for scene in others:
+        points = table[table["scene_id"] == scene]
+        flow = units.of_row(row, points["ustar0_m_s"], told)
+        _draw_curve(ax, flow, points["fraction_moved"], alike)
+    points = table[table["scene_id"] == row["scene_id"]]
+    moved = points["fraction_moved"]
+    factors = [(1.0, COMPUTED)]
+    if not single.is_level(row):
+        factors.append((units.measured_over_computed(row), BESIDE))
+    at = single.in_unit(row, float(row["ustar0_m_s"]), told)
+    reach = [at]
+    for factor, look in factors:
+        flow = units.of_row(row, factor * points["ustar0_m_s"], told)
+        _draw_curve(ax, flow, moved, look)
+        reach += _reach(flow, moved)
+    fraction = float(row["fraction"])
+    ax.plot([at], [fraction], "o", color=ANSWER, ms=6, mec="white", gid="card")
+    bold: Look = {"textcoords": "offset points", "color": ANSWER, "weight": "bold"}
+    text = f"{percent(fraction)} at {at:.3g} {told.unit}"
+    ax.annotate(text, (at, fraction), xytext=(7, -8), **bold)
+    ax.set(xlim=(0.9 * min(reach), 1.02 * max(reach)), ylim=(0, 1), ylabel="n/N")
+    ax.set_xlabel(f"{told.name}, {told.unit}")
+    ax.legend(handles=style.samples([ax]), loc="upper left")
+    return canvas
+
+
+def _reach(flow: Any, moved: pd.Series) -> list[float]:
+    """The flow of the first grain that has moved, and that of the last."""
+    share = moved.to_numpy(float)
+    if not (share > 0).any():
+        return []
+    is_last = share >= 0.999 * share.max()
+    return [float(flow[share > 0].min()), float(flow[is_last].min())]
+
+
+def _of_all(results: Results, along: Along) -> Iterator[Figure]:
+    """The figures of n/N along a column of the curves, for each slope."""
+    curves = _curves(results)
+    scenes = results.scenes[results.scenes["scene_id"].isin(curves)]
+    piles = results.beds("pile")
+    sizes_of_slopes = scenes.groupby("alpha_deg")["d_m"].nunique()
+    has_one_size = (sizes_of_slopes == 1).all()
+    by = "nu_m2_s" if has_one_size and piles["nu_m2_s"].nunique() > 1 else "d_m"
+    # of the piles alone: single grains have more diameters than there are colours
+    colours = style.palette(by, sorted(set(piles[by])))
+    least = scenes["alpha_deg"].min()
+    for (alpha,), of_slope in split(scenes, "alpha_deg"):
+        for figure in _of_slope(of_slope, curves, by, colours, along):
+            is_shown = figure.place == "" and alpha == least and along == "shields"
+            yield replace(figure, place="" if is_shown else "folded")
+
+
+def _of_slope(
+    scenes: pd.DataFrame,
+    curves: Mapping[str, pd.DataFrame],
+    by: str,
+    colours: Mapping[float, str],
+    along: Along,
+) -> Iterator[Figure]:
+    """The figures of one slope, of which further panels are folded."""
+    choices, rows = shields.parted(scenes, "alpha_deg", "z0_over_d", "force_law", by)
+    alpha = float(scenes["alpha_deg"].iloc[0])
+    slope = labels.plain("alpha_deg", alpha)
+    name, title, follows = ENDINGS[along]
+    is_of_paper = np.isclose(alpha, SLOPE_OF_PAPER)
+    keys = ["z0_over_d", *choices]
+    for sheet in shields.sheets(rows, keys, 2.3, AXES[along], "n/N"):
+        yield Figure(
+            name=f"fractions{name}-alpha{alpha:g}{sheet.name}",
+            title=f"Fraction of moving grains{title}, {slope}{sheet.title}",
+            caption=written(CAPTION, about=shields.about(sheet.rows), along=along),
+            cases=case_names(sheet.rows),
+            drawing=partial(_draw_panels, sheet, curves, by, colours, along),
+            place="folded" if sheet.name else "",
+            follows=follows if is_of_paper and not sheet.name else "",
+        )
+
+
+def _curves(results: Results) -> dict[str, pd.DataFrame]:
+    """The points of each pile's curve that have a place on the axes, by scene."""
+    table = results.tables["pile_curve"]
+    points = table[(table["moved"] > 0) & drawable(table, "shields")]
+    return {str(scene_id): rows for (scene_id,), rows in split(points, "scene_id")}
+
+
+def _draw_panels(
+    sheet: shields.Sheet,
+    curves: Mapping[str, pd.DataFrame],
+    by: str,
+    colours: Mapping[float, str],
+    along: Along,
+) -> Canvas:
+    """Draw the curves of a sheet along a column, in colours by another.
+
+    A curve is hollow where its force law does not hold.
+    """
+    _, axes = sheet.panels()
+    for ax, rows in zip(axes, sheet.parts, strict=True):
+        for _, pile in rows.iterrows():
+            points = curves[pile["scene_id"]]
+            look: Look = {"color": colours[float(pile[by])], "lw": 0.8}
+            look |= {"marker": str(pile[shields.SHAPE]), "label": pile[shields.LABEL]}
+            look["gid"] = str(pile["scene_id"])
+            if not pile["law_holds"]:
+                look |= {"mfc": "white", "label": "hollow: the force law does not hold"}
+            _draw_curve(ax, points[along], points["fraction_moved"], look)
+    # the last grains of a pile may wait for a hundred times the stress of the others
+    points = pd.concat([curves[scene_id] for scene_id in sheet.rows["scene_id"]])
+    last = max(SHOWN_UP_TO, points["fraction_moved"].min())
+    early = points[along][points["fraction_moved"] <= last]
+    # the panels share the axes
+    axes[0].set(
+        xscale="log",
+        xlim=(early.min() / 1.2, 1.2 * early.max()),
+        ylim=(0, 1),
+    )
+    for ax in axes:
+        style.plain_ticks(ax.xaxis)
+    return shields.legends(sheet, by, colours)
+
+
+def _draw_curve(ax: Axes, x: Any, moved: pd.Series, look: Look) -> None:
+    """Draw the curve of one bed, with some of its flows as markers."""
+    some = -(-len(moved) // MARKERS)
+    ax.plot(x, moved, **{"ms": 3, "mew": 0.7, "markevery": some, **look})
+
+
+FIGURE = Kind(order=70, draws=draw, needs=("pile_curve", "pile_threshold"))

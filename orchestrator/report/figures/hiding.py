@@ -1,0 +1,117 @@
+"""Hiding and exposure: thresholds of size classes over that of the median size."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+
+from orchestrator.physics import measured
+from orchestrator.report import shields, style
+from orchestrator.report.figures import Kind
+from orchestrator.report.results import Results, case_names, split
+from orchestrator.report.style import Figure
+from orchestrator.types import FloatArray
+
+HIDING_AXES = ("dᵢ/d₅₀", "$τ_c$ of the size over that of d₅₀")
+
+
+def _wilcock_crowe(size: FloatArray) -> Any:
+    """Shields number of a size over that of d50, by Wilcock and Crowe."""
+    return measured.wilcock_crowe_hiding(size) / size
+
+
+def _one_stress(size: FloatArray) -> Any:
+    """Shields number of a size over that of d50 if one stress moves all sizes."""
+    return 1 / size
+
+
+HIDING: tuple[tuple[str, Callable[[Any], Any], str], ...] = (
+    ("Wilcock and Crowe", _wilcock_crowe, "-"),
+    ("Egiazaroff", measured.egiazaroff_hiding, "--"),
+    ("one stress moves all sizes", _one_stress, ":"),
+)
+"""Published functions of the size: label, function and dash of a line."""
+CAPTION = (
+    "The Shields number of a size class, in its own diameter, at which a fraction of "
+    "its exposed grains has moved, over that at d₅₀, which lies between two classes. "
+    "Markers: geometric mean over the beds of the study. Bars: the range of these "
+    "beds, and the part that the number of grains in the class leaves to chance (80 "
+    "%); a bar leaves the frame where too few grains give no bound. Hollow: fewer "
+    "than ten grains. Lines: published hiding functions, which are for flow over beds "
+    "in space and for transport rates, not for first motion."
+)
+
+
+def draw(results: Results) -> Iterator[Figure]:
+    """Draw thresholds of size classes over that of the median size, by method.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Yields
+    ------
+    Figure
+        One figure, of a study with mixtures.
+    """
+    rows = results.joined("size_class")
+    is_known = rows["hiding"].notna() & (rows["size_over_d"] != 1)
+    if not is_known.any():
+        return
+    keys = ["method"]
+    (sheet,) = shields.sheets(rows, keys, 2.7, *HIDING_AXES, columns=3)
+    colours = style.palette("fraction", sorted(set(rows["fraction"])))
+    known = rows[["hiding", "hiding_low", "hiding_high"]].to_numpy(float)
+    known = known[np.isfinite(known) & (known > 0)]
+    _, axes = sheet.panels()
+    for ax, part in zip(axes, sheet.parts, strict=True):
+        part = part[part["hiding"] > 0]
+        for (fraction,), of_fraction in split(part, "fraction"):
+            _draw_classes(ax, of_fraction, colours[float(str(fraction))])
+        sizes = part["size_over_d"]
+        ratio = np.geomspace(min(sizes.min(), 0.5), max(sizes.max(), 2), 99)
+        for label, formula, dash in HIDING:
+            ax.plot(ratio, formula(ratio), color="0.3", ls=dash, lw=1, label=label)
+        ax.set(xscale="log", yscale="log", ylim=(known.min() / 1.5, 1.5 * known.max()))
+        style.plain_ticks(ax.xaxis)
+        style.plain_ticks(ax.yaxis)
+    yield Figure(
+        name="hiding",
+        title="Hiding and exposure of sizes",
+        caption=CAPTION,
+        cases=case_names(rows),
+        drawing=shields.legends(sheet, "fraction", colours),
+    )
+
+
+def _draw_classes(ax: Axes, rows: pd.DataFrame, colour: str) -> None:
+    """Draw the means of size classes with intervals, hollow where grains are few."""
+    number = np.rint(np.log(rows["size_over_d"]) / np.log(np.sqrt(2)))
+    logs = rows[["size_over_d", "hiding"]].map(np.log)
+    mean = np.exp(logs.groupby(number).mean())
+    classes = rows.groupby(number)
+    # an end that is not known is beyond the frame
+    low = classes["hiding_low"].min(skipna=False).fillna(0.0)
+    high = classes["hiding_high"].max(skipna=False).fillna(shields.BEYOND)
+    ax.errorbar(
+        mean["size_over_d"],
+        mean["hiding"],
+        # of one class the mean is an end but for its last digit
+        yerr=[
+            (mean["hiding"] - low).clip(lower=0.0),
+            (high - mean["hiding"]).clip(lower=0.0),
+        ],
+        marker="o",
+        ms=4,
+        lw=0.8,
+        capsize=2,
+        color=colour,
+    )
+    few = mean[classes["few"].any()]
+    ax.plot(few["size_over_d"], few["hiding"], "o", ms=3, color="white", zorder=3)
+
+
+FIGURE = Kind(order=140, draws=draw, needs=("size_class",))

@@ -1,0 +1,84 @@
+"""The sizes of a mixture: the stress that moves each, beside the measured hiding."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure as Canvas
+
+from orchestrator.digits import percent
+from orchestrator.physics.grain import Grain
+from orchestrator.report import answers, sheets, style, theory
+from orchestrator.report.figures import Kind
+from orchestrator.report.results import Results, case_names
+from orchestrator.report.style import ANSWER, INK, PALE, Figure
+
+CAPTION = (
+    "Orange: computed, with the interval that so few grains leave; rings: fewer than "
+    "ten grains. Squares: the function that Wilcock and Crowe (2003) fitted to "
+    "transport, at the measured stress of d50. Dotted: all sizes together. An "
+    "interval that reaches the frame is open."
+)
+
+
+def draw(results: Results) -> Iterator[Figure]:
+    """Draw the stress that moves each size of the mixture of the card.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Yields
+    ------
+    Figure
+        One figure, or none.
+    """
+    rows = results.exemplars
+    if rows.empty or theory.are_many(results) or sheets.sizes(results) is None:
+        return
+    row = rows.iloc[0]
+    classes = results.joined("size_class")
+    here = classes[classes["fraction"] == row["fraction"]]
+    here = here[here["scene_id"] == row["scene_id"]].sort_values("size_over_d")
+    title = f"The stress that moves {percent(row['fraction'])} of each size"
+    drawing = _sizes(row, here)
+    names = case_names(rows[:1])
+    yield Figure("sizes", title, CAPTION, names, drawing, place="under")
+
+
+def _sizes(row: pd.Series, here: pd.DataFrame) -> Canvas:
+    """A line for each size: its interval, its stress, and the measured one."""
+    weight = Grain.of_table(row).layer_weight * here["size_over_d"].to_numpy(float)
+    value = weight * here["shields_own"].to_numpy(float)
+    low = weight * here["shields_own_low"].to_numpy(float)
+    high = weight * here["shields_own_high"].to_numpy(float)
+    few = here["few"].to_numpy(bool)
+    measured = [answers.measured_of_size(row, size) for size in here["size_over_d"]]
+    at = float(row["rho_f_kg_m3"]) * float(row["ustar0_m_s"]) ** 2
+    top = 1.15 * np.nanmax([*value[np.isfinite(value)], *measured, at])
+    count = len(here)
+    places = np.arange(count)[::-1]
+    canvas = style.canvas(0.6 + 0.2 * count)
+    ax = canvas.subplots()
+    right = np.nan_to_num(high, nan=2 * top)
+    ax.hlines(places, np.nan_to_num(low), right, color=PALE, lw=8, zorder=1)
+    ax.plot(value[~few], places[~few], "o", color=ANSWER, ms=6)
+    ax.plot(value[few], places[few], "o", color=ANSWER, mfc="white", mew=1.4, ms=6)
+    ax.plot(measured, places, "s", color=INK, ms=5)
+    ax.axvline(at, color=ANSWER, lw=1, ls=":", zorder=0.5)
+    ax.set_yticks(places, _names(float(row["d_m"]), here))
+    ax.set(xlim=(0, top), ylim=(-0.6, count - 0.4), xlabel="stress on the bed, Pa")
+    return canvas
+
+
+def _names(d: float, here: pd.DataFrame) -> list[str]:
+    """Each size with the number of its grains."""
+    names = []
+    for size, count in zip(here["size_over_d"], here["count"], strict=True):
+        grains = f"{count:.0f} grains" if count != 1 else "1 grain"
+        names.append(f"{1e3 * d * size:.3g} mm, {grains}")
+    return names
+
+
+FIGURE = Kind(order=80, draws=draw, needs=("size_class", "pile_threshold"))
