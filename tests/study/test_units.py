@@ -230,3 +230,32 @@ def test_a_misspelt_preset_is_named(name: str) -> None:
     near = {"stockpiles": "stockpile"}.get(name, "first-look")
     with pytest.raises(InputError, match=f"did you mean {near}\\?"):
         study.load(name)
+
+
+KNOWN_UNITS = {
+    "m": 1.0,
+    "km": 1000.0,
+    "cm": 0.01,
+    "mm": 0.001,
+    "um": 0.000001,
+    "\u00b5m": 0.000001,
+    "\u03bcm": 0.000001,
+    "kg/m3": 1.0,
+    "kg/m\u00b3": 1.0,
+    "g/cm3": 1000.0,
+    "g/cm\u00b3": 1000.0,
+    "m/s": 1.0,
+    "cm/s": 0.01,
+    "m2/s": 1.0,
+    "m\u00b2/s": 1.0,
+    "deg": 1.0,
+    "\u00b0": 1.0,
+    "rad": 57.29577951308232,
+}
+"""What one of each is in the units of a study file (SI brochure, 9th edition)."""
+
+
+def test_every_unit_has_the_factor_of_its_definition() -> None:
+    assert pytest.approx(KNOWN_UNITS, rel=1e-15) == units.TO_SI
+    for unit, factor in KNOWN_UNITS.items():
+        assert units.meant(f"2.5 {unit}").startswith(f"write {2.5 * factor:.9g}, ")

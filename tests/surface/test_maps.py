@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.text import Text
+from matplotlib.text import Annotation, Text
 
 from orchestrator.report import style
 from orchestrator.surface import maps
@@ -93,3 +93,27 @@ def test_a_figure_is_no_wider_and_no_higher_than_its_map(
     # what is left is for labels, the title and the scale of colours
     room = canvas.bbox.width - box.width, canvas.bbox.height - box.height
     assert max(room) < 1.9 * canvas.dpi
+
+
+@pytest.mark.parametrize(
+    ("from_deg", "east", "north"),
+    [(270.0, 1, 0), (0.0, 0, -1), (90.0, -1, 0), (225.0, 1, 1), (150.0, -1, 1)],
+)
+def test_the_arrow_of_the_wind_points_to_where_it_blows(
+    from_deg: float, east: int, north: int
+) -> None:
+    of = grid()
+    values = of.of_faces(faces(), ["stress"])["stress"]
+    with style.settings():
+        canvas = maps.figure(of, [Map("one", values, from_deg)], "stress", middle=2.0)
+    first, *_ = canvas.axes
+    arrows = [
+        each
+        for each in first.texts
+        if isinstance(each, Annotation) and each.get_gid() == "arrow"
+    ]
+    # the others point to the north
+    wind = min(arrows, key=lambda each: each.xy[0])
+    (x0, y0), (x1, y1) = wind.xyann, wind.xy
+    signs = [0 if abs(way) < 1e-9 else np.sign(way) for way in (x1 - x0, y1 - y0)]
+    assert signs == [east, north]
