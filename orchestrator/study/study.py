@@ -8,7 +8,6 @@ import itertools
 import math
 import os
 import warnings
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -26,7 +25,7 @@ from orchestrator.study import units
 from orchestrator.study.closed_form import resolved
 from orchestrator.study.declare import List, Part, UnfitError
 from orchestrator.study.fidelities import AUTO, fields_of
-from orchestrator.study.fields import FIELDS, PARTS, SEED, default_of
+from orchestrator.study.fields import FIELDS, PARTS, SEED, Quantity, default_of
 from orchestrator.study.hints import HINTS
 from orchestrator.study.keys import Table, Tables, by_name, nested
 from orchestrator.study.models import FLAT
@@ -36,6 +35,7 @@ from orchestrator.study.reading import (
     CONFIRMED,
     TIME_LIMIT_S,
     Given,
+    Hint,
     Numbers,
     Point,
     explained,
@@ -106,163 +106,58 @@ S = TypeVar("S", bound=Point, default=Scene)
 """The scenes of a kind of beds, by default those of the core."""
 
 
-class Kind(ABC, Generic[S]):
+def _alone(scenes: Sequence[S]) -> Iterator[Sequence[S]]:
+    """Each scene, which answers itself."""
+    for scene in scenes:
+        yield [scene]
+
+
+@dataclass(frozen=True)
+class Kind(Generic[S]):
     """A kind of beds: how a study file on them becomes scenes.
 
     The core has `PLANE`, a guest may offer another one.
 
     Attributes
     ----------
+    tables
+        The tables of such a file.
+    make
+        Makes a scene of its tables, the name of the file for messages (`where`) and the
+        files that the tables may name (`files`).
+    check
+        Refuses beds that are likelier in millimetres, and what does not go together,
+        by the keys at the top, the groups, and the name of the file; returns what is
+        asked of files that stand beside the tables of a scene.
+    hint
+        What is said of an unknown key.
+    fields
+        Fields that are refused where they have no effect.
+    resolved
+        Decides what the scenes of a study leave open: the scenes that answer each.
+    with_files
+        Reads the files that are named beside the tables of a scene: the tables of the
+        file with what was read in place of names.
     file
         The keys at the top of such a file.
-    tables
-        Its tables.
     without
-        Keys at the top that beds in a plane alone have.
+        Those that beds in a plane alone have.
     most
         Most scenes of a study.
     """
 
-    file: type[File] = File
     tables: Mapping[str, type[Part]]
+    make: Callable[..., S]
+    check: "Callable[[File, Sequence[Group[S]], str], list[units.Remark]]"
+    hint: Hint
+    fields: Sequence[Quantity] = ()
+    resolved: Callable[[Sequence[S]], Iterator[Sequence[S]]] = _alone
+    with_files: Callable[[Mapping[str, Any], str, Files], Mapping[str, Any]] = (
+        lambda data, where, files: data
+    )
+    file: type[File] = File
     without: Sequence[str] = ()
     most: int = MOST_SCENES
-
-    def with_files(
-        self, data: Mapping[str, Any], where: str, files: Files
-    ) -> Mapping[str, Any]:
-        """Read the files that are named beside the tables of a scene.
-
-        Parameters
-        ----------
-        data
-            The tables of the file.
-        where
-            The study file, for messages.
-        files
-            The files that it may name.
-
-        Returns
-        -------
-        Mapping of str to object
-            The tables with what was read in place of names.
-        """
-        del where, files
-        return data
-
-    @abstractmethod
-    def make(
-        self, tables: Mapping[str, Table], where: str, files: Files | None = None
-    ) -> S:
-        """Make a scene of its tables.
-
-        Parameters
-        ----------
-        tables
-            The tables by their names.
-        where
-            The file, for messages.
-        files
-            The files that the tables may name.
-
-        Returns
-        -------
-        Scene
-            The scene.
-
-        Raises
-        ------
-        InputError
-            For the first thing that is wrong.
-        """
-
-    def resolved(self, scenes: Sequence[S]) -> Iterator[Sequence[S]]:
-        """Decide what the scenes of a study leave open.
-
-        Parameters
-        ----------
-        scenes
-            The scenes.
-
-        Yields
-        ------
-        Sequence
-            The scenes that answer each of them: by default it alone.
-        """
-        for scene in scenes:
-            yield [scene]
-
-    def check_effect(
-        self, names: Sequence[str], scenes: Sequence[S], where: str
-    ) -> None:
-        """Refuse a field that is written for some scenes, and has an effect on none.
-
-        Parameters
-        ----------
-        names
-            Names of the fields that are written.
-        scenes
-            The scenes.
-        where
-            The file or the group, for messages.
-
-        Raises
-        ------
-        InputError
-            With the scenes on which it has one.
-        """
-
-    def asked(self, file: File) -> list[units.Remark]:
-        """Ask about numbers of the files that are named beside the tables of a scene.
-
-        Parameters
-        ----------
-        file
-            The keys at the top.
-
-        Returns
-        -------
-        list of Remark
-            The questions.
-        """
-        del file
-        return []
-
-    @abstractmethod
-    def check(self, file: File, groups: "Sequence[Group[S]]", where: str) -> None:
-        """Refuse beds that are likelier in millimetres, and what does not go together.
-
-        Parameters
-        ----------
-        file
-            The keys at the top.
-        groups
-            The groups with their scenes.
-        where
-            The study file, for messages.
-
-        Raises
-        ------
-        InputError
-            With the field and the remedy.
-        """
-
-    @abstractmethod
-    def hint(self, names: Sequence[str], branch: str) -> tuple[str, str] | None:
-        """Say which beds have a field that is of no bed of this kind.
-
-        Parameters
-        ----------
-        names
-            The path of the unknown key.
-        branch
-            The bed among those of this kind, where there are several.
-
-        Returns
-        -------
-        what, remedy : tuple of str, or None
-            None where the key is no more than unknown.
-        """
 
     def explained(self, error: ValidationError, where: str) -> InputError:
         """Refuse a file's tables, for the first thing that is wrong in them.
@@ -490,8 +385,7 @@ def _study(
     files.carried = dict(file.profiles)
     numbers = Numbers(partial(files.sieve, where=where))
     groups = _groups(kind, file, where, files, numbers)
-    kind.check(file, groups, where)
-    asked = numbers.asked + kind.asked(file)
+    asked = numbers.asked + kind.check(file, groups, where)
     if file.units_confirmed:
         asked = [one for one in asked if not one.is_question]
     if any(text == path.read_text(encoding="utf-8") for path in presets().values()):
@@ -554,9 +448,9 @@ def _groups(
             tables[part] |= table
         make = partial(kind.make, where=place, files=files)
         listed.append([*scenes_at(tables, axes, place, make, numbers)])
-        kind.check_effect(_fields_in(own), listed[-1], place)
+        _check_effect(kind.fields, own, listed[-1], place)
     every = [*itertools.chain(*listed)]
-    kind.check_effect(_fields_in(by_name(dict(file), parts)), every, where)
+    _check_effect(kind.fields, by_name(dict(file), parts), every, where)
     # force laws are found for the scenes of all groups at once
     laws = kind.resolved(every)
     groups = []
@@ -569,9 +463,17 @@ def _groups(
     return tuple(groups)
 
 
-def _fields_in(tables: Tables) -> list[str]:
-    """The names of the fields in some tables."""
-    return [f"{name}.{key}" for name, table in tables.items() for key in table]
+def _check_effect(
+    fields: Sequence[Quantity], tables: Tables, scenes: Sequence[Any], where: str
+) -> None:
+    """Refuse a field that is written for some scenes, and has an effect on none."""
+    for each in fields:
+        table, _, key = each.name.rpartition(".")
+        if key not in tables[table] or any(map(each.applies, scenes)):
+            continue
+        if any(each.read(scene) != default_of(each.name) for scene in scenes):
+            what = f"it has an effect on {each.info.scope} alone"
+            raise InputError(what, f"{where}: {each.name}", "leave it out")
 
 
 def _axes(file: File, table: "_Group", where: str) -> dict[str, list[Any]]:
@@ -751,53 +653,31 @@ def changed(scene: Scene, fields: Mapping[str, Any]) -> Scene:
     return make_scene(tables, "fields that are changed")
 
 
-class _Plane(Kind[Scene]):
-    """Beds in a plane: a grain on two others, and piles."""
-
-    tables = TABLES
-
-    def make(
-        self, tables: Mapping[str, Table], where: str, files: Files | None = None
-    ) -> Scene:
-        """Make a scene of its tables."""
-        return make_scene(tables, where, files)
-
-    def resolved(self, scenes: Sequence[Scene]) -> Iterator[Sequence[Scene]]:
-        """Find the force laws of the scenes: two answer in the transition."""
-        return resolved(scenes)
-
-    def check_effect(
-        self, names: Sequence[str], scenes: Sequence[Scene], where: str
-    ) -> None:
-        """Refuse a field that has an effect on none of the scenes."""
-        for each in FIELDS:
-            if each.name not in names or any(map(each.applies, scenes)):
+def _check_profiles(
+    file: File, groups: Sequence[Group], where: str
+) -> list[units.Remark]:
+    """Refuse profiles that are likelier in millimetres."""
+    del where
+    for group in () if file.units_confirmed else groups:
+        for scene in group.scenes:
+            bed = scene.bed
+            if not isinstance(bed, PileBed) or not bed.profile:
                 continue
-            if any(each.read(scene) != default_of(each.name) for scene in scenes):
-                what = f"it has an effect on {each.info.scope} alone"
-                raise InputError(what, f"{where}: {each.name}", "leave it out")
-
-    def check(self, file: File, groups: Sequence[Group], where: str) -> None:
-        """Refuse profiles that are likelier in millimetres."""
-        del where
-        for group in () if file.units_confirmed else groups:
-            for scene in group.scenes:
-                bed = scene.bed
-                if not isinstance(bed, PileBed) or not bed.profile:
-                    continue
-                asked = units.of_bed(bed.profile.name, bed.profile.x[-1], bed.height)
-                if asked:
-                    remedy = "divide x_m and z_m by 1000, or "
-                    remedy += f"{CONFIRMED} if it is so large"
-                    raise InputError(asked, f"{group.where}: bed.profile", remedy)
-
-    def hint(self, names: Sequence[str], branch: str) -> tuple[str, str] | None:
-        """Say which beds have a field that is of no bed of this kind."""
-        *table, name = names
-        if branch == "grain" and name in PileBed.model_fields:
-            return "a bed of one grain has none", 'a pile has it: kind = "pile"'
-        told = (hint(".".join(table), name) for hint in HINTS)
-        return next(filter(None, told), None)
+            asked = units.of_bed(bed.profile.name, bed.profile.x[-1], bed.height)
+            if asked:
+                remedy = f"divide x_m and z_m by 1000, or {CONFIRMED} if it is so large"
+                raise InputError(asked, f"{group.where}: bed.profile", remedy)
+    return []
 
 
-PLANE: Kind[Scene] = _Plane()
+def _hint(names: Sequence[str], branch: str) -> tuple[str, str] | None:
+    """Say which beds have a field that is of no bed of this kind."""
+    *table, name = names
+    if branch == "grain" and name in PileBed.model_fields:
+        return "a bed of one grain has none", 'a pile has it: kind = "pile"'
+    told = (hint(".".join(table), name) for hint in HINTS)
+    return next(filter(None, told), None)
+
+
+PLANE = Kind(TABLES, make_scene, _check_profiles, _hint, FIELDS, resolved)
+"""Beds in a plane: a grain on two others, and piles."""

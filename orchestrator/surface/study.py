@@ -58,82 +58,79 @@ class _File(File):
     erosion: SurfaceErosion = SurfaceErosion()
 
 
-class _Surfaces(Kind[SurfaceScene]):
-    """Beds in three dimensions."""
-
-    file = _File
-    tables = TABLES
-    without = ("threshold", "seeds", "tolerance", "cluster", "profiles")
-    most = MOST_FLOWS
-
-    def with_files(
-        self, data: Mapping[str, Any], where: str, files: Files
-    ) -> Mapping[str, Any]:
-        """Read the wind rose."""
-        rasterio(f"{where}: bed.kind")  # maps are written at the end of hours of runs
-        erosion = data.get("erosion")
-        if not isinstance(erosion, dict) or not isinstance(erosion.get("wind"), str):
-            return data
-        rose = files.once(erosion["wind"], f"{where}: erosion.wind", _rose)
-        return {**data, "erosion": {**erosion, "wind": rose}}
-
-    def make(
-        self, tables: Mapping[str, Table], where: str, files: Files | None = None
-    ) -> SurfaceScene:
-        """Make a scene of its tables."""
-        made = {name: dict(table) for name, table in tables.items()}
-        bed = made["bed"]
-        bed.setdefault("roughness", "d/30")
-        diameter = made["grain"].get("diameter")
-        made["fluid"] = fluid_of(made["fluid"], where)
-        name = bed.get("surface")
-        if files and isinstance(name, str):
-            bed["surface"] = files.once(name, f"{where}: bed.surface", _named(name))
-        try:
-            if isinstance(bed["roughness"], str) and isinstance(diameter, float | int):
-                bed["roughness"] = roughness_length(bed["roughness"], diameter)
-            return SurfaceScene.model_validate(nested(made))
-        except UnfitError as error:
-            field = f"{where}: {error.field}"
-            raise InputError(error.what, field, error.remedy) from None
-        except ValidationError as error:
-            raise self.explained(error, where) from None
-
-    def asked(self, file: File) -> list[units.Remark]:
-        """Ask about the speeds of the wind rose."""
-        assert isinstance(file.erosion, SurfaceErosion)
-        rose = file.erosion.wind
-        return [units.Remark(rose.question)] if rose and rose.question else []
-
-    def check(
-        self, file: File, groups: Sequence[Group[SurfaceScene]], where: str
-    ) -> None:
-        """Refuse surfaces that are likelier in millimetres, and roses over liquids."""
-        assert isinstance(file.erosion, SurfaceErosion)
-        for group in groups:
-            for scene in group.scenes:
-                if not file.units_confirmed:
-                    _check_size(scene.bed, group.where)
-                if file.erosion.wind and scene.fluid.density >= GAS_BELOW:
-                    what = "the fluid is a liquid, and a wind rose is of air"
-                    raise InputError(what, f"{where}: erosion.wind", "leave it out")
-
-    def hint(self, names: Sequence[str], branch: str) -> tuple[str, str] | None:
-        """Say which tables and fields beds in a plane alone have."""
-        del branch
-        *table, name = names
-        if names[-2:] == ["bed", "obstacles"]:
-            remedy = (
-                "leave it out; the preset stockpile has fences on sections of piles"
-            )
-            return "a surface has no fences", remedy
-        part = IN_A_PLANE.get(".".join(table))
-        if name in IN_A_PLANE or (part is not None and name in part.model_fields):
-            return "beds in a plane alone have it", 'leave it out, or bed.kind = "pile"'
-        return None
+def _with_files(data: Mapping[str, Any], where: str, files: Files) -> Mapping[str, Any]:
+    """The tables of a file with its wind rose."""
+    rasterio(f"{where}: bed.kind")  # maps are written at the end of hours of runs
+    erosion = data.get("erosion")
+    if not isinstance(erosion, dict) or not isinstance(erosion.get("wind"), str):
+        return data
+    rose = files.once(erosion["wind"], f"{where}: erosion.wind", _rose)
+    return {**data, "erosion": {**erosion, "wind": rose}}
 
 
-SURFACES = _Surfaces()
+def _scene(tables: Mapping[str, Table], where: str, files: Files) -> SurfaceScene:
+    """The scene of some tables; an `InputError` for the first thing that is wrong."""
+    made = {name: dict(table) for name, table in tables.items()}
+    bed = made["bed"]
+    bed.setdefault("roughness", "d/30")
+    diameter = made["grain"].get("diameter")
+    made["fluid"] = fluid_of(made["fluid"], where)
+    name = bed.get("surface")
+    if isinstance(name, str):
+        bed["surface"] = files.once(name, f"{where}: bed.surface", _named(name))
+    try:
+        if isinstance(bed["roughness"], str) and isinstance(diameter, float | int):
+            bed["roughness"] = roughness_length(bed["roughness"], diameter)
+        return SurfaceScene.model_validate(nested(made))
+    except UnfitError as error:
+        raise InputError(error.what, f"{where}: {error.field}", error.remedy) from None
+    except ValidationError as error:
+        raise SURFACES.explained(error, where) from None
+
+
+def _check(
+    file: File, groups: Sequence[Group[SurfaceScene]], where: str
+) -> list[units.Remark]:
+    """Refuse surfaces that are likelier in millimetres, and roses over liquids.
+
+    Returned are questions on the wind rose.
+    """
+    assert isinstance(file.erosion, SurfaceErosion)
+    rose = file.erosion.wind
+    for group in groups:
+        for scene in group.scenes:
+            if not file.units_confirmed:
+                _check_size(scene.bed, group.where)
+            if rose and scene.fluid.density >= GAS_BELOW:
+                what = "the fluid is a liquid, and a wind rose is of air"
+                raise InputError(what, f"{where}: erosion.wind", "leave it out")
+    return [units.Remark(rose.question)] if rose and rose.question else []
+
+
+def _hint(names: Sequence[str], branch: str) -> tuple[str, str] | None:
+    """Say which tables and fields beds in a plane alone have."""
+    del branch
+    *table, name = names
+    if names[-2:] == ["bed", "obstacles"]:
+        remedy = "leave it out; the preset stockpile has fences on sections of piles"
+        return "a surface has no fences", remedy
+    part = IN_A_PLANE.get(".".join(table))
+    if name in IN_A_PLANE or (part is not None and name in part.model_fields):
+        return "beds in a plane alone have it", 'leave it out, or bed.kind = "pile"'
+    return None
+
+
+SURFACES: Kind[SurfaceScene] = Kind(
+    TABLES,
+    _scene,
+    _check,
+    _hint,
+    with_files=_with_files,
+    file=_File,
+    without=("threshold", "seeds", "tolerance", "cluster", "profiles"),
+    most=MOST_FLOWS,
+)
+"""Beds in three dimensions."""
 
 
 def rose_of(study: SurfaceStudy) -> Rose | None:
