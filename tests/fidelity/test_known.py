@@ -82,7 +82,7 @@ def _totals(*keys: tuple[str, str, str]) -> list[list[float]]:
 
 def test_errors_of_flow_and_grains_add_up_by_their_squares(pile: MakePile) -> None:
     scene = pile({"threshold.fractions": [0.1, 0.3, 0.5, 0.7]})
-    expected = np.hypot(*_totals(*KEYS))
+    expected = np.hypot.reduce(_totals(*KEYS))
     found = known(STATIC, scene)
     assert [found.at(one).total for one in (0.1, 0.3, 0.5, 0.7)] == pytest.approx(
         expected

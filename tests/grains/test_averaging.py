@@ -13,10 +13,10 @@ DIAMETER, HEIGHT = 1e-3, 0.02
 def _stress() -> WallStress:
     """Faces of 0.5 mm with any stress, back and forth."""
     random = np.random.default_rng(11)
-    s = (np.arange(400) - 200.5) * 5e-4
-    faces = np.full(len(s), 5e-4)
-    tau = random.normal(0.0, 1.0, len(s))
-    return WallStress(s, s, np.zeros(len(s)), faces, faces, tau, tau)
+    s = np.linspace(-0.1, 0.1, 401)[:-1]
+    faces = np.full(400, 5e-4)
+    tau = random.normal(0.0, 1.0, 400)
+    return WallStress(s, s, np.zeros(400), faces, faces, tau, tau)
 
 
 def _geometry(averaging_length: float) -> Geometry:
