@@ -123,9 +123,9 @@ def test_grains_of_every_law_lie_on_its_line(law: str, bed: pd.DataFrame) -> Non
 
 @pytest.fixture
 def several(results: Results, bed: pd.DataFrame) -> Results:
-    """A study of the grains of one flat bed by four laws, and of piles."""
+    """A study of the grains of one flat bed by three laws, and of piles."""
     grains = []
-    for name in ("low", "bridged", "profile", "bridged-gravel"):
+    for name in ("low", "bridged", "profile"):
         ids = bed["scene_id"] + name
         grains.append(bed.assign(force_law=name, scene_id=ids, law_holds=True))
     scenes = pd.concat([*grains, results.beds("pile")], ignore_index=True)
