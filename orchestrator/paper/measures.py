@@ -313,12 +313,12 @@ def order(evidence: Evidence) -> Comparisons:
 
 
 def _rank_correlation(place: FloatArray, late: IntArray) -> float:
-    """Spearman's, with mean ranks of ties; the places rise. NaN if all are alike."""
-    _, number, count = np.unique(late, return_inverse=True, return_counts=True)
-    if len(count) < 2:
+    """Spearman's; NaN if all are alike."""
+    from scipy.stats import spearmanr  # slow to import
+
+    if len(np.unique(late)) < 2:
         return float("nan")
-    rank = (np.cumsum(count) - count / 2)[number]
-    return float(np.corrcoef(place, rank)[0, 1])
+    return float(spearmanr(place, late).statistic)
 
 
 def above_single(evidence: Evidence) -> Comparisons:

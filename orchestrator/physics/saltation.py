@@ -13,12 +13,11 @@ with the Shields number theta, the viscosity ``sqrt(s)/Ga``. All grains are of s
 (n,).
 """
 
-import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,6 +28,9 @@ from orchestrator.physics.grain import Grain
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import CLIFT_GAUVIN
 from orchestrator.types import BoolArray, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from scipy.interpolate import RegularGridInterpolator
 
 ADDED_MASS = 0.5
 """Added mass of a sphere, in masses of the fluid that it displaces."""
@@ -892,8 +894,7 @@ def tabulated(grains: Grain, *, at_most: bool = False) -> Thresholds:
     """
     is_inside = is_tabulated(grains)
     found = np.full((2, len(grains)), np.nan)
-    table = _table()[2:] if at_most else _table()[:2]
-    found[:, is_inside] = _interpolated(table, grains.at(is_inside))
+    found[:, is_inside] = _interpolated(grains.at(is_inside), at_most)
     outside = np.flatnonzero(~is_inside)
     if len(outside):
         beyond = _beyond_table(grains.at(outside), at_most)
@@ -939,50 +940,16 @@ def is_tabulated(grains: Grain) -> BoolArray:
     return is_inside
 
 
-class _Cell(NamedTuple):
-    """Where points lie on an axis: the node below, and the part of the way to the next.
-
-    Arrays of shape (n,).
-    """
-
-    node: IntArray
-    part: FloatArray
-
-    @classmethod
-    def of(cls, nodes: FloatArray, point: FloatArray) -> "_Cell":
-        """The cells of some points between the first and the last node."""
-        below = np.searchsorted(nodes, point, side="right") - 1
-        node = np.clip(below, 0, len(nodes) - 2)
-        part = (point - nodes[node]) / (nodes[node + 1] - nodes[node])
-        return cls(node, part)
-
-    def weight(self, end: int) -> FloatArray:
-        """What the node below (0) or the next one (1) counts."""
-        return self.part if end else 1 - self.part
-
-
-def _interpolated(table: FloatArray, grains: Grain) -> FloatArray:
-    """Thresholds of grains that a part of the table holds, of shape (2, n)."""
-    galileo, density, slope = map(_Cell.of, _AXES, _points(grains))
-    at_slopes = []
-    for steeper in (0, 1):
-        logarithm = np.zeros((2, len(grains)))
-        for further, denser in itertools.product((0, 1), (0, 1)):
-            value = table[
-                :,
-                galileo.node + further,
-                density.node + denser,
-                slope.node + steeper,
-            ]
-            weight = galileo.weight(further) * density.weight(denser)
-            # a threshold of 0, of infinity or not known counts only with a weight
-            with np.errstate(invalid="ignore"):
-                logarithm += np.where(weight > 0, weight * value, 0.0)
-        at_slopes.append(np.exp(logarithm))
-    gentle, steep = at_slopes
-    with np.errstate(invalid="ignore"):
-        rise = np.where(gentle == steep, 0.0, slope.part * (steep - gentle))
-        return np.where(slope.part > 0, gentle + rise, gentle)
+def _interpolated(grains: Grain, at_most: bool) -> FloatArray:
+    """Thresholds of grains that the table holds, of shape (2, n)."""
+    galileo, density, slope = _points(grains)
+    below = np.searchsorted(SLOPE_NODES_DEG, slope, side="right") - 1
+    below = np.minimum(below, len(SLOPE_NODES_DEG) - 2)
+    ends = SLOPE_NODES_DEG[below], SLOPE_NODES_DEG[below + 1]
+    table = _table(at_most)
+    gentle, steep = (np.exp(table((galileo, density, end))).T for end in ends)
+    part = (slope - ends[0]) / (ends[1] - ends[0])
+    return np.asarray(gentle + part * (steep - gentle))
 
 
 def weakest(density_ratio: FloatArray) -> FloatArray:
@@ -1073,13 +1040,21 @@ def _of_unlike(rows: tuple[tuple[float, ...], ...], at_most: bool) -> Thresholds
     return weakest_thresholds(grains) if at_most else thresholds(grains)
 
 
-@cache
-def _table() -> FloatArray:
-    """Logarithms of the thresholds at the nodes: (4, Galileo, density, slope).
+LOG_OF_NOTHING = -1e300
+"""Logarithm of a threshold of 0, which any part of makes one of 0."""
 
-    They are steady and of cessation, and the same by the weakest rebounds.
+
+@cache
+def _table(at_most: bool) -> "RegularGridInterpolator":
+    """Logarithms of the thresholds, steady and of cessation, on the axes of the table.
+
+    They are those by the weakest rebounds, or by the usual ones.
     """
-    shape = (len(GALILEO_NODES), len(DENSITY_NODES), len(SLOPE_NODES_DEG))
-    both = np.loadtxt(TABLE, delimiter=",", skiprows=1, unpack=True)
+    from scipy.interpolate import RegularGridInterpolator  # slow to import
+
+    columns = (2, 3) if at_most else (0, 1)
+    both = np.loadtxt(TABLE, delimiter=",", skiprows=1, usecols=columns)
     with np.errstate(divide="ignore"):  # of 0, below `LEAST`
-        return np.log(both.reshape(4, *shape))
+        logarithms = np.maximum(np.log(both), LOG_OF_NOTHING)
+    shape = [len(nodes) for nodes in _AXES]
+    return RegularGridInterpolator(_AXES, logarithms.reshape(*shape, 2))

@@ -322,22 +322,6 @@ def held(table: pd.DataFrame) -> "pd.Series[bool]":
     return ~(table["waiting_time"] < HELD_FROM)
 
 
-def by_dem(table: pd.DataFrame) -> pd.DataFrame:
-    """Pick the rows that DEM answered.
-
-    Parameters
-    ----------
-    table
-        Rows with the columns of their scenes, or an empty table.
-
-    Returns
-    -------
-    DataFrame
-        The rows; an empty table as it is.
-    """
-    return table[needs_run(table)] if len(table) else table
-
-
 def valid(table: pd.DataFrame) -> "pd.Series[bool]":
     """Say which thresholds are usable, or which scenes are within their force law.
 
