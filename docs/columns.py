@@ -16,6 +16,7 @@ TABLES = {
     "methods": "a scene: how it was answered, and why",
     "single_grain": "a single grain: its threshold",
     "pile_threshold": "a pile and a fraction n/N: its threshold",
+    "reason": "a reason against a threshold",
     "pile_curve": "a pile and a load step: the part of the grains that has moved",
     "pile_grain": "a grain of a pile: where it lies and when it moved",
     "size_class": "a size class of a mixture and a fraction: its threshold, hiding",

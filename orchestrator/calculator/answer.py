@@ -27,8 +27,8 @@ def card(rows: Sequence["Row"]) -> Card:
         the laws that hold.
     """
     chosen = next(row for row in rows if row["answer"])
-    holding = {row["law"]: row["ustar_m_s"] for row in rows if row["valid"]}
-    made = single.card(as_row(chosen), holding)
+    made = single.card(as_row(chosen))
+    holding = [row["law"] for row in rows if row["valid"]]
     if chosen["valid"] or not holding:
         return made
     laws = ", ".join(f"--law {name}" for name in holding)

@@ -12,13 +12,11 @@ from numpy.typing import NDArray
 from orchestrator.calculator import LARGEST_DEPTH
 from orchestrator.errors import InputError
 from orchestrator.physics.constants import GAS_BELOW
-from orchestrator.physics.reported import in_units
+from orchestrator.physics.reported import SLOPE, in_units
 from orchestrator.types import FloatArray
 
 MOST = 0.05
 """Steepest slope of a channel: on steeper ones grains weigh in along the bed."""
-COLUMN = "bed_slope"
-"""Column of the slope at which the channel falls."""
 
 
 def uniform_flow(table: Mapping[str, Any], bed_slope: float) -> dict[str, FloatArray]:
@@ -48,6 +46,7 @@ def uniform_flow(table: Mapping[str, Any], bed_slope: float) -> dict[str, FloatA
     Examples
     --------
     >>> table = {"ustar_m_s": np.array([0.15]), "g_m_s2": 9.81, "z0_m": 1e-3}
+    >>> table |= {"depth_m": np.nan}
     >>> table |= {"rho_f_kg_m3": np.array([1000.0]), "nu_m2_s": 1e-6}
     >>> print(uniform_flow(table, -0.005)["depth_m"].round(3))
     [0.459]
@@ -60,14 +59,13 @@ def uniform_flow(table: Mapping[str, Any], bed_slope: float) -> dict[str, FloatA
         what = f"{bed_slope:g} is not between 0 and {MOST:g}"
         remedy = "write the fall over the length, such as 0.005"
         raise InputError(what, "--bed-slope", remedy)
-    ustar = table["ustar_m_s"]
+    slopes = np.full(np.shape(table["ustar_m_s"]), slope)
     # the slope may be as small as numbers are
     with np.errstate(over="ignore"):
-        depth = ustar**2 / (table["g_m_s2"] * slope)
-        found = in_units(ustar, {**table, "depth_m": depth})
+        found = in_units(table["ustar_m_s"], {**table, SLOPE: slopes})
     return {
-        COLUMN: np.full(np.shape(ustar), slope),
-        "depth_m": depth,
+        SLOPE: slopes,
+        "depth_m": found["depth_m"],
         "mean_velocity_m_s": found["mean_velocity_m_s"],
     }
 

@@ -26,7 +26,7 @@ from orchestrator.physics.constants import GAS_BELOW, GRAIN_COLUMNS
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import DEFAULT, LAWS, law
 from orchestrator.physics.onset import Onset, of_grains
-from orchestrator.physics.reported import in_units
+from orchestrator.physics.reported import Interval, every_unit, has_no_law, measured
 from orchestrator.physics.threshold import (
     AUTO,
     LAWS_OF,
@@ -126,7 +126,7 @@ def thresholds(
                 against[row].append(Reason("depth", text))
                 table["valid"][row] = False
     _judge(table, against)
-    return table
+    return table | _reported(table)
 
 
 def _check_criterion(criterion: str) -> None:
@@ -158,10 +158,12 @@ def _of_all_laws(
         if at.criteria is not None:
             kind["criterion"] = np.full(len(block["law"]), GOES_ON, object)
         block["regime"] = regimes
-        measured = beside({**block, **kind})
-        block |= measured
+        rows_beside = beside({**block, **kind})
+        block |= rows_beside
         block["level_ustar_m_s"] = of_grains(level, name, criterion).friction_velocity
-        block["measured_level_ustar_m_s"] = measured_level_ustar({**inputs, **measured})
+        block["measured_level_ustar_m_s"] = measured_level_ustar(
+            {**inputs, **rows_beside}
+        )
         block["answer"] = np.array([name in laws for laws in picked])
         blocks.append(block)
     table = {name: np.repeat(column, len(LAWS)) for name, column in inputs.items()}
@@ -178,8 +180,7 @@ def _block(at: Onset, inputs: Table) -> Table:
     A law is valid where it holds for the grain that leaves.
     """
     density = inputs["rho_f_kg_m3"]
-    depth = np.where(density < GAS_BELOW, np.nan, inputs["depth_m"])
-    found = in_units(at.friction_velocity, {**inputs, "depth_m": depth})
+    found = every_unit(at.friction_velocity, _flow(inputs))
     found |= {
         "ustar_m_s": at.friction_velocity,
         "shields": at.shields,
@@ -193,6 +194,30 @@ def _block(at: Onset, inputs: Table) -> Table:
     if at.criteria is not None:
         block |= at.criteria.columns()
     return block
+
+
+def _flow(table: Table) -> Table:
+    """The columns of grains and fluids; a gas has no depth."""
+    is_gas = table["rho_f_kg_m3"] < GAS_BELOW
+    return {**table, "depth_m": np.where(is_gas, np.nan, table["depth_m"])}
+
+
+def _reported(table: Table) -> Table:
+    """The intervals and the measured values of thresholds, in every unit."""
+    ustar = table["ustar_m_s"]
+    flow = _flow(table)
+    # a row for each law, grain by grain
+    shape = (-1, len(LAWS))
+    is_asked = table["usable"] & ~has_no_law(table, len(ustar))
+    by_law = []
+    for place, each in enumerate(LAWS.values()):
+        if each.in_interval:
+            own = np.repeat(ustar.reshape(shape)[:, place], len(LAWS))
+            holds = np.repeat(table["valid"].reshape(shape)[:, place], len(LAWS))
+            by_law.append((own, holds & is_asked))
+    with np.errstate(all="ignore"):
+        interval = Interval.tested(table, ustar).or_of_laws(by_law)
+        return interval.columns(flow) | measured(flow, ustar)
 
 
 def _judge(table: Table, against: Sequence[Sequence[Reason]]) -> None:

@@ -1,40 +1,109 @@
 """A threshold in the units that people measure: wind, mean velocity and stress.
 
-A friction velocity is turned into them here alone, of numbers and of columns.
+A friction velocity is turned into them here alone, of numbers and of columns. Here are
+also the intervals that a threshold of grains has.
 """
 
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from orchestrator.physics.beside import GOES_ON
+from orchestrator.physics.grain import Grain
 from orchestrator.physics.velocity import measurable_speeds
-from orchestrator.types import FloatArray
+from orchestrator.types import BoolArray, FloatArray
 
 CLOSED_CHANNEL = "closed channel"
 """Word of the column ``flow_top`` for a flow between two walls."""
+REPORTED = {
+    "ustar0": "_m_s",
+    "stress": "_pa",
+    "wind_10m": "_m_s",
+    "mean_velocity": "_m_s",
+    "depth": "_m",
+}
+"""Quantities by which thresholds are reported, with the unit in names of columns."""
+SLOPE = "bed_slope"
+"""Column of the slope at which a channel falls, whose depth follows from the flow."""
+MEASURED, NUMERICAL, SEEDS, OF_LAWS = (
+    "measured thresholds",
+    "numerical",
+    "seeds",
+    "force laws",
+)
+"""What an interval is of, in the column ``interval_of``."""
+COUNT = "interval_laws"
+"""Column of the number of force laws whose range an interval is."""
+WIDTH = 1.02
+"""Ratio of the ends from which force laws have a range: below they are the same."""
 
 
-def in_units(
-    ustar: ArrayLike, flow: Any, end: str = "", before: str = ""
-) -> dict[str, FloatArray]:
-    """Convert friction velocities of undisturbed flows to what is measured of them.
+def every_unit(ustar: ArrayLike, flow: Any) -> dict[str, FloatArray]:
+    """Convert friction velocities of undisturbed flows to all that is measured of them.
 
     Parameters
     ----------
     ustar
         Friction velocities, m/s.
     flow
-        The columns of fluid and bed, which broadcast with them: density, viscosity,
-        roughness length, depth, and ``flow_top`` of a closed channel.
+        A table, a row or a mapping of columns of fluid and bed, which broadcast with
+        them: density, viscosity, roughness length, depth, ``flow_top`` of a closed
+        channel, and `SLOPE` of one whose depth follows from the flow.
+
+    Returns
+    -------
+    dict of str to ndarray
+        Friction velocity, stress on the bed, depth of the flow of a slope, and the
+        speeds of `measurable_speeds`, by their columns.
+
+    Examples
+    --------
+    >>> water = {"rho_f_kg_m3": 1000.0, "nu_m2_s": 1e-6, "z0_m": 1e-4, "g_m_s2": 9.81}
+    >>> river = every_unit(0.05, {**water, "depth_m": 1.0, "bed_slope": 1e-3})
+    >>> print(river["depth_m"].round(3), river["mean_velocity_m_s"].round(3))
+    0.255 0.835
+    """
+    density = np.asarray(flow["rho_f_kg_m3"], float)
+    speed = np.asarray(ustar, float)
+    depth = np.asarray(flow["depth_m"], float)
+    found = {"ustar0_m_s": speed, "stress_pa": density * speed**2}
+    if SLOPE in flow:
+        # the stress of a wide channel of depth h that falls by S is rho g h S
+        gravity = np.asarray(flow["g_m_s2"], float)
+        depth = speed**2 / (gravity * np.asarray(flow[SLOPE], float))
+        found["depth_m"] = depth
+    is_closed = False
+    if "flow_top" in flow:
+        is_closed = np.asarray(flow["flow_top"], object) == CLOSED_CHANNEL
+    speeds = measurable_speeds(
+        speed,
+        roughness=np.asarray(flow["z0_m"], float),
+        fluid_density=density,
+        viscosity=np.asarray(flow["nu_m2_s"], float),
+        depth=depth,
+        closed=is_closed,
+    )
+    return found | speeds
+
+
+def in_units(
+    ustar: ArrayLike, flow: Any, end: str = "", before: str = ""
+) -> dict[str, FloatArray]:
+    """Make the columns of friction velocities in every unit that is reported.
+
+    Parameters
+    ----------
+    ustar, flow
+        As `every_unit` takes them.
     end, before
         What the names of the columns have before their unit, and at their beginning.
 
     Returns
     -------
     dict of str to ndarray
-        Friction velocity, stress on the bed, and the speeds of `measurable_speeds`,
-        each with its unit in its name.
+        Those of `REPORTED`, and the depth of the flow of a slope.
 
     Examples
     --------
@@ -43,39 +112,162 @@ def in_units(
     >>> print(low["first_mean_velocity_low_m_s"].round(3))
     0.917
     """
-    density = np.asarray(flow["rho_f_kg_m3"], float)
-    speeds = measurable_speeds(
-        ustar,
-        roughness=np.asarray(flow["z0_m"], float),
-        fluid_density=density,
-        viscosity=np.asarray(flow["nu_m2_s"], float),
-        depth=np.asarray(flow["depth_m"], float),
-        closed=is_closed(flow),
-    )
-    speed = np.asarray(ustar, float)
-    found = {"ustar0_m_s": speed, "stress_pa": density * speed**2, **speeds}
+    found = every_unit(ustar, flow)
     columns = {}
-    for name, values in found.items():
-        for unit in ("_m_s", "_pa"):
-            if name.endswith(unit):
-                stem = name.removesuffix(unit)
-                columns[f"{before}{stem}{end}{unit}"] = values
+    for stem, unit in REPORTED.items():
+        if stem + unit in found:
+            columns[f"{before}{stem}{end}{unit}"] = found[stem + unit]
     return columns
 
 
-def is_closed(flow: Any) -> Any:
-    """Tell which flows are closed channels.
+class Interval(NamedTuple):
+    """Intervals of n friction velocities, m/s, and what they are of.
+
+    Attributes
+    ----------
+    low, high
+        Their ends; NaN where one is not known.
+    of
+        A word for what each is of; None without an interval.
+    laws
+        Number of force laws whose range it is; NaN where it is none.
+    """
+
+    low: FloatArray
+    high: FloatArray
+    of: Any
+    laws: FloatArray
+
+    @classmethod
+    def tested(cls, table: Any, ustar: FloatArray) -> "Interval":
+        """Take the tested interval of each threshold, where it has one.
+
+        Parameters
+        ----------
+        table
+            The columns of grains and fluids, and those of `beside`.
+        ustar
+            The friction velocities, m/s.
+
+        Returns
+        -------
+        Interval
+            Their intervals.
+        """
+        theta = np.asarray(table["shields"], float)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            low = ustar * np.sqrt(np.asarray(table["tested_low"], float) / theta)
+            high = ustar * np.sqrt(np.asarray(table["tested_high"], float) / theta)
+        is_tested = np.asarray(table["tested_rows"], float) > 0
+        of = np.full(len(ustar), None, object)
+        of[is_tested] = MEASURED
+        return cls(low, high, of, np.full(len(ustar), np.nan))
+
+    def or_of_laws(self, by_law: Iterable[tuple[FloatArray, BoolArray]]) -> "Interval":
+        """Take the range of force laws where there is no other interval.
+
+        Parameters
+        ----------
+        by_law
+            Friction velocities by each law that takes part, m/s, and whether it holds.
+
+        Returns
+        -------
+        Interval
+            The intervals; none of laws that agree.
+        """
+        held = np.array([np.where(holds, ustar, np.nan) for ustar, holds in by_law])
+        low = np.fmin.reduce(held)
+        high = np.fmax.reduce(held)
+        count = np.isfinite(held).sum(axis=0)
+        is_none = np.array([word is None for word in self.of], bool)
+        taken = is_none & (high > WIDTH * low)
+        of = self.of.copy()
+        of[taken] = OF_LAWS
+        return Interval(
+            np.where(taken, low, self.low),
+            np.where(taken, high, self.high),
+            of,
+            np.where(taken, count, self.laws),
+        )
+
+    def columns(self, table: Any) -> dict[str, Any]:
+        """Make the columns of the intervals in every unit.
+
+        Parameters
+        ----------
+        table
+            The columns of grains, fluids and beds.
+
+        Returns
+        -------
+        dict of str to ndarray
+            The columns.
+        """
+        made: dict[str, Any] = {}
+        grains = Grain.of_table(table)
+        for end, at in (("_low", self.low), ("_high", self.high)):
+            made |= in_units(at, table, end)
+            made[f"shields{end}"] = grains.shields(at)
+        return {**made, "interval_of": self.of, COUNT: self.laws}
+
+
+def has_no_law(table: Any, count: int) -> BoolArray:
+    """Tell which thresholds depend on no force law: those that hopping on decides.
 
     Parameters
     ----------
-    flow
-        Columns, among them ``flow_top`` or not.
+    table
+        Columns, among them ``decides`` or not.
+    count
+        Number of the thresholds.
 
     Returns
     -------
-    bool or ndarray
-        Whether each is one.
+    ndarray
+        Truth values, shape (n,).
     """
-    if "flow_top" not in flow:
-        return False
-    return np.asarray(flow["flow_top"], object) == CLOSED_CHANNEL
+    if "decides" not in table:
+        return np.zeros(count, bool)
+    return np.asarray(np.asarray(table["decides"], object) == GOES_ON)
+
+
+def measured(
+    table: Any,
+    ustar: FloatArray,
+    is_level: Any = False,
+    before: str = "measured_",
+) -> dict[str, FloatArray]:
+    """Make the columns of a flow with measured thresholds in place of the computed one.
+
+    Parameters
+    ----------
+    table
+        The columns of grains, fluids and beds, those of `beside`, and the friction
+        velocities of one grain on a level bed, computed and measured.
+    ustar
+        The flow, m/s: it goes with the threshold of the grain.
+    is_level
+        Whether each bed is level: its flow has the stress of the grain everywhere.
+    before
+        What the names of the columns begin with.
+
+    Returns
+    -------
+    dict of str to ndarray
+        The columns in every unit, of the measured threshold and of the ends of what
+        was measured.
+    """
+    level = np.asarray(table["level_ustar_m_s"], float)
+    grains = Grain.of_table(table)
+    of_grain = {
+        "": np.asarray(table["measured_level_ustar_m_s"], float),
+        "_low": grains.ustar_at(table["measured_low"]),
+        "_high": grains.ustar_at(table["measured_high"]),
+    }
+    made: dict[str, FloatArray] = {}
+    for end, at in of_grain.items():
+        with np.errstate(invalid="ignore", divide="ignore"):
+            there = np.where(is_level, at, ustar * at / level)
+        made |= in_units(there, table, end, before)
+    return made

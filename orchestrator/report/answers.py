@@ -24,6 +24,7 @@ from orchestrator.report.results import (
 from orchestrator.report.subjects import (
     STRESS,
     TERMS,
+    USTAR,
     Quantity,
     digits_of_place,
     fluid,
@@ -36,7 +37,7 @@ from orchestrator.report.subjects import (
 from orchestrator.study.profile import WITH_X
 from orchestrator.study.shapes import SHAPES
 from orchestrator.tables.facts import packs_grains
-from orchestrator.tables.quoted import MEASURED, SEEDS, of_rows
+from orchestrator.tables.quoted import is_flat, of_rows
 
 NONE = Card(
     "When do these grains start to move?",
@@ -134,7 +135,7 @@ def _of_bed(row: pd.Series, results: Results) -> Card:
         _question(row, pile, told),
         _scene(row, pile, results),
         tuple(_numbers_of_bed(row, pile, results, told)),
-        single.source(row, told, single.known(row["first_ustar0_m_s"])),
+        single.source(row, told, "first_"),
         _worth(row),
     )
 
@@ -204,58 +205,18 @@ def _numbers_of_bed(
     if has_place:
         yield _place(row, pile, results)
     if first > 0:
-        yield _first_motion(row, first, told)
+        yield _first_motion(row, told)
     yield share(row, told)
     if not has_place:
         yield ustar_number(row)
 
 
-def _first_motion(row: pd.Series, first: float, told: Quantity) -> Number:
+def _first_motion(row: pd.Series, told: Quantity) -> Number:
     """The flow that moves the first grains, with its interval."""
-    low, high = _speeds(row, "first_ustar0")
-    of_what = _interval_of(row, "load step and the known error of the method")
-    return _flow_number(row, told, "the first grains", (first, low, high), of_what)
-
-
-def _flow_number(
-    row: pd.Series,
-    told: Quantity,
-    moved: str,
-    ustar: tuple[float, float, float],
-    of_what: str,
-) -> Number:
-    """The flow that moves a part of a bed: u*_0 with the ends of its interval, m/s."""
-    value, low, high = ustar
-    return Number(
-        single.in_unit(row, value, told),
-        told.unit,
-        f"{told.name} that moves {moved}",
-        single.place_of(told, row),
-        low=single.in_unit(row, low, told),
-        high=single.in_unit(row, high, told),
-        interval_of=of_what,
-        measured=single.in_unit(row, single.measured_ustar(row, value), told),
-    )
-
-
-def _speeds(row: pd.Series, stem: str) -> tuple[float, float]:
-    """The ends of the interval of a friction velocity of a row, m/s."""
-    low, high = (single.known(row[f"{stem}{end}_m_s"]) for end in ("_low", "_high"))
-    return low, high
-
-
-def _interval_of(row: pd.Series, numerical: str) -> str:
-    """What the interval of a bed is of, of seeds together."""
-    of_what = row["interval_of"]
-    if not isinstance(of_what, str):
-        return ""
-    beds = ""
-    if row.get("of_seeds", 1) > 1:
-        beds = f"{row['of_seeds']} beds that differ in chance alone"
-    if of_what == SEEDS:
-        return f"the range of {beds}; no error of the method is known"
-    said = single.tested_on(row) if of_what == MEASURED else numerical
-    return f"{said}; it holds {beds}" if beds else said
+    of_what = single.interval_of(row, "load step and the known error of the method")
+    meaning = f"{told.name} that moves the first grains"
+    place = single.place_of(told, row)
+    return single.reported(row, told, meaning, place, of_what, "first_")
 
 
 def _place(row: pd.Series, pile: Pile, results: Results) -> Number:
@@ -318,12 +279,11 @@ def share(row: pd.Series, told: Quantity) -> Number:
     Number
         With its interval.
     """
-    ustar = float(row["ustar0_m_s"])
-    low, high = _speeds(row, "ustar0")
-    of_what = _interval_of(row, NUMBERS)
     part = percent(row["fraction"])
     what = "of the grains" if packs_grains(row) else "of the bed"
-    return _flow_number(row, told, f"{part} {what}", (ustar, low, high), of_what)
+    of_what = single.interval_of(row, NUMBERS)
+    meaning = f"{told.name} that moves {part} {what}"
+    return single.reported(row, told, meaning, single.place_of(told, row), of_what)
 
 
 def ustar_number(row: pd.Series) -> Number:
@@ -339,17 +299,8 @@ def ustar_number(row: pd.Series) -> Number:
     Number
         With its interval.
     """
-    ustar = float(row["ustar0_m_s"])
-    low, high = _speeds(row, "ustar0")
-    return Number(
-        ustar,
-        "m/s",
-        "friction velocity",
-        "the pull of the flow on the ground, written as a speed",
-        low=low,
-        high=high,
-        measured=single.measured_ustar(row, ustar),
-    )
+    note = "the pull of the flow on the ground, written as a speed"
+    return single.reported(row, USTAR, USTAR.name, note)
 
 
 def _of_several(rows: pd.DataFrame, results: Results) -> Card:
@@ -357,13 +308,7 @@ def _of_several(rows: pd.DataFrame, results: Results) -> Card:
     told = sheets.quantity(rows)
     usable = rows[valid(rows)]
     shown = usable if len(usable) else rows
-    column = told.column()
-    values = [
-        single.in_unit(row, float(row["ustar0_m_s"]), told)
-        for _, row in rows.iterrows()
-    ]
-    rows = rows.assign(**{column: values})
-    shown = rows.loc[shown.index].sort_values(column, kind="stable")
+    shown = shown.sort_values(told.column(), kind="stable")
     telling = labels.varying(results.at_fraction, "fraction")
     numbers = _range(shown, told, telling)
     every = results.joined("pile_threshold")
@@ -391,16 +336,12 @@ def _first_of_several(
 
     None where no bed has such a place.
     """
-    starts = [
-        row
-        for _, row in shown.iterrows()
-        if row["first_ustar0_m_s"] > 0 and not single.is_level(row)
-    ]
-    if not starts:
+    starts = shown[(shown["first_ustar0_m_s"] > 0) & ~is_flat(shown)]
+    if starts.empty:
         return None
-    row = min(starts, key=lambda each: float(each["first_ustar0_m_s"]))
+    row = starts.loc[starts["first_ustar0_m_s"].idxmin()]
     bed = results.plan.piles[str(row["scene_id"])].bed
-    number = _first_motion(row, float(row["first_ustar0_m_s"]), told)
+    number = _first_motion(row, told)
     what = ", ".join(labels.told(row, list(telling)[:3]))
     where = counted.spot(float(row["first_x_m"]), bed)
     meaning = f"least {told.name} that moves the first grains, {where}: {what}"
@@ -475,24 +416,14 @@ def _end_of_range(
     row: pd.Series, told: Quantity, telling: Sequence[str], which: str
 ) -> Number:
     """The least or the largest flow of several beds or grains."""
-    ustar = float(row["ustar0_m_s"])
     what = ", ".join(labels.told(row, list(telling)[:3]))
     moves = "moves a grain"
     if "fraction" in row:
         moves = f"moves {percent(row['fraction'])}"
-    low = single.known(row.get(told.column("_low")))
-    high = single.known(row.get(told.column("_high")))
-    of_what = _interval_of(row, NUMBERS if "fraction" in row else "the load step")
-    return Number(
-        single.in_unit(row, ustar, told),
-        told.unit,
-        f"{which}{told.name} that {moves}: {what}",
-        single.place_of(told, row),
-        low=low,
-        high=high,
-        interval_of=of_what,
-        measured=single.in_unit(row, single.measured_ustar(row, ustar), told),
-    )
+    is_bed = "fraction" in row
+    of_what = single.interval_of(row, NUMBERS if is_bed else single.LOAD_STEP)
+    meaning = f"{which}{told.name} that {moves}: {what}"
+    return single.reported(row, told, meaning, single.place_of(told, row), of_what)
 
 
 def _usable_number(count: int, of: int) -> Number:
@@ -601,8 +532,7 @@ def of_grain(row: pd.Series) -> Card:
     Card
         The card.
     """
-    found = by_law(row)
-    return single.card(row, {name: at for name, (at, holds) in found.items() if holds})
+    return single.card(row)
 
 
 def by_law(row: pd.Series) -> dict[str, tuple[float, bool]]:
@@ -657,7 +587,7 @@ def _of_laws(results: Results, best: Sequence[theory.Line]) -> Card:
         count += int(piles["usable"].sum())
         of += len(piles)
     law = labels.value("force_law", first.law)
-    said = " ".join(theory.nearest(results)[1:])
+    said = " ".join(each.sentence for each in theory.nearest(results)[1:])
     word = "usable" if count == of else f"usable, with gaps: {count} of {of} thresholds"
     mark: Mark = "good" if count == of else "care"
     return Card(

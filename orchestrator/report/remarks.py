@@ -11,7 +11,7 @@ from orchestrator.fidelity.decision import floor_of
 from orchestrator.fidelity.limits import FROZEN_BED
 from orchestrator.physics.velocity import log_law_speed
 from orchestrator.physics.verdict import USABLE
-from orchestrator.report import counted, labels, sheets, single, theory
+from orchestrator.report import counted, labels, sheets, theory
 from orchestrator.report.card import Remark
 from orchestrator.report.page import caption
 from orchestrator.report.results import Results
@@ -68,7 +68,7 @@ def remarks(results: Results) -> list[Remark]:
     if table.empty:
         return [*_questions(results)]
     said = [*_of_laws(results), *_correction(results, table), *_questions(results)]
-    said += _usable(table)
+    said += _usable(table, results.tables.get("reason", pd.DataFrame()))
     if len(piles):
         said += _of_piles(results, piles)
     if any(scene.fluid.is_paper for scene in results.study.scenes):
@@ -104,7 +104,7 @@ def over_ground(rows: pd.DataFrame) -> Remark:
         return Remark(head, f"{weaker}. {unknown}")
     row = known.iloc[0]
     ustar = float(row["ustar0_m_s"])
-    here = single.in_unit(row, ustar, WIND)
+    here = float(row[WIND.column()])
     winds = []
     for z0 in ROUGHER_M:
         wind = float(log_law_speed(ustar, 10, z0))
@@ -122,12 +122,9 @@ def _of_laws(results: Results) -> Iterator[Remark]:
     best = theory.best(theory.ranked(results))
     if len(best) <= theory.MANY:
         return
-    for sentence in theory.nearest(results):
-        if sentence.startswith("Nearest"):
-            head, _, rest = sentence.partition(" is ")
-            yield Remark(f"{head}:", rest)
-        else:
-            yield Remark("Where no law is as measured.", sentence)
+    for found in theory.nearest(results):
+        head = f"{found.of}:" if found.of else "Where no law is as measured."
+        yield Remark(head, found.text)
 
 
 def _correction(results: Results, table: pd.DataFrame) -> Iterator[Remark]:
@@ -177,14 +174,15 @@ def _questions(results: Results) -> Iterator[Remark]:
         yield Remark("Is the study file right?", question)
 
 
-def _usable(table: pd.DataFrame) -> Iterator[Remark]:
+def _usable(table: pd.DataFrame, reasons: pd.DataFrame) -> Iterator[Remark]:
     """How many thresholds are usable, and what is most often against the others."""
     count = len(table)
     usable = int(table["usable"].sum())
     if usable == count:
         return
-    reasons = table.loc[~table["usable"].astype(bool), "why_not"]
-    most = str(reasons.mode().iloc[0])
+    of_table = reasons[reasons["scene_id"].isin(table["scene_id"])]
+    code = of_table["reason"].value_counts().idxmax()
+    most = of_table.loc[of_table["reason"] == code, "why_not"].iloc[0]
     head = f"Usable: {usable} of {count} thresholds."
     yield Remark(head, f"The most frequent reason against the others: {most}.")
 

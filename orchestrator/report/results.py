@@ -16,6 +16,7 @@ from orchestrator.study.method import HELD_FROM
 from orchestrator.study.study import Study
 from orchestrator.tables import Tables, with_methods, with_scenes
 from orchestrator.tables.facts import needs_run
+from orchestrator.tables.quoted import reported
 from orchestrator.tables.rows import measured_hill
 
 FRACTION = 0.3  # n/N at which one threshold stands for all of its pile
@@ -256,7 +257,7 @@ def seeds_as_one(rows: pd.DataFrame) -> pd.DataFrame:
     ]
     means: pd.DataFrame = groups[names].transform("mean")
     rows = rows.assign(**means, seeds=groups["shields"].transform("count"))
-    return rows.drop_duplicates(keys)
+    return reported(rows.drop_duplicates(keys))
 
 
 def _but_seed(rows: pd.DataFrame) -> list[str]:

@@ -165,21 +165,19 @@ def _first_grain(
 
     The row has some cells that name it, by their heads.
     """
-    ustar = float(row["first_ustar0_m_s"])
-    if not ustar > 0:
+    if not row["first_ustar0_m_s"] > 0:
         return frame
     told = single.quantity(row)
-    beside = single.measured_ustar(row, ustar)
     values = {**dict.fromkeys(frame.columns, "—"), **named}
     heads = _heads(told)
-    values[heads[0]] = f"{single.in_unit(row, ustar, told):#.3g}"
+    values[heads[0]] = f"{row[f'first_{told.column()}']:#.3g}"
     if heads[1] in values:
         ends = (row[f"first_{told.column(end)}"] for end in ("_low", "_high"))
         values[heads[1]] = labels.interval(*ends)
     if heads[2] in values:
-        values[heads[2]] = f"{single.in_unit(row, beside, told):#.3g}"
+        values[heads[2]] = f"{row[f'measured_first_{told.column()}']:#.3g}"
     if USTAR_HEAD in values:
-        values[USTAR_HEAD] = f"{ustar:#.3g}"
+        values[USTAR_HEAD] = f"{row['first_ustar0_m_s']:#.3g}"
     if "usable" in values:
         values["usable"] = ""
     return pd.concat([pd.DataFrame([values]), frame], ignore_index=True)
@@ -234,7 +232,6 @@ def single_grains(results: Results) -> pd.DataFrame:
     re = rows["reynolds"].where(is_run, rows["reynolds_closed_form"])
     values = {
         "shields": rows["shields_dem"].where(is_run, rows["shields_closed_form"]),
-        "ustar0_m_s": rows["ustar_m_s"].where(is_run, rows["ustar_closed_form_m_s"]),
         "by": is_run.map({True: "DEM", False: "closed form"}),
     }
     return pd.concat([rows.assign(reynolds=re), pd.DataFrame(values)], axis=1)

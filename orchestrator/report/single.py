@@ -5,15 +5,12 @@ which the command `threshold` does without.
 """
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 from orchestrator.digits import percent
 from orchestrator.physics import verdict
 from orchestrator.physics.beside import FIELD, GOES_ON, LEVEL_DEG
-from orchestrator.physics.grain import Grain
-from orchestrator.physics.laws import LAWS
-from orchestrator.physics.velocity import measurable_speeds
+from orchestrator.physics.reported import COUNT, MEASURED, OF_LAWS, SEEDS, in_units
 from orchestrator.report.card import Card, Number, Worth, decimals
 from orchestrator.report.subjects import (
     DEPTH,
@@ -33,19 +30,17 @@ Row = Any
 """A row of a table with the columns of its scene, or a mapping with them."""
 
 
-WIDTH = 1.02
-"""Ratio of the ends from which force laws have a range: below they are the same."""
+LOAD_STEP = "the load step"
+"""What the numerical interval of a single grain is of."""
 
 
-def card(row: Row, holding: Mapping[str, float]) -> Card:
+def card(row: Row) -> Card:
     """Make the card of one grain.
 
     Parameters
     ----------
     row
-        Its threshold.
-    holding
-        Friction velocities, m/s, by the force laws that hold.
+        Its threshold, with the columns of `physics.reported`.
 
     Returns
     -------
@@ -64,7 +59,7 @@ def card(row: Row, holding: Mapping[str, float]) -> Card:
     return Card(
         f"At which {told.flow} does a grain of {size} start to move{ending}?",
         _scene_of_grain(row),
-        numbers_of_grain(row, told, holding),
+        numbers_of_grain(row, told),
         source(row, told),
         worth(row),
     )
@@ -123,44 +118,7 @@ def in_unit(row: Row, ustar: float, told: Quantity) -> float:
     float
         In the unit of the quantity; NaN where the flow has none.
     """
-    if told is USTAR:
-        return ustar
-    if told is STRESS:
-        return float(row["rho_f_kg_m3"]) * ustar**2
-    depth = depth_at(row, ustar)
-    if told is DEPTH:
-        return depth
-    speeds = measurable_speeds(
-        ustar,
-        roughness=float(row["z0_m"]),
-        fluid_density=float(row["rho_f_kg_m3"]),
-        viscosity=float(row["nu_m2_s"]),
-        depth=depth,
-        closed=row.get("flow_top") == "closed channel",
-    )
-    return float(speeds[told.column()])
-
-
-def depth_at(row: Row, ustar: float) -> float:
-    """Find the depth of a flow.
-
-    Parameters
-    ----------
-    row
-        A threshold with the columns of its scene.
-    ustar
-        Undisturbed friction velocity, m/s.
-
-    Returns
-    -------
-    float
-        The given depth, or that of a channel which falls by ``bed_slope``, m; NaN
-        without either.
-    """
-    slope = known(row.get("bed_slope"))
-    if slope > 0:
-        return ustar**2 / (float(row["g_m_s2"]) * slope)
-    return known(row["depth_m"])
+    return float(in_units(ustar, row)[told.column()])
 
 
 def measured_ustar(row: Row, ustar: float) -> float:
@@ -240,9 +198,7 @@ def _scene_of_grain(row: Row) -> str:
     return f"One grain of {grain} on {bed}, in {within}."
 
 
-def numbers_of_grain(
-    row: Row, told: Quantity, holding: Mapping[str, float]
-) -> tuple[Number, ...]:
+def numbers_of_grain(row: Row, told: Quantity) -> tuple[Number, ...]:
     """Make the figures of one grain.
 
     Parameters
@@ -251,28 +207,13 @@ def numbers_of_grain(
         Its threshold.
     told
         What its flow is told by.
-    holding
-        Friction velocities by the laws that hold.
 
     Returns
     -------
     tuple of Number
-        Speed, friction velocity and stress, each with the tested interval, or else the
-        range of the laws that hold. Where hopping on decides, which no law changes, or
-        where the laws agree, there is none.
+        Speed, friction velocity and stress, each with its interval.
     """
-    ustar = float(row["ustar0_m_s"])
     theta = float(row["shields"])
-    compared = [each for name, each in holding.items() if LAWS[name].in_interval]
-    low = min(compared, default=math.nan)
-    high = max(compared, default=math.nan)
-    of_what = f"the {len(compared)} force laws that hold here"
-    if row["tested_rows"] > 0:
-        low, high = tested(row, ustar)
-        of_what = tested_on(row)
-    elif row.get("decides") == GOES_ON or not high > WIDTH * low:
-        low = high = math.nan
-    measured = measured_ustar(row, ustar)
     notes = {
         WIND: "10 m above bare, level ground",
         MEAN: place_of(MEAN, row) if told is MEAN else "",
@@ -283,45 +224,83 @@ def numbers_of_grain(
     }
     second = DEPTH if known(row.get("bed_slope")) > 0 else USTAR
     shown = [each for each in (told, second, STRESS) if each is not STRESS]
+    of_what = interval_of(row, LOAD_STEP)
     numbers = []
     for each in (*dict.fromkeys(shown), STRESS):
-        ends = (low, high, measured)
-        low_, high_, measured_ = (in_unit(row, end, each) for end in ends)
-        numbers.append(
-            Number(
-                in_unit(row, ustar, each),
-                each.unit,
-                each.name if each is not STRESS else "stress of the flow on the bed",
-                notes[each],
-                low=low_,
-                high=high_,
-                interval_of=of_what if each is (*shown, STRESS)[0] else "",
-                measured=measured_,
-            )
-        )
+        name = each.name if each is not STRESS else "stress of the flow on the bed"
+        is_first = each is (*shown, STRESS)[0]
+        number = reported(row, each, name, notes[each], of_what if is_first else "")
+        numbers.append(number)
     return tuple(numbers)
 
 
-def tested(row: Row, ustar: float) -> tuple[float, float]:
-    """Find the ends of the tested interval of a friction velocity.
+def reported(
+    row: Row,
+    told: Quantity,
+    meaning: str,
+    note: str = "",
+    of_what: str = "",
+    which: str = "",
+) -> Number:
+    """Make the number of a threshold as its row has it in the unit of a quantity.
+
+    Parameters
+    ----------
+    row
+        A threshold.
+    told
+        The quantity.
+    meaning, note
+        What the number is.
+    of_what
+        What its interval is of.
+    which
+        ``first_`` for the flow that moves the first grains.
+
+    Returns
+    -------
+    Number
+        With its interval and the measured value.
+    """
+    return Number(
+        known(row.get(f"{which}{told.column()}")),
+        told.unit,
+        meaning,
+        note,
+        low=known(row.get(f"{which}{told.column('_low')}")),
+        high=known(row.get(f"{which}{told.column('_high')}")),
+        interval_of=of_what,
+        measured=known(row.get(f"measured_{which}{told.column()}")),
+    )
+
+
+def interval_of(row: Row, numerical: str) -> str:
+    """Say what the interval of a threshold is of, of seeds together.
 
     Parameters
     ----------
     row
         A threshold with the columns of its scene.
-    ustar
-        A friction velocity of the same bed and grains, m/s.
+    numerical
+        What its numerical interval is of.
 
     Returns
     -------
-    low, high : float
-        The ends, m/s; NaN where no measured thresholds are of such beds.
+    str
+        The words; empty without an interval.
     """
-    if not row["tested_rows"] > 0:
-        return math.nan, math.nan
-    theta = float(row["shields"])
-    low = ustar * math.sqrt(float(row["tested_low"]) / theta)
-    return low, ustar * math.sqrt(float(row["tested_high"]) / theta)
+    of_what = row["interval_of"]
+    if not isinstance(of_what, str):
+        return ""
+    if of_what == OF_LAWS:
+        return f"the {row[COUNT]:.0f} force laws that hold here"
+    beds = ""
+    if row.get("of_seeds", 1) > 1:
+        beds = f"{row['of_seeds']} beds that differ in chance alone"
+    if of_what == SEEDS:
+        return f"the range of {beds}; no error of the method is known"
+    said = tested_on(row) if of_what == MEASURED else numerical
+    return f"{said}; it holds {beds}" if beds else said
 
 
 def tested_on(row: Row) -> str:
@@ -345,7 +324,7 @@ def tested_on(row: Row) -> str:
     return held
 
 
-def source(row: Row, told: Quantity, ustar: float | None = None) -> str:
+def source(row: Row, told: Quantity, which: str = "") -> str:
     """Say where the measured values of a card are from.
 
     Parameters
@@ -354,8 +333,8 @@ def source(row: Row, told: Quantity, ustar: float | None = None) -> str:
         A threshold with the columns of its scene.
     told
         What its flow is told by.
-    ustar
-        The flow that field measurements are told of, m/s; by default that of the row.
+    which
+        ``first_`` if field measurements are told of the flow of the first grains.
 
     Returns
     -------
@@ -364,8 +343,6 @@ def source(row: Row, told: Quantity, ustar: float | None = None) -> str:
     """
     if math.isnan(known(row["measured_level_ustar_m_s"])):
         return "No measurement is near."
-    if ustar is None:
-        ustar = float(row["ustar0_m_s"])
     size = length(float(row["d_m"]))
     alike = "this bed with "
     if is_level(row) or row["bed"] == "grain":
@@ -375,7 +352,7 @@ def source(row: Row, told: Quantity, ustar: float | None = None) -> str:
             f"Squares: {alike}the curve of Shao and Lu (2000) through wind tunnels in "
         )
         said += f"air, for a level bed of grains of {size}."
-        return f"{said} {_field(row, told, ustar)}"
+        return f"{said} {_field(row, told, which)}"
     if row["measured_rows"] > 0:
         rows = f"{row['measured_rows']:.0f} rows of flumes"
         ends = f"{row['measured_low']:.3f} … {row['measured_high']:.3f}"
@@ -390,20 +367,12 @@ def source(row: Row, told: Quantity, ustar: float | None = None) -> str:
     )
 
 
-def _field(row: Row, told: Quantity, ustar: float) -> str:
+def _field(row: Row, told: Quantity, which: str) -> str:
     """What the field sites would give, or why none is near."""
     if not row["measured_rows"] > 0:
         return "No field site is near: those have sand of 0.40 to 0.53 mm in air."
-    computed = float(row["level_ustar_m_s"])
-    grain = Grain.of_table(row)
-    ends = []
-    for theta in (row["measured_low"], row["measured_high"]):
-        of_grain = float(grain.ustar_at(theta))
-        there = of_grain
-        if not is_level(row):
-            there = ustar * of_grain / computed
-        ends.append(in_unit(row, there, told))
-    places = decimals(ends[0])
+    ends = [row[f"measured_{which}{told.column(end)}"] for end in ("_low", "_high")]
+    places = decimals(float(ends[0]))
     low, high = (f"{end:.{places}f}" for end in ends)
     sites = f"{len(FIELD)} field sites (Martin and Kok 2018)"
     return f"{sites} would give {low} … {high} {told.unit}."

@@ -67,7 +67,7 @@ class Quantity(NamedTuple):
         str
             The name, with its unit.
         """
-        unit = {"m/s": "m_s", "Pa": "pa"}[self.unit]
+        unit = {"m/s": "m_s", "Pa": "pa", "m": "m"}[self.unit]
         return f"{self.stem}{end}_{unit}"
 
 

@@ -632,7 +632,7 @@ def section(results: Results) -> dict[str, Any] | None:
     return {
         "source": MEASURED_SOURCE,
         "start": FACTORS_FROM,
-        "sentences": nearest(results),
+        "sentences": [each.sentence for each in nearest(results)],
         "best": sheet(best(listed)),
         "every": sheet(listed),
     }
@@ -664,7 +664,27 @@ def sheet(listed: Iterable[Line]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=list(HEAD))
 
 
-def nearest(results: Results) -> list[str]:
+class Finding(NamedTuple):
+    """What measurements say of the lines of a study.
+
+    Attributes
+    ----------
+    of
+        To what a line is nearest; empty where none is.
+    text
+        Which line it is, or what no line meets.
+    """
+
+    of: str
+    text: str
+
+    @property
+    def sentence(self) -> str:
+        """The finding as a text of its own."""
+        return f"{self.of} is {self.text}" if self.of else self.text
+
+
+def nearest(results: Results) -> list[Finding]:
     """Write which line is nearest to measurements.
 
     Parameters
@@ -674,16 +694,16 @@ def nearest(results: Results) -> list[str]:
 
     Returns
     -------
-    list of str
-        Sentences: the nearest line in water, the Re* at which no line is within the
-        measured range, and the nearest line in air.
+    list of Finding
+        The nearest line in water, the Re* at which no line is within the measured
+        range, and the nearest line in air.
     """
     listed = ranked(results)
     in_air = _nearest_in_air(results, listed)
     return [*_nearest_in_water(listed), *_unmet(listed), *in_air]
 
 
-def _nearest_in_water(listed: Sequence[Line]) -> list[str]:
+def _nearest_in_water(listed: Sequence[Line]) -> list[Finding]:
     """The sentence on the line that is within measured ranges over most decades."""
     first = listed[0]
     _, at = first.worst
@@ -697,18 +717,20 @@ def _nearest_in_water(listed: Sequence[Line]) -> list[str]:
         decades=DECADES,
         start=FACTORS_FROM,
     )
-    return [sentence]
+    return [Finding("Nearest to the measurements in water", sentence)]
 
 
-def _unmet(listed: Sequence[Line]) -> list[str]:
+def _unmet(listed: Sequence[Line]) -> list[Finding]:
     """The sentence on the Re* at which lines answer, none within measured ranges."""
     is_answered = np.any([np.isfinite(line.answers(GRID)) for line in listed], axis=0)
     is_met = np.any([line.met for line in listed], axis=0)
     unmet = is_answered & ~is_met
-    return [caption("unmet", ranges=_ranges(unmet))] if unmet.any() else []
+    if not unmet.any():
+        return []
+    return [Finding("", caption("unmet", ranges=_ranges(unmet)))]
 
 
-def _nearest_in_air(results: Results, listed: Sequence[Line]) -> list[str]:
+def _nearest_in_air(results: Results, listed: Sequence[Line]) -> list[Finding]:
     """The sentence on the line that is nearest to the mean of the curves for air."""
     logs = np.log(MIDDLES)
     read = []
@@ -733,7 +755,9 @@ def _nearest_in_air(results: Results, listed: Sequence[Line]) -> list[str]:
         off.append(float(np.median(np.nan_to_num(factors, nan=np.inf))))
     if np.isinf(min(off)):
         most = f"{max(answered)} of {len(x)}"
-        return [caption("none_in_air", count=len(listed), ends=ends, most=most)]
+        said = caption("none_in_air", count=len(listed), ends=ends, most=most)
+        return [Finding("", said)]
     of_first = None if np.isinf(off[0]) else off[0]
     fit = listed[int(np.argmin(off))]
-    return [caption("best_in_air", fit=fit, off=min(off), of_first=of_first, ends=ends)]
+    said = caption("best_in_air", fit=fit, off=min(off), of_first=of_first, ends=ends)
+    return [Finding("Nearest to the published curves for air", said)]

@@ -13,7 +13,7 @@ from orchestrator.report.card import lines as card_lines
 from orchestrator.report.page import Guest
 from orchestrator.report.results import Results
 from orchestrator.report.sheets import Sheet
-from orchestrator.tables import COLUMNS
+from orchestrator.tables import missing
 
 MOST_LETTERS = 46
 """Letters of a column in a terminal; longer cells stand on several lines."""
@@ -39,34 +39,22 @@ def text(results: Results, guests: Sequence[Guest] = ()) -> str:
     OrchestratorError
         If the tables lack columns, as those of another version do.
     """
-    try:
-        answered = card(results, guests)
-        table = sheet(results, guests)
-        qualified = remarks.remarks(results)
-    except KeyError as error:
-        lacking = _columns_in(error)
-        if not lacking:
-            raise  # a fault of this program, which says where it is
+    lacking = missing(results.tables)
+    if lacking:
         listed = ", ".join(lacking)
         what = f"its tables lack {listed}: another version of this program wrote them"
         where = str(results.cases.parent)
         remedy = "`orchestrator study` of the same file runs it again"
-        raise OrchestratorError(what, where, remedy) from None
+        raise OrchestratorError(what, where, remedy)
+    answered = card(results, guests)
+    table = sheet(results, guests)
+    qualified = remarks.remarks(results)
     said = [*card_lines(answered)]
     if table is not None:
         said += ["", *sheet_lines(table)]
     if qualified:
         said += ["", *remark_lines(qualified)]
     return "\n".join(said)
-
-
-def _columns_in(error: KeyError) -> list[str]:
-    """The columns of tables that were looked up in vain; none of any other key."""
-    key = error.args[0] if error.args else None
-    if key in COLUMNS:
-        return [str(key)]
-    # of several columns pandas makes one text
-    return [column for column in COLUMNS if repr(column) in str(key)]
 
 
 def card(results: Results, guests: Sequence[Guest] = ()) -> Card:

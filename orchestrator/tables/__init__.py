@@ -21,6 +21,8 @@ import pandas as pd
 from orchestrator import digits
 from orchestrator.errors import OrchestratorError
 from orchestrator.grains.pile import Pile
+from orchestrator.physics import verdict
+from orchestrator.physics.reported import REPORTED
 from orchestrator.plan import Plan
 from orchestrator.runs.files import Folder
 from orchestrator.study import fields
@@ -92,22 +94,56 @@ def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
     checks = with_agreement(pd.DataFrame(rows.check(plan, cases, done)), thresholds)
     against = contradictions(checks)
     beds = with_usable(thresholds, asked, study.tolerance, against)
-    stress = [rows.wall_stress(pile, cases) for pile in flows.values()]
+    lone = with_usable(grains, asked, study.tolerance)
     made = {
         "scenes": scenes,
         "methods": methods,
-        "single_grain": with_usable(grains, asked, study.tolerance),
-        "wall_stress": _stacked(stress),
+        "single_grain": lone.table,
+        "wall_stress": _stacked(
+            rows.wall_stress(pile, cases) for pile in flows.values()
+        ),
         "flow": pd.DataFrame([rows.flow(pile, cases) for pile in flows.values()]),
         "pile_grain": _stacked(map(rows.pile_grain, answers)),
         "pile_curve": _stacked(map(rows.pile_curve, answers)),
-        "pile_threshold": beds,
-        "size_class": of_classes(_listed(rows.size_class, answers), beds),
+        "pile_threshold": beds.table,
+        "reason": pd.concat([beds.reasons, lone.reasons], ignore_index=True),
+        "size_class": of_classes(_listed(rows.size_class, answers), beds.table),
         "bed_change": _stacked(rows.bed_changes(answers)),
         "form": _listed(rows.forms, answers),
         "check": checks,
     }
     return {name: table for name, table in made.items() if not table.empty}
+
+
+def missing(tables: Mapping[str, pd.DataFrame]) -> list[str]:
+    """List the columns that tables lack which this version always writes.
+
+    Parameters
+    ----------
+    tables
+        The tables of a study.
+
+    Returns
+    -------
+    list of str
+        The columns; there are some where another version wrote the tables.
+    """
+    reported = {*verdict.COLUMNS, "interval_of"}
+    for stem, unit in REPORTED.items():
+        if stem != "depth":
+            ends = (stem, f"{stem}_low", f"{stem}_high", f"measured_{stem}")
+            reported |= {name + unit for name in ends}
+    columns = {
+        "scenes": {*fields.OF_QUESTION, "gust"},
+        "methods": {*fields.OF_METHOD},
+        "pile_threshold": reported,
+        "single_grain": reported,
+    }
+    lacking: dict[str, None] = {}
+    for name, known in columns.items():
+        if name in tables:
+            lacking |= dict.fromkeys(sorted(known - {*tables[name]}))
+    return [*lacking]
 
 
 def with_methods(scenes: pd.DataFrame, methods: pd.DataFrame) -> pd.DataFrame:

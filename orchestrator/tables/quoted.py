@@ -12,19 +12,23 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from orchestrator.physics.beside import LEAVES, measured_level_ustar
-from orchestrator.physics.grain import Grain
+from orchestrator.physics.laws import LAWS
 from orchestrator.physics.onset import of_grains
-from orchestrator.physics.reported import in_units
+from orchestrator.physics.reported import (
+    MEASURED,
+    NUMERICAL,
+    SEEDS,
+    Interval,
+    has_no_law,
+    in_units,
+    measured,
+)
 from orchestrator.study.shapes import SHAPES
 from orchestrator.tables.facts import needs_run
 from orchestrator.types import BoolArray, FloatArray
 
 ENDS = ("_low", "_high")
 """Endings of the columns of an interval, before the unit."""
-SPEEDS = ("wind_10m", "mean_velocity")
-"""Speeds of which the interval and the measured value are told, without the unit."""
-MEASURED, NUMERICAL, SEEDS = "measured thresholds", "numerical", "seeds"
-"""What an interval is of, in the column ``interval_of``."""
 OF_PILE = ("shields_numerical_low", "shields_numerical_high")
 OF_GRAIN = ("shields_dem_low", "shields_dem_high")
 """Columns of the ends of the numerical interval of a Shields number."""
@@ -71,35 +75,90 @@ def quoted(rows: pd.DataFrame, twins: "pd.Series[int] | None" = None) -> dict[st
     theta = rows["shields"].to_numpy(float)
     of_row = _interval(rows)
     held = _held(of_row, theta, twins)
-    columns: dict[str, Any] = {"stress_pa": _in_units(rows, ustar)["stress_pa"]}
+    own = in_units(ustar, rows)
+    columns: dict[str, Any] = {n: at for n, at in own.items() if n not in rows}
     columns |= {f"shields{end}": at for end, at in zip(ENDS, held, strict=True)}
     columns["interval_of"] = _named(rows, of_row, held, twins)
     ends = _held(_Ends(*(_rooted(ustar, at, theta) for at in of_row)), ustar, twins)
     for end, at in zip(ENDS, ends, strict=True):
-        columns |= _in_units(rows, at, end)
+        columns |= in_units(at, rows, end)
     if "first_ustar0_m_s" in rows:
         columns |= _first(rows, twins)
-    level = of_rows(rows.assign(alpha_deg=0.0))["ustar"]
-    measured = {}
-    for name in ("low", "high"):
-        measured[name] = Grain.of_table(rows).ustar_at(rows[f"measured_{name}"])
-    best = measured_level_ustar(rows)
-    columns["level_ustar_m_s"] = level
-    columns["measured_level_ustar_m_s"] = best
-    is_flat = _is_flat(rows)
-    for name, of_grain in {
-        "": best,
-        "_low": measured["low"],
-        "_high": measured["high"],
-    }.items():
-        there = np.where(is_flat, of_grain, ustar * of_grain / level)
-        columns |= {f"measured_{k}": v for k, v in _in_units(rows, there, name).items()}
+    of_grain = {
+        "level_ustar_m_s": of_rows(rows.assign(alpha_deg=0.0))["ustar"],
+        "measured_level_ustar_m_s": measured_level_ustar(rows),
+    }
+    columns |= of_grain
+    rows = rows.assign(**of_grain)
+    level = is_flat(rows)
+    columns |= measured(rows, ustar, level)
     if "first_ustar0_m_s" in rows:
         first = rows["first_ustar0_m_s"].to_numpy(float)
-        columns["measured_first_ustar0_m_s"] = np.where(
-            is_flat, best, first * best / level
-        )
+        columns |= measured(rows, first, level, "measured_first_")
     return columns
+
+
+def with_laws(
+    rows: pd.DataFrame, columns: dict[str, Any], usable: BoolArray
+) -> dict[str, Any]:
+    """Give usable single grains without another interval the range of the force laws.
+
+    Parameters
+    ----------
+    rows
+        Thresholds of single grains, with the columns of their scenes.
+    columns
+        Those of `quoted`.
+    usable
+        Which are usable; an answer that is not has no range of laws.
+
+    Returns
+    -------
+    dict of str to ndarray
+        The columns with the range of the laws that hold, of those that take part in
+        intervals; none where hopping on decides, which no law changes, or where the
+        laws agree.
+    """
+    own = Interval(
+        columns["ustar0_low_m_s"],
+        columns["ustar0_high_m_s"],
+        columns["interval_of"],
+        np.full(len(rows), np.nan),
+    )
+    is_none = np.array([word is None for word in own.of], bool)
+    asked = np.asarray(usable & is_none & ~has_no_law(rows, len(rows)))
+    by_law = []
+    for name, law in LAWS.items():
+        if law.in_interval:
+            ustar = np.full(len(rows), np.nan)
+            holds = np.zeros(len(rows), bool)
+            found = of_rows(rows[asked].assign(force_law=name))
+            ustar[asked] = found["ustar"]
+            holds[asked] = found["holds"]
+            by_law.append((ustar, holds))
+    return {**columns, **own.or_of_laws(by_law).columns(rows)}
+
+
+def reported(rows: pd.DataFrame) -> pd.DataFrame:
+    """Make the units of thresholds anew, after their friction velocities were merged.
+
+    Parameters
+    ----------
+    rows
+        Thresholds of piles with the columns of `quoted` and of their scenes.
+
+    Returns
+    -------
+    DataFrame
+        The rows, whose flows, measured or not, are those of ``ustar0_m_s`` and of
+        ``first_ustar0_m_s`` in every unit.
+    """
+    changed: dict[str, FloatArray] = {}
+    for stem in ("", "first_"):
+        ustar = rows[f"{stem}ustar0_m_s"].to_numpy(float)
+        changed |= in_units(ustar, rows, before=stem)
+        changed |= measured(rows, ustar, is_flat(rows), f"measured_{stem}")
+    return rows.assign(**changed)
 
 
 def of_classes(classes: pd.DataFrame, thresholds: pd.DataFrame) -> pd.DataFrame:
@@ -146,8 +205,7 @@ def _first(rows: pd.DataFrame, twins: "pd.Series[int] | None") -> dict[str, Floa
     held = _held(_Ends(*ends), first, twins)
     columns: dict[str, FloatArray] = {}
     for end, at in {"": first, **dict(zip(ENDS, held, strict=True))}.items():
-        of_end = _in_units(rows, at, end)
-        columns |= {f"first_{name}": column for name, column in of_end.items()}
+        columns |= in_units(at, rows, end, "first_")
     del columns["first_ustar0_m_s"]  # it is in the rows
     return columns
 
@@ -228,16 +286,6 @@ def _named(
     return np.asarray(names[first])
 
 
-def _in_units(
-    rows: pd.DataFrame, ustar: FloatArray, end: str = ""
-) -> dict[str, FloatArray]:
-    """A friction velocity (m/s) with its speeds and its stress, by column."""
-    found = in_units(ustar, rows, end)
-    names = (f"ustar0{end}_m_s", f"stress{end}_pa")
-    speeds = (f"{name}{end}_m_s" for name in SPEEDS)
-    return {name: found[name] for name in (*names, *speeds)}
-
-
 def of_rows(rows: pd.DataFrame) -> dict[str, Any]:
     """Find the threshold of one grain by each row's law, criterion and gusts.
 
@@ -275,10 +323,21 @@ def of_rows(rows: pd.DataFrame) -> dict[str, Any]:
     return found
 
 
-def _is_flat(rows: pd.DataFrame) -> Any:
-    """Whether each bed is level, so that its flow has one stress everywhere."""
+def is_flat(rows: pd.DataFrame) -> Any:
+    """Tell which beds are level, so that their flow has one stress everywhere.
+
+    Parameters
+    ----------
+    rows
+        Thresholds with the columns of their scenes.
+
+    Returns
+    -------
+    ndarray
+        Truth values, shape (n,).
+    """
     if "bed_shape" not in rows:
         return np.zeros(len(rows), bool)
     level = [shape.name for shape in SHAPES.values() if shape.is_level]
-    is_flat = rows["bed_shape"].isin(level) & rows["profile"].isna()
-    return is_flat.to_numpy()
+    found = rows["bed_shape"].isin(level) & rows["profile"].isna()
+    return found.to_numpy()

@@ -18,7 +18,7 @@ from orchestrator.grains.motion import MODES, Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold
 from orchestrator.physics import measured
-from orchestrator.physics.reported import in_units
+from orchestrator.physics.reported import every_unit
 from orchestrator.physics.velocity import outer_roughness
 from orchestrator.plan import Plan
 from orchestrator.study import fields
@@ -250,7 +250,7 @@ def _speeds(scene: Scene, ustar: float) -> Row:
         "depth_m": flow.depth or np.nan,
         "flow_top": flow.top,
     }
-    speeds = in_units(ustar, undisturbed)
+    speeds = every_unit(ustar, undisturbed)
     row = {}
     for column in SPEEDS:
         if np.isfinite(speeds[column]):

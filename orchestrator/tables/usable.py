@@ -1,7 +1,7 @@
 """Whether thresholds are usable, and their scatter over seeds."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -20,7 +20,8 @@ from orchestrator.study.methods import METHODS
 from orchestrator.tables.check import Contradictions
 from orchestrator.tables.facts import needs_run, packs_grains
 from orchestrator.tables.kinds import ROW_HOLD, tested_as
-from orchestrator.tables.quoted import OF_PILE, of_rows, quoted
+from orchestrator.tables.quoted import OF_PILE, of_rows, quoted, with_laws
+from orchestrator.types import Row
 
 CARRIED_OFF = 0.1
 """Share of the moved grains from which a threshold is one of lift-off."""
@@ -102,12 +103,27 @@ def _layouts(scenes: pd.DataFrame) -> "pd.Series[int]":
     return columns.groupby([*columns], dropna=False).ngroup()
 
 
+class Judged(NamedTuple):
+    """Thresholds with their verdicts, and each reason against one.
+
+    Attributes
+    ----------
+    table
+        The thresholds.
+    reasons
+        A row for each reason: the threshold, its code, what it is, and what helps.
+    """
+
+    table: pd.DataFrame
+    reasons: pd.DataFrame
+
+
 def with_usable(
     table: pd.DataFrame,
     scenes: pd.DataFrame,
     tolerance: float | None,
     contradicted: Contradictions | None = None,
-) -> pd.DataFrame:
+) -> Judged:
     """Add to thresholds of piles or of single grains whether they are usable.
 
     Parameters
@@ -123,12 +139,12 @@ def with_usable(
 
     Returns
     -------
-    DataFrame
+    Judged
         The table with the columns of `verdict.columns`, what was measured, by `beside`,
-        and the columns of `quoted`.
+        and the columns of `quoted`; and the reasons, which its columns join.
     """
     if table.empty:
-        return table
+        return Judged(table, pd.DataFrame())
     columns = [name for name in scenes if name not in table or name == "scene_id"]
     rows = table.merge(scenes[columns], on="scene_id", how="left")
     is_pile = "share_carried_off" in rows
@@ -136,7 +152,6 @@ def with_usable(
         is_run = needs_run(rows)
         rows["reynolds"] = rows["reynolds"].where(is_run, rows["reynolds_closed_form"])
         rows["shields"] = rows["shields_dem"].where(is_run, rows["shields_closed_form"])
-    against_law = _against_law(rows, is_pile)
     rows["standing_out"] = standing_out(rows["relative_size"], rows["beta_deg"])
     rows["flow_reynolds"] = _flow_reynolds(rows)
     measured = beside(rows.assign(**{TESTED_AS: tested_as(rows)}))
@@ -148,14 +163,33 @@ def with_usable(
     units = quoted(rows, twins)
     records = rows.assign(**units).to_dict("records")
     reasons = []
-    for row, of_law in zip(records, against_law, strict=True):
+    for row, of_law in zip(records, _against_law(rows, is_pile), strict=True):
         against = [*_reasons(row, of_law, tolerance)]
         key = (row["scene_id"], row.get("fraction", np.nan))
         if contradicted and key in contradicted:
             against.append(Reason("contradicted", contradicted[key]))
         reasons.append(against)
-    made = {**verdict.columns(records, reasons), **measured, **units}
-    return pd.concat([table, pd.DataFrame(made, index=table.index)], axis=1)
+    of_verdict = verdict.columns(records, reasons)
+    if not is_pile:
+        units = with_laws(rows, units, np.array(of_verdict["usable"], bool))
+    made = {**of_verdict, **measured, **units}
+    judged = pd.concat([table, pd.DataFrame(made, index=table.index)], axis=1)
+    return Judged(judged, pd.DataFrame(_listed(records, reasons)))
+
+
+def _listed(
+    rows: Sequence[Mapping[Any, Any]], reasons: Sequence[Sequence[Reason]]
+) -> Iterator[Row]:
+    """A row for each reason against each threshold."""
+    for row, against in zip(rows, reasons, strict=True):
+        for each in against:
+            yield {
+                "scene_id": row["scene_id"],
+                "fraction": row.get("fraction"),
+                "reason": each.code,
+                "why_not": each.text,
+                "remedy": each.remedy or None,
+            }
 
 
 def _against_law(rows: pd.DataFrame, is_pile: bool) -> list[list[Reason]]:

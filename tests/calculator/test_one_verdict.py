@@ -12,6 +12,7 @@ from orchestrator import plan, tables
 from orchestrator.calculator import answer
 from orchestrator.calculator.table import thresholds
 from orchestrator.physics.laws import LAWS
+from orchestrator.physics.reported import OF_LAWS, REPORTED
 from orchestrator.report import answers, sheets
 from orchestrator.report.results import Results
 from orchestrator.study import study
@@ -59,8 +60,17 @@ NAMED: tuple[tuple[Given, dict[str, Any], str], ...] = (
     ((30e-3, 2650.0, WATER), {"roughness": "d/10"}, CARE),
 )
 """Grains, what else they have, and their verdict."""
-OTHERS = ("measured_rows", "tested_rows", "usable", "why_not", "remedy", "verdict")
+OTHERS = (
+    *("measured_rows", "tested_rows", "usable", "reason", "why_not", "remedy"),
+    *("verdict", "shields_low", "shields_high", "interval_of", "interval_laws"),
+)
 """Columns that a row of either command has."""
+UNITS = [(stem, unit) for stem, unit in REPORTED.items() if stem != "depth"]
+REPORTED_AS = [
+    f"{stem}{end}{unit}" for stem, unit in UNITS for end in ("_low", "_high")
+]
+REPORTED_AS += [f"measured_{stem}{unit}" for stem, unit in UNITS]
+"""Columns of intervals and of measured values in each reported unit."""
 
 
 def named() -> list[dict[str, Any]]:
@@ -208,7 +218,7 @@ def test_threshold_and_study_say_the_same_of_one_grain(
             for name in ("value", "low", "high", "measured"):
                 ends = getattr(number, name), getattr(same, name)
                 assert alike(*ends), (told, name, ends)
-        for name in OTHERS:
+        for name in (*OTHERS, *REPORTED_AS):
             assert alike(here[name], there[name]), (told, name, here[name], there[name])
 
 
@@ -238,6 +248,35 @@ def test_a_usable_answer_has_measurements_and_lies_in_its_interval(
             assert row["tested_low"] <= row["shields"] <= row["tested_high"]
     # the grains span all verdicts
     assert min(marks.values()) > 0
+
+
+def test_what_is_not_usable_has_no_range_of_laws(
+    pairs: list[tuple[Any, Any]],
+) -> None:
+    of_laws = [row for row, _ in pairs if row["interval_of"] == OF_LAWS]
+    assert of_laws
+    assert all(row["usable"] for row in of_laws)
+    for row in of_laws:
+        assert row["ustar0_low_m_s"] <= row["ustar_m_s"] <= row["ustar0_high_m_s"]
+        assert row["interval_laws"] > 1
+
+
+def test_an_interval_is_the_same_in_every_unit(pairs: list[tuple[Any, Any]]) -> None:
+    count = 0
+    for row, _ in pairs:
+        for end in ("_low", "_high"):
+            ustar = row[f"ustar0{end}_m_s"]
+            if math.isnan(ustar):
+                continue
+            count += 1
+            stress = row["rho_f_kg_m3"] * ustar**2
+            assert row[f"stress{end}_pa"] == pytest.approx(stress)
+            ratio = row[f"shields{end}"] / row["shields"]
+            assert ratio == pytest.approx((ustar / row["ustar_m_s"]) ** 2)
+            if row["rho_f_kg_m3"] < 100:
+                is_more = row[f"wind_10m{end}_m_s"] >= row["wind_10m_m_s"]
+                assert is_more == (end == "_high")
+    assert count > 100
 
 
 def test_no_interval_has_a_width_of_zero(pairs: list[tuple[Any, Any]]) -> None:

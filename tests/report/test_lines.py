@@ -79,15 +79,15 @@ def test_laws_that_answer_at_few_re_are_not_compared_with_the_curves_for_air(
     """Eq. 2 and Eq. 4 hold below 3 and from 30 on: their median factor was infinite."""
     low = Line("low", BED, 1.7, 55.0)
     high = Line("high", BED, 1.7, 55.0)
-    (sentence,) = theory._nearest_in_air(results, [low, high])
-    assert sentence.startswith("None of the 2 combinations can be compared")
-    assert "inf" not in sentence
-    (sentence,) = theory._nearest_in_air(results, [low, bridged(0.1, 170.0)])
-    assert "nearest in water has no threshold at half of these Re*" in sentence
-    assert "inf" not in sentence
-    (sentence,) = theory._nearest_in_air(results, [bridged(), bridged(0.1, 170.0)])
-    assert "nearest in water is off by" in sentence
-    assert "inf" not in sentence
+    (found,) = theory._nearest_in_air(results, [low, high])
+    assert found.text.startswith("None of the 2 combinations can be compared")
+    assert "inf" not in found.text
+    (found,) = theory._nearest_in_air(results, [low, bridged(0.1, 170.0)])
+    assert "nearest in water has no threshold at half of these Re*" in found.text
+    assert "inf" not in found.text
+    (found,) = theory._nearest_in_air(results, [bridged(), bridged(0.1, 170.0)])
+    assert "nearest in water is off by" in found.text
+    assert "inf" not in found.text
 
 
 @pytest.fixture

@@ -272,10 +272,10 @@ def test_a_fault_of_the_program_is_not_told_as_another_version(
     studies: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def misspelt(_: object) -> object:
-        return dict[str, object]()["colour"]
+        return dict[str, object]()["usable"]
 
     monkeypatch.setattr(remarks, "remarks", misspelt)
-    with pytest.raises(KeyError, match="colour"):
+    with pytest.raises(KeyError, match="usable"):
         _ = orchestrator.open(studies / "one").answer
 
 

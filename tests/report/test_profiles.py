@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from orchestrator.fidelity import limits
-from orchestrator.report import answers, remarks, sheets, single
+from orchestrator.report import answers, remarks, sheets
 from orchestrator.report.results import Results
-from orchestrator.report.subjects import WIND
 from orchestrator.study import study
 from tests import small_study
 from tests.report.conftest import changed
@@ -137,10 +136,7 @@ def test_a_comparison_says_where_each_bed_starts(fenced: Results) -> None:
         f"first grain, at x = {x:.2f} m" for x in rows["first_x_m"]
     ]
     assert firsts["wind at 10 m, m/s"].astype(float).tolist() == pytest.approx(
-        [
-            single.in_unit(row, row["first_ustar0_m_s"], WIND)
-            for _, row in rows.iterrows()
-        ],
+        [row["first_wind_10m_m_s"] for _, row in rows.iterrows()],
         rel=5e-3,
     )
     # each stands above the shares of its own bed
@@ -152,9 +148,7 @@ def test_a_comparison_says_where_each_bed_starts(fenced: Results) -> None:
     first = answers.card(usable).numbers[2]
     least = rows.iloc[int(rows["first_ustar0_m_s"].argmin())]
     assert f"at x = {least['first_x_m']:.2f} m" in first.meaning
-    assert first.value == pytest.approx(
-        single.in_unit(least, least["first_ustar0_m_s"], WIND)
-    )
+    assert first.value == pytest.approx(least["first_wind_10m_m_s"])
 
 
 @pytest.mark.parametrize(

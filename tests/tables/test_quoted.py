@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from orchestrator import face
+from orchestrator.physics.reported import MEASURED, NUMERICAL, SEEDS
 from orchestrator.report import (
     answers,
     labels,
@@ -20,7 +21,7 @@ from orchestrator.report import (
 from orchestrator.report.card import lines
 from orchestrator.report.figures import shields as overview
 from orchestrator.report.results import Results, seeds_as_one, seeds_of
-from orchestrator.tables.quoted import MEASURED, NUMERICAL, SEEDS, of_classes, quoted
+from orchestrator.tables.quoted import of_classes, quoted
 from tests import small_study
 
 NAN = float("nan")

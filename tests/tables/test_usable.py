@@ -110,7 +110,7 @@ def test_reasons_against_a_sound_threshold_with_some_changes(
     tolerance: float | None, changes: dict[str, Any], reasons: list[str]
 ) -> None:
     table = pd.DataFrame([{**SOUND, **changes}])
-    row = with_usable(table, pd.DataFrame([SCENE]), tolerance).iloc[0]
+    row = with_usable(table, pd.DataFrame([SCENE]), tolerance).table.iloc[0]
     parts = row["why_not"].split("; ") if row["why_not"] else []
     assert len(parts) == len(reasons)
     assert all(reason in part for reason, part in zip(reasons, parts, strict=True))
@@ -193,7 +193,7 @@ def test_a_channel_is_laminar_by_its_flow_where_it_has_no_mean_velocity(
     scenes = [
         {**SCENE, **channel, "scene_id": str(n), "z0_m": z0} for n in range(len(rows))
     ]
-    made = with_usable(pd.DataFrame(rows), pd.DataFrame(scenes), None)
+    made = with_usable(pd.DataFrame(rows), pd.DataFrame(scenes), None).table
     speeds = measurable_speeds(
         ustar0,
         roughness=1e-3 / 30,
