@@ -55,7 +55,7 @@ def tested_as(table: Any) -> list[str]:
 
 def _kind(row: Mapping[str, Any]) -> str:
     """What one threshold is like."""
-    if row["bed"] == "grain" or _is_alone(row):
+    if row.get("bed", "grain") == "grain" or _is_alone(row):
         return GRAIN
     return STRIP if _is_strip(row) else ""
 
