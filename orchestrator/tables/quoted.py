@@ -12,6 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from orchestrator.physics.beside import LEAVES, measured_level_ustar
+from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.onset import of_grains
 from orchestrator.physics.reported import (
