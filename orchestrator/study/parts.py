@@ -358,7 +358,9 @@ class PileBed(Bed):
     """windward side of a dune
     - straight: one slope
     - curved: half a wave of a cosine"""
-    lee_slope_deg: float | None = _pile(None, unit="°", gt=0, le=60)
+    lee_slope_deg: float | None = field(
+        None, unit="°", scope="beds with a straight lee side", gt=0, le=60
+    )
     """slope of a straight lee side or a step down; by default the windward side's, 30
     of a dune and a step down"""
     brink_radius: float = _dune(0.0, unit="m", ge=0, le=1e3)
@@ -366,9 +368,9 @@ class PileBed(Bed):
     length: Length | None = field(None, unit="m", scope="beds with level parts")
     """length of level bed with grains: a trapezoid's top, a flat bed, before or behind
     a step; by default 4 h, of a flat bed 80 diameters"""
-    forms: int = _pile(1, ge=1, le=100)
+    forms: int = field(1, scope="shapes of trains", ge=1, le=100)
     """number of forms in a train"""
-    spacing: Length | None = _pile(None, unit="m")
+    spacing: Length | None = field(None, scope="shapes of trains", unit="m")
     """from one form of a train to the next; by default they touch"""
     profile: File | None = _pile(None)
     """file with the bed line, in place of a shape: columns x_m and z_m; its path is

@@ -30,8 +30,6 @@ from orchestrator.study.parts import (
     extremes,
     percentile,
 )
-from orchestrator.study.profile import WITH_X
-from orchestrator.study.shapes import SHAPES
 
 BUILDABLE_DEG = (1.0, 60.0)
 """Slopes of piles that can be meshed and packed."""
@@ -56,7 +54,6 @@ OFF_MEDIAN = 0.01
 """Relative difference of a log-normal mixture's d50 from the diameter, of which Shields
 numbers and a roughness length of d/30 are made."""
 OUT = "leave it out"
-POURED = 'leave it out, or bed.packing = "poured"'
 
 
 class Question(Part):
@@ -74,7 +71,7 @@ class Question(Part):
 
     @model_validator(mode="after")
     def _parts_fit(self) -> Self:
-        _check(self)
+        check(self)
         return self
 
     @property
@@ -164,8 +161,14 @@ class Question(Part):
         return degrees(acos(self.pocket_cosine))
 
 
-def _check(question: Question) -> None:
-    """Raise an `UnfitError` for the first fields that do not go together."""
+def check(question: Question) -> None:
+    """Raise an `UnfitError` for the first fields that do not go together.
+
+    Parameters
+    ----------
+    question
+        The question.
+    """
     if question.grain.sizes is not None:
         _check_sizes(question.grain.sizes, question.grain.diameter)
     if question.grain.density <= question.fluid.density:
@@ -173,13 +176,10 @@ def _check(question: Question) -> None:
         raise UnfitError("grain.density", "not above the fluid's", remedy)
     _check_roughness(question)
     _check_forces(question)
-    if not question.is_poured:
-        _check_not_poured(question)
     if 0 < question.threshold.update < LEAST_UPDATE:
         what = "each update is a solve of the flow"
         raise UnfitError("threshold.update", what, f"0, or at least {LEAST_UPDATE:g}")
     _check_top(question.flow)
-    _check_towards(question)
     _check_criterion(question)
     if isinstance(question.bed, PileBed):
         _check_pile(question, question.bed)
@@ -271,23 +271,6 @@ def _check_forces(question: Question) -> None:
             raise UnfitError("forces.sheltering", what, remedy)
 
 
-def _check_not_poured(question: Question) -> None:
-    what = "it is of poured beds"
-    if question.grain.sizes:
-        raise UnfitError("grain.sizes", what, POURED)
-    if question.forces.exposure == "protrusion":
-        raise UnfitError("forces.exposure", what, POURED)
-    if isinstance(question.bed, PileBed) and question.bed.width:
-        raise UnfitError("bed.width", what, POURED)
-
-
-def _check_towards(question: Question) -> None:
-    is_profile = isinstance(question.bed, PileBed) and question.bed.profile is not None
-    if question.flow.towards != WITH_X and not is_profile:
-        what = "it is of profiles: other beds are built with the flow"
-        raise UnfitError("flow.towards", what, OUT)
-
-
 def _check_top(flow: Flow) -> None:
     remedy = "see flow.top"
     if flow.top == "boundary layer" and flow.depth:
@@ -303,11 +286,6 @@ def _check_single_grain(question: Question) -> None:
     if question.pocket_cosine >= 1:
         what = "it falls between its neighbours"
         raise UnfitError("bed.relative_size", what, "raise it")
-    if question.threshold.update:
-        raise UnfitError("threshold.update", "it is of piles", OUT)
-    if question.forces.sheltering == "balanced":
-        what = "a single grain has no neighbours"
-        raise UnfitError("forces.sheltering", what, OUT)
 
 
 def _check_pile(question: Question, bed: PileBed) -> None:
@@ -319,8 +297,6 @@ def _check_pile(question: Question, bed: PileBed) -> None:
     if 0 < bed.width < least:
         what = f"three of the largest grains are {least:.4g} d"
         raise UnfitError("bed.width", what, "raise it, or 0: a bed in a plane")
-    if bed.relative_size != 1:
-        raise UnfitError("bed.relative_size", "it is of single grains", OUT)
     if bed.spacing and bed.forms == 1:
         raise UnfitError("bed.spacing", "one form has no neighbour", OUT)
     has_height = bed.profile is not None or not bed.form.is_level
@@ -355,15 +331,6 @@ def _check_shape(bed: PileBed) -> None:
         what = f"the shape {bed.shape} does not rise"
         remedy = f'{OUT}; bed.kind = "grain" has a slope'
         raise UnfitError("bed.slope_deg", what, remedy)
-    if bed.smoothing:
-        raise UnfitError("bed.smoothing", "it is of a profile", OUT)
-    fields_of_some: set[str] = set()
-    for shape in SHAPES.values():
-        fields_of_some.update(shape.fields)
-    for name in sorted(fields_of_some - {*bed.form.fields}):
-        if getattr(bed, name) != PileBed.model_fields[name].default:
-            shapes = [each.name for each in SHAPES.values() if name in each.fields]
-            raise UnfitError(f"bed.{name}", f"it is of: {', '.join(shapes)}", OUT)
 
 
 def _check_depth(flow: Flow, bed: PileBed, largest: float) -> None:

@@ -15,8 +15,8 @@ from orchestrator.study.declare import UnfitError
 from orchestrator.study.method import Method
 from orchestrator.study.methods import ThresholdMethod
 from orchestrator.study.parts import PileBed, Sizes, percentile
-from orchestrator.study.question import LEAST_DEPTH, OUT, Question
-from orchestrator.study.scopes import effective
+from orchestrator.study.question import LEAST_DEPTH, OUT, Question, check
+from orchestrator.study.scopes import blanked, effective
 
 SOLVE_VISCOSITY = 1e-5
 """Viscosity at which flows are solved, m2/s, where it is low enough for their cells."""
@@ -52,7 +52,10 @@ class Scene(Question):
     method: Method = Method()
 
     @model_validator(mode="after")
-    def _method_fits(self) -> Self:
+    def _parts_fit(self) -> Self:
+        """Blank the fields without effect, and refuse others that do not fit."""
+        vars(self).update(dict(blanked(self, self)))
+        check(self)
         _check(self)
         return self
 

@@ -46,6 +46,7 @@ from orchestrator.study.reading import (
     tables_of,
 )
 from orchestrator.study.scene import Scene, roughness_length
+from orchestrator.study.scopes import BY
 from orchestrator.study.shapes import SHAPES
 from orchestrator.study.source import Source, presets
 
@@ -469,11 +470,13 @@ def _check_effect(
     """Refuse a field that is written for some scenes, and has an effect on none."""
     for each in fields:
         table, _, key = each.name.rpartition(".")
-        if key not in tables[table] or any(map(each.applies, scenes)):
-            continue
-        if any(each.read(scene) != default_of(each.name) for scene in scenes):
+        value = tables[table].get(key, default_of(each.name))
+        if isinstance(value, list):
+            value = tuple(value)
+        if value != default_of(each.name) and not any(map(each.applies, scenes)):
             what = f"it has an effect on {each.info.scope} alone"
-            raise InputError(what, f"{where}: {each.name}", "leave it out")
+            remedy = f"leave it out, or {BY[each.info.scope]}"
+            raise InputError(what, f"{where}: {each.name}", remedy)
 
 
 def _axes(file: File, table: "_Group", where: str) -> dict[str, list[Any]]:

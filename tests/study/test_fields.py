@@ -10,9 +10,9 @@ from pydantic.fields import FieldInfo
 from orchestrator import plan
 from orchestrator.errors import InputError
 from orchestrator.lab.ladder import RUNGS
-from orchestrator.study import fields, study
+from orchestrator.study import fields, scopes, study
 from orchestrator.study.fields import Quantity
-from orchestrator.study.parts import Gusts, LogNormal
+from orchestrator.study.parts import Gusts, LogNormal, PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import changed
 from orchestrator.tables import COLUMNS, rows
@@ -181,3 +181,39 @@ def test_columns_are_distinct_and_explained() -> None:
     quantities = (*fields.FIELDS, *fields.DERIVED)
     assert len(fields.COLUMNS) == len(quantities) - without
     assert {*fields.COLUMNS} <= set(COLUMNS)
+
+
+OF_POURED = """
+grain = { diameter = 1e-3, sizes = { sigma_g = 1.3 } }
+bed = { kind = "flat", width = 6.0 }
+forces.exposure = "protrusion"
+[axes]
+"bed.packing" = %s
+"""
+
+
+def test_a_field_is_blank_on_the_scenes_of_an_axis_on_which_it_has_no_effect() -> None:
+    text = OF_POURED % '["aligned", "poured"]'
+    lattice, poured = study.parse(text, name="t", where="t").scenes
+    (plain,) = study.parse(
+        'grain.diameter = 1e-3\nbed.kind = "flat"', name="t", where="t"
+    ).scenes
+    assert lattice == plain
+    assert lattice.id == plain.id != poured.id
+    for each in fields.FIELDS:
+        if not each.applies(lattice):
+            assert each.read(lattice) == fields.default_of(each.name), each.name
+    assert isinstance(poured.bed, PileBed)
+    assert (poured.bed.width, poured.forces.exposure) == (6.0, "protrusion")
+    assert poured.grain.sizes is not None
+
+
+def test_a_field_without_effect_on_any_scene_is_refused_with_what_would_have_one() -> (
+    None
+):
+    with pytest.raises(InputError, match="on poured beds alone") as caught:
+        study.parse(OF_POURED % '["aligned"]', name="t", where="t")
+    assert caught.value.where == "t: grain.sizes"
+    assert caught.value.remedy == 'leave it out, or bed.packing = "poured"'
+    assert scopes.BY.keys() == scopes.APPLIES.keys() - {"every scene"}
+    assert {each.info.scope for each in fields.FIELDS} == scopes.APPLIES.keys()

@@ -221,8 +221,8 @@ def test_a_profile_is_its_mirror_image_in_the_opposite_wind(tmp_path: Path) -> N
 def test_the_wind_towards_smaller_x_is_of_profiles(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"flow.towards: 'west' is not accepted"):
         scene_of(tmp_path, GOOD, STUDY + 'flow.towards = "west"\n')
-    pile = 'grain = { diameter = 1e-3 }\nbed.kind = "pile"\nflow.towards = "-x"\n'
-    with pytest.raises(InputError, match=r"flow.towards: it is of profiles"):
+    pile = 'grain = { diameter = 1e-3 }\nbed.kind = "dune"\nbed.slope_deg = 9.0\nflow.towards = "-x"\n'
+    with pytest.raises(InputError, match=r"flow.towards: it has an effect on profiles"):
         scene_of(tmp_path, GOOD, pile)
 
 

@@ -180,9 +180,9 @@ BAD = [
     (
         GRAIN + "[forces]\nsheltering = 'balanced'\n",
         "forces.sheltering",
-        "no neighbours",
+        'it has an effect on piles alone (leave it out, or bed.kind = "pile")',
     ),
-    (GRAIN + "sizes = { sigma_g = 1.3 }\n", "grain.sizes", "it is of poured beds"),
+    (GRAIN + "sizes = { sigma_g = 1.3 }\n", "grain.sizes", "on poured beds alone"),
     ("[axes]\ndiameter = [1e-3]\n", "axes.diameter", "grain.diameter"),
     ("[axes]\n'grain.diameter' = 1e-3\n", "axes.grain.diameter", "list"),
     *((f"[axes]\n{axes}", "axes", "are one scene") for axes in AXES),
