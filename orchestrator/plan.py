@@ -227,6 +227,22 @@ def listed(cases: Iterable[Case]) -> dict[str, Case]:
     return {name: case for name, case in found.items() if not case.needs} | found
 
 
+def of_cases(cases: Iterable[Case]) -> Plan:
+    """Plan runs that answer no scene by themselves.
+
+    Parameters
+    ----------
+    cases
+        The cases.
+
+    Returns
+    -------
+    Plan
+        The plan of them and of all that they need.
+    """
+    return Plan({}, {}, (), {}, listed(cases))
+
+
 def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
     """Say what a study would run.
 

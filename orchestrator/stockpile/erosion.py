@@ -384,11 +384,10 @@ def experiment(study: Study, out: Path) -> Experiment:
             return {}, ()
         return _results(grouped(done, least, runs.cases), winds, source)
 
-    every = plan.listed(run for flow in flows.values() for run in flow.cases)
     return Experiment(
         name="erosion",
         title=study.title,
-        planned=plan.Plan({}, {}, (), {}, every),
+        planned=plan.of_cases(run for flow in flows.values() for run in flow.cases),
         results=results,
         limit_s=study.time_limit_s,
         source=study.source,

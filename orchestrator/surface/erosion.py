@@ -65,9 +65,9 @@ class Wind:
         heaps = []
         for one, heap in enumerate(answer.surface.heaps, 1):
             faces = form[form[HEAP] == one]
-            heaps.append(surface_of(answer, direction.from_deg, faces, heap))
+            heaps.append(_surface_of(answer, direction.from_deg, faces, heap))
         highest = answer.surface.heaps[0]
-        whole = surface_of(answer, direction.from_deg, form, highest)
+        whole = _surface_of(answer, direction.from_deg, form, highest)
         return cls(direction.from_deg, whole, heaps)
 
     def loss_kg(self, winds: Sequence[float]) -> float:
@@ -196,26 +196,12 @@ class Heaps:
         return pd.Series(found)
 
 
-def surface_of(
+def _surface_of(
     answer: Answer, from_deg: float, faces: pd.DataFrame, heap: Heap
 ) -> erosion.Surface:
-    """Make the surface of a pile of its faces.
+    """The surface of a pile by its faces, whose shares are areas.
 
-    Parameters
-    ----------
-    answer
-        The surface that the pile is on.
-    from_deg
-        Where the wind comes from, degrees.
-    faces
-        The faces of the pile, as `answer.Ground.faces` lists them.
-    heap
-        The heap whose middle the figure is drawn over.
-
-    Returns
-    -------
-    erosion.Surface
-        The surface; shares are by area.
+    The figure is drawn over the middle of the heap.
     """
     faces = faces.sort_values("along_m")
     is_level = faces["slope_deg"] < erosion.LEVEL_DEG

@@ -139,7 +139,7 @@ def experiment_on(
     return Experiment(
         name,
         study.title,
-        plan.Plan({}, {}, (), {}, plan.listed(flows.values())),
+        plan.of_cases(flows.values()),
         made,
         study.time_limit_s,
         source=study.source,

@@ -59,6 +59,8 @@ UNSAID = "no"
 """Its word for no unit of the heights."""
 UNIT_OFF = 1e-4
 """Largest difference of a unit from the metre, m: the German legal metre."""
+FORMAT_OF = {"GTiff": "GeoTIFF", "AAIGrid": "ESRI grid"}
+"""Formats by GDAL's names for them."""
 FORMATS = ".tif .tiff (GeoTIFF), .asc (ESRI), .xyz .csv .txt (x y z), .stl"
 POINT_REMEDY = "leave such points out"
 DECLARED = {
@@ -159,9 +161,9 @@ def _opened(path: Path | str, driver: str, where: str, **options: str) -> Any:
         try:
             return library.open(path, driver=driver, **options)
         except library.errors.RasterioError:
-            what = f"no readable {driver}: it is cut off, or another kind of file"
+            what = f"no readable {FORMAT_OF[driver]}: it is cut off, or another kind"
             remedy = "write it anew, with gdal_translate"
-            raise InputError(what, where, remedy) from None
+            raise InputError(f"{what} of file", where, remedy) from None
 
 
 def _check_band(dataset: Any, where: str) -> None:

@@ -495,7 +495,7 @@ def experiment(names: Sequence[str]) -> Experiment:
         table = pd.DataFrame(listed)
         return {"surfaces": table}, [section(table)]
 
-    planned = plan.Plan({}, {}, (), {}, plan.listed([*chain(*runs.values())]))
+    planned = plan.of_cases(chain(*runs.values()))
     return Experiment(
         "surfaces",
         "Flows over surfaces beside measurements",

@@ -400,7 +400,7 @@ def test_a_form_of_few_cells_is_refused() -> None:
             CORNER + "ncols 9\nnrows 9\ncellsize 1\n1 2 3\n",
             "3 heights, not 9 x 9",
         ),
-        ("a.tif", "no picture", "GTiff: it is cut off, or another kind of file"),
+        ("a.tif", "no picture", "GeoTIFF: it is cut off, or another kind of file"),
         ("a.stl", "no triangles", "it is no whole STL file"),
         ("a.las", "points", "'.las' is of no surface"),
     ],
