@@ -249,20 +249,16 @@ def _whether_it_holds(row: "Row") -> str:
     return f"{where}: {row['why_not']}"
 
 
-def _as_table(rows: Sequence["Row"], heads: Mapping[str, str]) -> Iterator[str]:
+def _as_table(rows: Sequence["Row"], heads: Mapping[str, str]) -> list[str]:
     """Lines of a table, with a last column that says whether the law holds."""
-    holds = ["holds"]
+    from orchestrator.report.lines import table
+
+    shown = [column for column in heads if column not in TOO_MANY]
+    cells = []
     for row in rows:
-        holds.append(_whether_it_holds(row))
-    columns = []
-    for column, head in heads.items():
-        if column in TOO_MANY:
-            continue
-        cells = [head, *(_cell(row[column]) for row in rows)]
-        width = max(map(len, cells))
-        columns.append([cell.ljust(width) for cell in cells])
-    for *cells, last in zip(*columns, holds, strict=True):
-        yield "  ".join([*cells, last])
+        told = [_cell(row[column]) for column in shown]
+        cells.append([*told, _whether_it_holds(row)])
+    return table(cells, [*(heads[column] for column in shown), "holds"])
 
 
 def _cell(value: float | str) -> str:

@@ -10,12 +10,16 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from orchestrator.report.lines import BETWEEN, table
+
 Mark = Literal["good", "care", "bad"]
 """What an answer is worth: usable, usable with something, not usable."""
 DISCS: dict[Mark, str] = {"good": "●", "care": "◐", "bad": "○"}
 """A full disc, a half disc and a ring, as the page draws them."""
 WIDTH = 79
 """Letters of a line in a terminal."""
+INDENT = "  "
+"""What stands before the figures in a terminal."""
 MOST_DIGITS = 9
 """Largest number of digits that tell two ends of an interval apart."""
 MOST_NUMBERS = 3
@@ -281,19 +285,18 @@ def _numbers(numbers: Sequence[Number]) -> Iterator[str]:
         cells = [f"{number.figure} {number.unit}".strip()]
         cells += [number.interval or "-"] if has_interval else []
         cells += [number.beside or "-"] if has_measured else []
-        rows.append(cells)
-    widths = [max(map(len, column)) for column in zip(heads, *rows, strict=True)]
-    if len(heads) > 1:
-        yield "  " + "  ".join(map(str.ljust, heads, widths)).rstrip()
-    indent = 2 + sum(width + 2 for width in widths)
-    for cells, number in zip(rows, numbers, strict=True):
-        start = "  " + "  ".join(map(str.ljust, cells, widths)) + "  "
         told = [number.meaning]
         if number.note:
             told.append(number.note)
         if number.interval and number.interval_of:
             told.append(f"interval: {number.interval_of}")
-        yield from _wrapped("; ".join(told), start, " " * indent)
+        rows.append([*cells, "; ".join(told)])
+    shown = [[*heads, ""], *rows] if len(heads) > 1 else rows
+    *columns, _ = zip(*shown, strict=True)
+    widths = [max(map(len, column)) for column in columns]
+    left = WIDTH - len(INDENT) - sum(width + BETWEEN for width in widths)
+    for line in table(shown, widths=[*widths, left]):
+        yield f"{INDENT}{line}".rstrip()
 
 
 def _wrapped(text: str, first: str = "", later: str = "") -> list[str]:

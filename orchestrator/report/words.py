@@ -1,13 +1,11 @@
 """What a page and a terminal say: the card, its table, remarks, and all other words."""
 
-import textwrap
 from collections.abc import Iterator, Sequence
-from itertools import zip_longest
 
 import pandas as pd
 
 from orchestrator.errors import OrchestratorError
-from orchestrator.report import answers, remarks, sheets, theory
+from orchestrator.report import answers, lines, remarks, sheets, theory
 from orchestrator.report.card import Card, remark_lines
 from orchestrator.report.card import lines as card_lines
 from orchestrator.report.page import Guest
@@ -128,22 +126,12 @@ def sheet_lines(table: Sheet) -> Iterator[str]:
         yield term[:1].upper() + term[1:] + "."
 
 
-def _as_lines(table: pd.DataFrame) -> Iterator[str]:
-    """The lines of a table of texts, whose columns stand below each other.
-
-    Heads and cells that are long stand on several lines.
-    """
-    heads = [str(name) for name in table]
-    rows = table.to_numpy(str).tolist()
+def _as_lines(frame: pd.DataFrame) -> list[str]:
+    """The lines of a table of texts; long heads and cells stand on several lines."""
+    heads = [str(name) for name in frame]
+    rows = frame.to_numpy(str).tolist()
     widths = []
     for head, column in zip(heads, zip(*rows, strict=True), strict=True):
-        longest = max(map(len, column))
-        words_ = max(map(len, head.split()))
-        widths.append(min(max(longest, words_), MOST_LETTERS))
-    for cells in (heads, *rows):
-        parts = [
-            textwrap.wrap(cell, width) or [""]
-            for cell, width in zip(cells, widths, strict=True)
-        ]
-        for line in zip_longest(*parts, fillvalue=""):
-            yield "  ".join(map(str.ljust, line, widths)).rstrip()
+        longest = max(map(len, (*column, *head.split())))
+        widths.append(min(longest, MOST_LETTERS))
+    return lines.table(rows, heads, widths)

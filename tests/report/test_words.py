@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.report import answers, labels, remarks, sheets, shields
+from orchestrator.report import answers, labels, lines, remarks, sheets, shields
 from orchestrator.report.figures import bed
 from orchestrator.report.figures import shields as overview
 from orchestrator.report.results import Results
@@ -297,3 +297,17 @@ def test_the_lines_beside_piles_have_the_roughness_of_the_piles(
     lines = [text for text in legend_of(figure) if text.startswith("Eq.")]
     assert len(lines) == 2
     assert all(text.endswith("β = 60°, z₀ = d/30") for text in lines)
+
+
+def test_long_heads_and_cells_of_a_table_stand_on_several_lines() -> None:
+    rows = [("10 %", "no: the error is not known"), ("30 %", "")]
+    assert lines.table(rows, ("part that moves", "usable"), widths=(9, 12)) == [
+        "part that  usable",
+        "moves",
+        "10 %       no: the",
+        "           error is not",
+        "           known",
+        "30 %",
+    ]
+    # what a user wrote is no markup
+    assert lines.table([("[red]a[/red]",)]) == ["[red]a[/red]"]
