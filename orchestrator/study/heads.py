@@ -19,11 +19,31 @@ DEGREES = ("longitude", "long", "lon", "lng", "latitude", "lat")
 """Columns of angles on the Earth."""
 ALONG = (*EAST, *NORTH[1:], "chainage", "distance", "station")
 """Columns of the places along a profile, which goes any way over the ground."""
+SIZE = (
+    "sieve",
+    "sieve size",
+    "size",
+    "grain size",
+    "particle size",
+    "diameter",
+    "opening",
+    "aperture",
+    "sieb",
+    "siebweite",
+    "maschenweite",
+    "korngröße",
+    "durchmesser",
+)
+"""Columns of the openings of sieves or of the diameters of classes."""
+PASSES = ("passing", "finer", "durchgang", "siebdurchgang")
+"""Columns of the part of the mass that passes a sieve, in per cent."""
+PER_CENT = re.compile(r"[(\[ _]*(per ?cent|pct|%)[)\] _]*")
 METRE = ("m", "metre", "metres", "meter", "meters")
 UNITS = {
     **dict.fromkeys(METRE, 1.0),
     **dict.fromkeys(("ft", "foot", "feet", "ift"), 0.3048),
     **dict.fromkeys(("usft", "ftus", "us-ft", "us_ft", "sft"), 1200 / 3937),
+    **dict.fromkeys(("um", "µm", "μm"), 1e-6),
     "mm": 1e-3,
     "cm": 1e-2,
     "dm": 0.1,
@@ -78,6 +98,45 @@ def name_of(cell: str) -> Name:
     if unit is None:
         return Name(name, "")
     return Name(name[: unit.start()], unit[1] or unit[2])
+
+
+def is_size(cell: str) -> bool:
+    """Tell whether a column has sizes of grains in a unit that its name states.
+
+    Parameters
+    ----------
+    cell
+        A cell of the head of a table.
+
+    Returns
+    -------
+    bool
+        Whether it has.
+    """
+    name = name_of(cell)
+    return name.plain in SIZE and bool(name.unit)
+
+
+def is_passing(cell: str) -> bool:
+    """Tell whether a column has the per cent that passes a sieve.
+
+    Parameters
+    ----------
+    cell
+        A cell of the head of a table.
+
+    Returns
+    -------
+    bool
+        Whether it has.
+
+    Examples
+    --------
+    >>> [is_passing(cell) for cell in ("Passing (%)", "% finer", "passing")]
+    [True, True, False]
+    """
+    name, marks = PER_CENT.subn("", cell.strip().lower())
+    return name in PASSES and marks == 1
 
 
 def in_metres(names: Sequence[str]) -> str:

@@ -19,7 +19,16 @@ from numpy.typing import ArrayLike
 from orchestrator.digits import on_grid, rounded
 from orchestrator.errors import InputError
 from orchestrator.runs.files import digest_file, digest_text
-from orchestrator.study.heads import ALONG, HEIGHT, in_metres, more_cells, name_of
+from orchestrator.study.heads import (
+    ALONG,
+    HEIGHT,
+    UNITS,
+    in_metres,
+    is_passing,
+    is_size,
+    more_cells,
+    name_of,
+)
 from orchestrator.study.noise import needed_smoothing
 from orchestrator.study.shapes import SHAPES
 from orchestrator.study.source import decoded, read_bytes
@@ -38,7 +47,8 @@ PASSING = ("sieve_mm", "passing_percent")
 NO_PAN = "leave out the line of the pan, and end with the sieve that nothing passes"
 SIEVE_REMEDY = (
     f"the first line must be {','.join(PASSING)} (what passes each sieve, mm) or "
-    f"{','.join(CLASSES)} (in m), then numbers; {NO_PAN}"
+    f"{','.join(CLASSES)} (in m), or names with another unit of length, as Sieve (um); "
+    f"then numbers; {NO_PAN}"
 )
 MOST_CORNERS = (
     3000  # most corners of a bed line, each of which is a grid line of the flow's mesh
@@ -309,11 +319,24 @@ class Files:
         where = f"{where}: grain.sizes"
         place = self._place(name, where)
         text = self._text(name, where)
-        header = text.partition("\n")[0]
-        if PASSING[0] in header or PASSING[1] in header:
-            lines, rows = read_columns(text, PASSING, place, SIEVE_REMEDY)
-            return _classes(lines, rows, place)
-        lines, rows = read_columns(text, CLASSES, place, SIEVE_REMEDY)
+        head = next(csv.reader(text.splitlines()[:1]), [])
+        cells = [cell.strip() for cell in head]
+        sizes = [*filter(is_size, cells)]
+        passing = [*filter(is_passing, cells)]
+        if len(sizes) == len(passing) == 1:
+            unit = UNITS[name_of(sizes[0]).unit] / UNITS["mm"]
+            names = (sizes[0], passing[0])
+            lines, rows = read_columns(text, names, place, SIEVE_REMEDY)
+            in_mm = [[rounded(unit * size), part] for size, part in rows]
+            return _classes(lines, in_mm, place)
+        parts = [cell for cell in cells if cell.lower() == CLASSES[1]]
+        names = CLASSES
+        if len(sizes) == len(parts) == 1:
+            names = (sizes[0], parts[0])
+        lines, rows = read_columns(text, names, place, SIEVE_REMEDY)
+        unit = UNITS[name_of(names[0]).unit]
+        if unit != 1:
+            rows = [[rounded(unit * size), part] for size, part in rows]
         _check_rows(lines, rows, place)
         return rows
 
@@ -501,7 +524,7 @@ def _column(header: Sequence[str], name: str, names: tuple[str, str]) -> str:
     if len(header) == 1 and ";" in header[0]:
         what = f"{what}: commas between the cells, no semicolons"
     in_another_unit = in_metres(header)
-    if in_another_unit and names[0].endswith("_m"):
+    if in_another_unit and names[0] in ALSO:
         what = f"{what}: {in_another_unit}"
     raise ValueError(what)
 

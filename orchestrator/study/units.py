@@ -209,7 +209,9 @@ def meant(text: str) -> str:
     """
     comma = DECIMAL_COMMA.fullmatch(text.strip())
     if comma:
-        return f"write {comma[1]}.{comma[2]}"
+        point = f"write {comma[1]}.{comma[2]}"
+        is_thousands = len(comma[2]) == 3 and comma[2].isdecimal()
+        return f"{point}, or {comma[1]}{comma[2]}" if is_thousands else point
     parts = WITH_UNIT.fullmatch(text.strip())
     if parts is None or not NUMBER.fullmatch(parts[1]) or parts[2] not in TO_SI:
         return ""

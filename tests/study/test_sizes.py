@@ -184,6 +184,45 @@ def test_the_per_cent_that_passes_each_sieve_makes_classes(tmp_path: Path) -> No
             study.load(str(source))
 
 
+HEADINGS = {
+    # openings of 4, 2 and 0.5 mm
+    "sieve_mm,passing_percent": ("4", "2", "0.5"),
+    "Sieve (mm),Passing (%)": ("4", "2", "0.5"),
+    "Sample,Sieve size [mm],% finer": ("A,4", "A,2", "A,0.5"),
+    "Sieve (µm),Percent passing": ("4000", "2000", "500"),
+    "opening_um,passing_pct": ("4000", "2000", "500"),
+    "Diameter (m),Passing (%)": ("4e-3", "2e-3", "5e-4"),
+}
+
+
+@pytest.mark.parametrize("head", HEADINGS)
+def test_a_heading_that_states_its_unit_is_read_in_that_unit(
+    head: str, tmp_path: Path
+) -> None:
+    sieve, source = tmp_path / "sieve.csv", tmp_path / "mixed.toml"
+    source.write_text(f"{BED % 'd/30'}\ngrain = {{ sizes = 'sieve.csv' }}\n")
+    rows = zip(HEADINGS[head], (100, 60, 0), strict=True)
+    sieve.write_text("\n".join([head, *(f"{size},{part}" for size, part in rows)]))
+    (scene,) = study.load(str(source)).scenes
+    assert scene.grain.sizes == ((0.001, 0.6), (0.00282842712, 0.4))
+
+
+def test_classes_and_numbers_of_a_heading_in_millimetres(tmp_path: Path) -> None:
+    sieve, source = tmp_path / "sieve.csv", tmp_path / "mixed.toml"
+    source.write_text(f"{BED % 'd/30'}\ngrain = {{ sizes = 'sieve.csv' }}\n")
+    sieve.write_text("Diameter (mm),Fraction\n0.5,0.2\n1,0.5\n2,0.3\n")
+    assert study.load(str(source)).scenes[0].grain.sizes == SIEVE
+    head = "Sieve (mm),Passing (%)\n"
+    for rows, message in {
+        '"5,000",100\n2,0\n': r"line 2: Sieve \(mm\): '5,000' .* 5.000, or 5000",
+        "4,95\n1,0\n": "95 % pass the largest sieve",
+    }.items():
+        sieve.write_text(head + rows)
+        with pytest.raises(InputError, match=message) as caught:
+            study.load(str(source))
+        assert "multiply" not in str(caught.value)
+
+
 def test_beds_that_differ_in_their_scale_alone_are_poured_once() -> None:
     bed = '{ kind = "pile", shape = "flat", length = %g, packing = "poured" }'
     text = f"bed = {bed}\ngrain = {{ diameter = %g, sizes = {{ sigma_g = 1.3 }} }}"
