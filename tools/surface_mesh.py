@@ -42,7 +42,7 @@ def write(path: Path) -> None:
     """Write the mesh as gmsh does, which gmshToFoam reads."""
     made = columns()
     patches = made.patches
-    quads = [faces.reshape(-1, 4) for faces, _ in patches.values()]
+    quads = list(patches.values())
     numbers = np.arange(1, len(patches) + 1)
     on_quads = np.repeat(numbers, [len(each) for each in quads])
     in_cells = np.full(made.cells, len(patches) + 1)

@@ -14,6 +14,7 @@ from orchestrator.errors import InputError, SolverError
 from orchestrator.flow.foam import (
     INTERPOLATED_DIGITS,
     SolvedFlow,
+    ordered,
     patch_types,
     start_from,
     write_poly_mesh,
@@ -290,7 +291,12 @@ class FlowCase(OpenFoamCase[WallStress]):
         types = {**patch_types(-self.height_m), "sides": "empty"}
         if self.is_closed:
             types["lid"] = "wall"
-        middles = write_poly_mesh(made_by_gmsh(directory), directory, types)
+        mesh = made_by_gmsh(directory)
+        cells, middles = ordered(mesh)
+        patches = {}
+        for name, rows in mesh.cell_sets_dict.items():
+            patches[name] = mesh.cells_dict["quad"][rows["quad"]]
+        write_poly_mesh(directory, mesh.points, cells, patches, types)
         if coarser:
             self._start_from_flow(directory / "0", middles, coarser)
         else:

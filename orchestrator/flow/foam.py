@@ -26,7 +26,7 @@ READ_ERROR = 1e-5
 """Most that these tables may be off the fields, of the largest value: they have six
 digits."""
 SIDES = np.array(
-    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
+    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [3, 7, 6, 2], [0, 4, 7, 3]]
 )
 """Corners of the sides of a hexahedron, seen from outside against the clock."""
 VECTOR = f"({FORMAT} {FORMAT} {FORMAT})"
@@ -108,47 +108,36 @@ def read_list(path: Path, after: str = "", kind: type = float) -> NDArray[Any]:
     return np.fromstring(numbers, kind, sep=" ").reshape(count, -1)
 
 
-def write_poly_mesh(mesh: Any, directory: Path, types: Mapping[str, str]) -> FloatArray:
-    """Write the ``constant/polyMesh`` of a case.
+def ordered(mesh: Any) -> tuple[IntArray, FloatArray]:
+    """Order the cells of a mesh, one cell thick, for OpenFOAM.
 
     Parameters
     ----------
     mesh
-        A `meshio.Mesh` of hexahedra, one cell thick. Its cell sets become the patches;
-        ``bed`` has one face for each column of cells.
-    directory
-        The case.
-    types
-        Type of a patch with its entries; a patch that is left out is a "patch".
+        A `meshio.Mesh` of hexahedra. Its cell sets are the patches; ``bed`` has one
+        face for each column of cells.
 
     Returns
     -------
-    FloatArray
-        Middles of the cells in their order, m: downstream, in a column upwards; shape
-        (columns, cells of a column, 3).
+    cells
+        Corners of the cells, downstream, in a column upwards; shape (cells, 8).
+    middles
+        Middles of the cells, m; shape (columns, cells of a column, 3).
     """
-    points = mesh.points
     cells = mesh.cells_dict["hexahedron"]
-    patches = {}
-    for name, rows in mesh.cell_sets_dict.items():
-        patches[name] = mesh.cells_dict["quad"][rows["quad"]]
-    middles = points[cells].mean(axis=1)
-    columns = _columns(middles, len(patches["bed"]))
-    faces = _Faces.of(cells[columns.ravel()], patches, len(points))
-    sizes = {name: len(quads) for name, quads in patches.items()}
-    write_faces(
-        directory, points, faces.corners, faces.owner, faces.neighbour, sizes, types
-    )
-    return np.asarray(middles[columns])
+    middles = mesh.points[cells].mean(axis=1)
+    count = len(mesh.cell_sets_dict["bed"]["quad"])
+    columns = np.argsort(middles[:, 0]).reshape(count, -1)
+    upwards = np.argsort(middles[columns, 2], axis=1)
+    columns = np.take_along_axis(columns, upwards, axis=1)
+    return cells[columns.ravel()], middles[columns]
 
 
-def write_faces(
+def write_poly_mesh(
     directory: Path,
     points: FloatArray,
-    faces: IntArray,
-    owner: IntArray,
-    neighbour: IntArray,
-    patches: Mapping[str, int],
+    cells: IntArray,
+    patches: Mapping[str, IntArray],
     types: Mapping[str, str],
 ) -> None:
     """Write the ``constant/polyMesh`` of a case, which has none yet.
@@ -156,35 +145,31 @@ def write_faces(
     Parameters
     ----------
     directory
-        Directory of the case.
+        The case.
     points
         Corners of the cells, m, shape (n, 3).
-    faces
-        The four points of each side of a cell, seen against the clock from where its
-        owner is not; the inner ones first, in OpenFOAM's order, then those of each
-        patch.
-    owner
-        Cell of each face.
-    neighbour
-        The other cell of each inner face.
+    cells
+        The eight points of each cell: those of one side, seen from within against the
+        clock, then the points of the other side beyond each.
     patches
-        Numbers of faces by the names of the patches, in their order.
+        The four points of each face of a patch, in any order.
     types
-        Types of patches with their entries; one that is not named is a "patch".
+        Type of a patch with its entries; a patch that is left out is a "patch".
     """
+    faces = _Faces.of(cells, patches, len(points))
     boundary = []
-    start = len(neighbour)
-    for name, count in patches.items():
-        entries = f"type {types.get(name, 'patch')}; nFaces {count}"
+    start = len(faces.neighbour)
+    for name, quads in patches.items():
+        entries = f"type {types.get(name, 'patch')}; nFaces {len(quads)}"
         boundary.append(f"    {name} {{ {entries}; startFace {start}; }}\n")
-        start += count
+        start += len(quads)
     patch_list = f"{len(boundary)}\n(\n{''.join(boundary)})\n"
     folder = directory / "constant/polyMesh"
     folder.mkdir(parents=True)
     _write(folder / "points", "vectorField", listed(points, VECTOR))
-    _write(folder / "faces", "faceList", listed(faces, "4(%d %d %d %d)"))
-    _write(folder / "owner", "labelList", listed(owner, "%d"))
-    _write(folder / "neighbour", "labelList", listed(neighbour, "%d"))
+    _write(folder / "faces", "faceList", listed(faces.corners, "4(%d %d %d %d)"))
+    _write(folder / "owner", "labelList", listed(faces.owner, "%d"))
+    _write(folder / "neighbour", "labelList", listed(faces.neighbour, "%d"))
     _write(folder / "boundary", "polyBoundaryMesh", patch_list)
 
 
@@ -209,13 +194,6 @@ def patch_types(offset: float) -> dict[str, str]:
         "inlet": "mappedPatch; sampleMode nearestCell; sampleRegion region0; "
         f"samplePatch none; {sampled}",
     }
-
-
-def _columns(middles: FloatArray, count: int) -> IntArray:
-    """Cells of each column, upwards, from the most upstream column on."""
-    columns = np.argsort(middles[:, 0]).reshape(count, -1)
-    upwards = np.argsort(middles[columns, 2], axis=1)
-    return np.take_along_axis(columns, upwards, axis=1)
 
 
 class _Faces(NamedTuple):

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from orchestrator import digits
-from orchestrator.flow.foam import patch_types, write_faces
+from orchestrator.flow.foam import patch_types, write_poly_mesh
 from orchestrator.flow.mesh import cells_in, growing, ratio_of
 from orchestrator.types import FloatArray, IntArray
 
@@ -31,8 +31,6 @@ FIRST_CELL = 1 / 40
 """Height of the cells on the bed, in heights of the form."""
 STEEPEST = 2.0
 """Largest tangent of a slope along which a first cell is made higher: 63 degrees."""
-BACKWARDS = [0, 3, 2, 1]
-"""Corners of a face as they are seen from its other side."""
 
 
 @dataclass(frozen=True)
@@ -325,24 +323,9 @@ class Columns:
         directory
             Directory of the case.
         """
-        inner, owner, neighbour = self._inner_faces()
-        patches = self.patches
-        faces = [inner, *(quads.reshape(-1, 4) for quads, _ in patches.values())]
-        owners = [owner, *(cells.ravel() for _, cells in patches.values())]
-        write_faces(
-            directory,
-            self.corners.reshape(-1, 3),
-            np.concatenate(faces),
-            np.concatenate(owners),
-            neighbour,
-            {name: cells.size for name, (_, cells) in patches.items()},
-            patch_types(-self.slab),
-        )
-
-    @cached_property
-    def _cell_numbers(self) -> IntArray:
-        """Number of each cell: upwards, then across, then along the wind."""
-        return np.arange(self.cells).reshape(self.shape)
+        points = self.corners.reshape(-1, 3)
+        types = patch_types(-self.slab)
+        write_poly_mesh(directory, points, self.hexahedra, self.patches, types)
 
     @cached_property
     def _planes(self) -> tuple[IntArray, IntArray]:
@@ -355,73 +338,36 @@ class Columns:
         behind = np.delete(points[1:], 1, axis=0)
         return ahead, behind
 
-    @cached_property
-    def _fronts(self) -> IntArray:
-        """Sides of the cells downstream of them, seen from there against the clock."""
-        return _fronts(self._planes[1])
-
-    @cached_property
-    def _walls(self) -> IntArray:
-        """Upright sides along the wind, seen from the left against the clock."""
-        low, high = self._planes
-        ends = [low[:, :, :-1], low[:, :, 1:], high[:, :, 1:], high[:, :, :-1]]
-        return np.stack(ends, axis=-1)
-
-    @cached_property
-    def _floors(self) -> IntArray:
-        """Lower and upper sides, seen from above against the clock."""
-        low, high = self._planes
-        ends = [low[:, :-1], high[:, :-1], high[:, 1:], low[:, 1:]]
-        return np.stack(ends, axis=-1)
-
-    def _inner_faces(self) -> tuple[IntArray, IntArray, IntArray]:
-        """The faces between two cells, their owners and the cells beyond.
-
-        They are those of each cell above it, to its left and downstream of it: so the
-        cells beyond rise, which is OpenFOAM's order.
-        """
-        _, across, up = self.shape
-        sides = [self._floors[:, :, 1:], self._walls[:, 1:], self._fronts]
-        faces = np.stack(sides, axis=3)
-        steps = np.array([1, up, across * up])
-        beyond = self._cell_numbers[..., None] + steps
-        is_inner = np.ones(beyond.shape, bool)
-        is_inner[:, :, -1, 0] = False
-        is_inner[:, -1, :, 1] = False
-        is_inner[[0, -1], :, :, 2] = False  # the slab stands apart
-        owner = beyond - steps
-        return faces[is_inner], owner[is_inner], beyond[is_inner]
-
     @property
     def hexahedra(self) -> IntArray:
-        """Numbers of the corners of each cell, of its right and left sides, (n, 8)."""
-        walls = self._walls
-        whole = np.concatenate([walls[:, :-1], walls[:, 1:]], axis=-1)
-        return whole.reshape(-1, 8)
+        """Numbers of the corners of each cell, upstream and downstream, (n, 8)."""
+        # so the cyclic sides of the slab begin at corners that face each other
+        fronts = [_across(planes) for planes in self._planes]
+        return np.concatenate(fronts, axis=-1).reshape(-1, 8)
 
     @property
-    def patches(self) -> dict[str, tuple[IntArray, IntArray]]:
-        """Faces of each patch, seen against the clock from outside, and their cells."""
-        cell = self._cell_numbers
-        backs = _fronts(self._planes[0])[..., BACKWARDS]
-        beside = [self._walls[:, 0][..., BACKWARDS], self._walls[:, -1]]
-        return {
-            "bed": (self._floors[:, :, 0][..., BACKWARDS], cell[:, :, 0]),
-            "lid": (self._floors[:, :, -1], cell[:, :, -1]),
-            "before": (backs[0], cell[0]),
-            "after": (self._fronts[0], cell[0]),
-            "inlet": (backs[1], cell[1]),
-            "outlet": (self._fronts[-1], cell[-1]),
-            "sides": (np.stack(beside), np.stack([cell[:, 0], cell[:, -1]])),
+    def patches(self) -> dict[str, IntArray]:
+        """Numbers of the corners of each face of each patch."""
+        ahead, behind = self._planes
+        sides = [_between(ahead[:, side], behind[:, side]) for side in (0, -1)]
+        patches = {
+            "bed": _between(ahead[..., 0], behind[..., 0]),
+            "lid": _between(ahead[..., -1], behind[..., -1]),
+            "before": _across(ahead[0]),
+            "after": _across(behind[0]),
+            "inlet": _across(ahead[1]),
+            "outlet": _across(behind[-1]),
+            "sides": np.stack(sides),
         }
+        return {name: quads.reshape(-1, 4) for name, quads in patches.items()}
 
 
-def _fronts(planes: IntArray) -> IntArray:
-    """The quadrilaterals of some planes, seen from downstream against the clock."""
-    ends = [
-        planes[:, :-1, :-1],
-        planes[:, 1:, :-1],
-        planes[:, 1:, 1:],
-        planes[:, :-1, 1:],
-    ]
+def _across(planes: IntArray) -> IntArray:
+    """The quadrilaterals of planes across the wind, seen from downstream."""
+    return _between(planes[..., :-1, :], planes[..., 1:, :])
+
+
+def _between(one: IntArray, other: IntArray) -> IntArray:
+    """The quadrilaterals between two lines of corners."""
+    ends = [one[..., :-1], other[..., :-1], other[..., 1:], one[..., 1:]]
     return np.stack(ends, axis=-1)
