@@ -12,7 +12,8 @@ from orchestrator.benchmark.pack import OF_POCKET, Problem, expectation
 from orchestrator.flow.run import SPEED_HEIGHT
 from orchestrator.grains import cells
 from orchestrator.grains.loads import forces
-from orchestrator.grains.pile import MARGIN, Pile
+from orchestrator.grains.pile import Pile
+from orchestrator.grains.pile_case import MARGIN
 from orchestrator.grains.threshold import PileThreshold
 from orchestrator.study import closed_form as study_form
 from orchestrator.study import fields

@@ -85,7 +85,7 @@ class Solve(FlowModel):
         The scene.
     """
 
-    facts = models.SOLVE
+    facts: ClassVar[models.FlowModel] = models.SOLVE
 
     @cached_property
     def cases(self) -> tuple[FlowCase, ...]:
@@ -108,7 +108,7 @@ class Waves(FlowModel):
         The scene.
     """
 
-    facts = models.WAVES
+    facts: ClassVar[models.FlowModel] = models.WAVES
 
     def stress(self, cases: Path) -> WallStress:
         """The stress of all wavelengths of the bed line."""
@@ -125,7 +125,7 @@ class Flat(FlowModel):
         The scene.
     """
 
-    facts = models.FLAT
+    facts: ClassVar[models.FlowModel] = models.FLAT
 
     def stress(self, cases: Path) -> WallStress:
         """The stress of a flat bed, on each face."""

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any, Self
@@ -200,7 +200,7 @@ class Geometry:
     """
 
     scene: Scene
-    cases: Path | None = field(default=None, compare=False)
+    cases: Path | None = None
     part: Range | None = None
 
     @property

@@ -2,7 +2,7 @@
 
 Whoever needs to know something of a method asks its object, and never for its name. A
 new method is one entry of `METHODS` here, with its words and what it knows, and one
-class in `orchestrator.grains.pile`, which finds the motion.
+class in `orchestrator.grains.methods`, which finds the motion.
 """
 
 from typing import ClassVar

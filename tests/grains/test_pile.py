@@ -11,7 +11,8 @@ from scipy.optimize import linprog
 from orchestrator.errors import Exploded, InputError
 from orchestrator.grains.loads import Loads
 from orchestrator.grains.motion import Motion
-from orchestrator.grains.pile import Pile, flows
+from orchestrator.grains.pile import Pile
+from orchestrator.grains.pile_case import flows
 from orchestrator.grains.threshold import at_size, classes, sampled, within
 from orchestrator.physics import saltation
 from orchestrator.physics.grain import Grain

@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestrator.grains import pile as wear
+from orchestrator.grains import bed_state, wear
+from orchestrator.grains.bed_state import BedState
 from orchestrator.grains.loads import Geometry
-from orchestrator.grains.pile import Pile, Worn
+from orchestrator.grains.pile import Pile
 from orchestrator.report.figures import bed
 from orchestrator.report.results import Results
 from orchestrator.study.parts import Grain
@@ -70,17 +71,17 @@ def test_the_line_of_any_bed_sinks_with_the_counted_grains_alone(
     bed = Geometry(
         Scene(grain=Grain(diameter=1e-3), bed=bed_of(packing=packing, **WORN[name]))
     )
-    whole, counted = Worn.whole(bed.packing), bed.packing.windward
+    whole, counted = BedState.whole(bed.packing), bed.packing.windward
     x = np.linspace(bed.line.x[0], bed.line.x[-1], 2000)
-    line = wear.sunk(bed, whole)
+    line = bed_state.sunk(bed, whole)
     assert line.height(x) == pytest.approx(bed.line.height(x), abs=1e-9)
     # the gap between rows, over the cosine of at most 40 degrees, and a grain of level rows
     places = np.where(counted[:, None], np.nan, whole.places)
-    bared = Worn(places, whole.left, whole.speed)
-    sunk = bed.line.height(x) - wear.sunk(bed, bared).height(x)
+    bared = BedState(places, whole.left, whole.speed)
+    sunk = bed.line.height(x) - bed_state.sunk(bed, bared).height(x)
     places = np.sort(bed.packing.centres[counted, 0])
     away = np.abs(x[:, None] - places).min(axis=1)
-    assert sunk[away > wear.EDGE + 3] == pytest.approx(0.0, abs=1e-9)
+    assert sunk[away > bed_state.EDGE + 3] == pytest.approx(0.0, abs=1e-9)
     assert -1e-9 <= sunk.min() <= sunk.max() < 1.7
     assert 0.8 < np.median(sunk[away < 0.5]) < 1.2
 
@@ -91,7 +92,7 @@ def test_a_bed_changes_after_each_part_of_its_grains(
 ) -> None:
     pile, cases = _pile(results, method), results.cases
     assert [flow.kind for flow in pile.flows] == ["flow", "worn", "worn"]
-    begun = (wear.grains(pile, flow, cases) for flow in pile.flows)
+    begun = (wear.state(pile, flow, cases) for flow in pile.flows)
     gone = [np.isfinite(worn.left[pile.packing.windward]) for worn in begun]
     for flow, part in zip(pile.flows[:-1], gone[1:], strict=True):
         assert part.sum() >= wear.goal(pile, flow)

@@ -9,7 +9,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from orchestrator.grains.loads import Geometry
-from orchestrator.grains.pile import in_time
+from orchestrator.grains.pile_case import in_time
 from orchestrator.physics.gusts import gust_stresses, peak_over_mean
 from orchestrator.study.closed_form import closed_form
 from orchestrator.study.scene import Scene

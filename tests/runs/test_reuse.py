@@ -21,7 +21,7 @@ from orchestrator import plan
 from orchestrator.flow.case import FlowCase
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains import motion
-from orchestrator.grains.pile import PileCase
+from orchestrator.grains.pile_case import PileCase
 from orchestrator.physics import laws
 from orchestrator.runs import case as case_states
 from orchestrator.runs import files, reuse

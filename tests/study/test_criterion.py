@@ -11,7 +11,8 @@ from orchestrator.calculator.table import thresholds
 from orchestrator.errors import InputError
 from orchestrator.fidelity.decision import decide
 from orchestrator.grains.motion import Motion
-from orchestrator.grains.pile import Pile, PileCase
+from orchestrator.grains.pile import Pile
+from orchestrator.grains.pile_case import PileCase
 from orchestrator.study import study
 from orchestrator.study.criterion import goes_on, of_single_grain
 from orchestrator.study.scene import Scene

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from orchestrator.flow import model
-from orchestrator.grains import pile
+from orchestrator.grains import methods
+from orchestrator.grains.pile import Pile
 from orchestrator.study.methods import METHODS
 from orchestrator.study.models import MODELS
 from orchestrator.study.parts import PileBed
@@ -29,7 +30,7 @@ def _scene(method: str = "dem", model: str = "solve") -> Scene:
 
 
 def test_each_method_and_each_model_of_a_study_file_has_its_class() -> None:
-    assert set(pile.METHODS) == set(METHODS.values())
+    assert set(methods.METHODS) == set(METHODS.values())
     assert set(model.MODELS) == set(MODELS.values())
 
 
@@ -42,7 +43,7 @@ def test_numbers_of_contacts_and_load_steps_are_of_methods_that_have_them(
     assert scene.method.facts is method
     assert APPLIES["DEM of piles"](scene) == method.is_resolved_in_time
     assert APPLIES["DEM and peeling"](scene) == method.has_contacts
-    runs = pile.Pile(scene).method.cases
+    runs = Pile(scene).method.cases
     assert bool(runs) == method.needs_run
 
 

@@ -14,8 +14,8 @@ from PIL import Image
 
 from orchestrator.bed.line import BedLine
 from orchestrator.digits import percent
-from orchestrator.grains import motion
-from orchestrator.grains import pile as piles
+from orchestrator.grains import motion, wear
+from orchestrator.grains.methods import Dem
 from orchestrator.grains.pile import Pile
 from orchestrator.report import labels, single, solved, units
 from orchestrator.report.figures import Kind
@@ -133,9 +133,9 @@ def read(pile: Pile, cases: Path) -> Steps:
     lines = [(0, pile.line)]
     for worn in pile.flows[1:]:
         # the first grain that moves under its flow
-        gone_before = np.isfinite(piles.grains(pile, worn, cases).left).sum()
+        gone_before = np.isfinite(wear.state(pile, worn, cases).left).sum()
         stop = int(np.searchsorted(moved.moved[stops], gone_before, side="right"))
-        lines.append((stop, piles.line(pile, worn, cases)))
+        lines.append((stop, wear.line(pile, worn, cases)))
     left_at = np.zeros(len(packing.centres), np.int64)
     left_at[packing.windward] = moved.level
     level = np.where(left_at > 0, np.searchsorted(stops, left_at), 0)[grains]
@@ -155,7 +155,7 @@ def _follows_dem(pile: Pile) -> bool:
     two flows, and at that flow no load step was run. Such grains are shown where they
     were packed.
     """
-    return pile.by_dem and not pile.goes_on
+    return pile.scene.method.facts.is_resolved_in_time and not pile.goes_on
 
 
 def _grains_shown(pile: Pile) -> IntArray:
@@ -174,7 +174,7 @@ def _grains_shown(pile: Pile) -> IntArray:
 def _places_by_dem(pile: Pile, cases: Path) -> FloatArray:
     """Places of all grains as packed and after each load step, d: (K + 1, N, 2)."""
     method = pile.method
-    assert isinstance(method, piles.Dem)
+    assert isinstance(method, Dem)
     packing = pile.packing
     d = pile.scene.grain.diameter
     fixed = np.where(packing.mobile[:, None], np.nan, packing.centres)
