@@ -10,7 +10,7 @@ from typing import Any
 from orchestrator.digits import percent
 from orchestrator.physics import verdict
 from orchestrator.physics.beside import FIELD, GOES_ON, LEVEL_DEG
-from orchestrator.physics.reported import COUNT, MEASURED, OF_LAWS, SEEDS, in_units
+from orchestrator.physics.reported import COUNT, MEASURED, OF_LAWS, SEEDS
 from orchestrator.report.card import Card, Number, Worth, decimals
 from orchestrator.report.subjects import (
     DEPTH,
@@ -99,47 +99,6 @@ def quantity(row: Row) -> Quantity:
     if known(row.get(MEAN.column())) > 0:
         return MEAN
     return STRESS
-
-
-def in_unit(row: Row, ustar: float, told: Quantity) -> float:
-    """Convert a friction velocity of a row to the quantity that its flow is told by.
-
-    Parameters
-    ----------
-    row
-        A threshold with the columns of its scene.
-    ustar
-        Undisturbed friction velocity, m/s.
-    told
-        The quantity.
-
-    Returns
-    -------
-    float
-        In the unit of the quantity; NaN where the flow has none.
-    """
-    return float(in_units(ustar, row)[told.column()])
-
-
-def measured_ustar(row: Row, ustar: float) -> float:
-    """Find the undisturbed friction velocity with the measured threshold of a grain.
-
-    Parameters
-    ----------
-    row
-        A threshold with the columns of its scene.
-    ustar
-        The computed friction velocity, m/s.
-
-    Returns
-    -------
-    float
-        That of the same flow, m/s.
-    """
-    measured = known(row["measured_level_ustar_m_s"])
-    if is_level(row):
-        return measured
-    return ustar * measured / float(row["level_ustar_m_s"])
 
 
 def is_level(row: Row) -> bool:

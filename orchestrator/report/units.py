@@ -2,41 +2,20 @@
 
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
-from orchestrator.report import single
+from orchestrator.physics.reported import in_units
 from orchestrator.report.subjects import Quantity
 from orchestrator.types import FloatArray
 
 
-def of_row(row: pd.Series, ustar: Any, told: Quantity) -> FloatArray:
-    """Convert several friction velocities of one row.
-
-    Parameters
-    ----------
-    row
-        A threshold with the columns of its scene.
-    ustar
-        Friction velocities, m/s, shape (n,).
-    told
-        The quantity.
-
-    Returns
-    -------
-    ndarray
-        In its unit, shape (n,).
-    """
-    return np.array([single.in_unit(row, float(one), told) for one in ustar])
-
-
-def of_rows(rows: pd.DataFrame, ustar: Any, told: Quantity) -> FloatArray:
-    """Convert a friction velocity of each row.
+def told_by(rows: Any, ustar: Any, told: Quantity) -> FloatArray:
+    """Take friction velocities in the unit of a quantity.
 
     Parameters
     ----------
     rows
-        Thresholds with the columns of their scenes.
+        A threshold with the columns of its scene, or a table of n.
     ustar
         Friction velocities, m/s, shape (n,).
     told
@@ -47,8 +26,7 @@ def of_rows(rows: pd.DataFrame, ustar: Any, told: Quantity) -> FloatArray:
     ndarray
         In its unit, shape (n,).
     """
-    pairs = zip(rows.to_dict("records"), ustar, strict=True)
-    return np.array([single.in_unit(row, float(one), told) for row, one in pairs])
+    return in_units(ustar, rows)[told.column()]
 
 
 def measured_over_computed(row: pd.Series) -> float:

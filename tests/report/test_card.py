@@ -9,6 +9,7 @@ import pytest
 from orchestrator.physics import saltation, verdict
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.gusts import peak_over_mean
+from orchestrator.physics.reported import in_units
 from orchestrator.physics.threshold import thresholds_of
 from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.report import answers, figures, single, units
@@ -139,12 +140,12 @@ def test_the_growth_of_motion_passes_through_the_answer(results: Results) -> Non
     curve = heap.tables["pile_curve"]
     told = single.quantity(row)
     assert np.asarray(computed.get_xdata()) == pytest.approx(
-        units.of_row(row, curve["ustar0_m_s"], told)
+        units.told_by(row, curve["ustar0_m_s"], told)
     )
     assert np.asarray(computed.get_ydata()).tolist() == curve["fraction_moved"].tolist()
     ratio = units.measured_over_computed(row)
     assert np.asarray(measured.get_xdata()) == pytest.approx(
-        units.of_row(row, ratio * curve["ustar0_m_s"], told)
+        units.told_by(row, ratio * curve["ustar0_m_s"], told)
     )
     ((flow, part),) = np.asarray(card.get_xydata(), float)
     assert flow == pytest.approx(answers.card(heap).numbers[2].value)
@@ -171,17 +172,21 @@ def test_motion_starts_within_the_interval_of_its_place(results: Results) -> Non
 def test_the_first_motion_has_an_interval_in_its_unit(results: Results) -> None:
     heap = only(results, "pile")
     row = heap.joined("pile_threshold").iloc[0]
-    first = row["first_ustar0_m_s"]
-    assert math.isnan(row["first_ustar0_low_m_s"])
-    assert math.isnan(row["first_ustar0_high_m_s"])
+    first = row["first_wind_10m_m_s"]
+    assert math.isnan(row["first_wind_10m_low_m_s"])
+    assert math.isnan(row["first_wind_10m_high_m_s"])
     assert math.isnan(answers.card(heap).numbers[1].low)
-    ends = {"first_ustar0_low_m_s": 0.9 * first, "first_ustar0_high_m_s": 1.1 * first}
+    ends = {
+        "first_wind_10m_low_m_s": 0.9 * first,
+        "first_wind_10m_high_m_s": 1.1 * first,
+    }
     known = heap.tables["pile_threshold"].assign(**ends)
     number = answers.card(changed(heap, pile_threshold=known)).numbers[1]
     assert number.low < number.value < number.high
     beside: dict[str, float | str] = {"tested_rows": 20.0, "tested_held": 0.8}
     beside |= {"interval_of": "measured thresholds"}
-    beside |= {"first_ustar0_low_m_s": first / 2, "first_ustar0_high_m_s": 2 * first}
+    beside |= {"first_wind_10m_low_m_s": first / 2}
+    beside |= {"first_wind_10m_high_m_s": 2 * first}
     table = heap.tables["pile_threshold"].assign(**beside)
     tested = answers.card(changed(heap, pile_threshold=table)).numbers[1]
     assert "80 % of 20 measured" in tested.interval_of
@@ -226,8 +231,10 @@ def test_labels_of_the_picture_of_a_grain_lie_on_no_points(
     grain = only(results, "grain").joined("single_grain").iloc[0].copy()
     # of this roughness the thresholds of grains that go on are tabulated
     grain["z0_m"] = grain["d_m"] / 30
-    grain["ustar0_m_s"] = grain["ustar_m_s"]
-    grain["measured_level_ustar_m_s"] = measured * grain["ustar0_m_s"]
+    ustar = grain["ustar_m_s"]
+    columns = in_units(ustar, grain)
+    columns |= in_units(measured * ustar, grain, before="measured_")
+    grain = pd.Series({**grain, **columns})
     canvas = of_one.of_grain(grain)
     canvas.draw_without_rendering()
     for ax in canvas.axes:

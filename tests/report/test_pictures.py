@@ -273,7 +273,7 @@ def test_the_map_shows_every_grain_at_its_place(train: Results) -> None:
     known = np.isfinite(x)
     np.testing.assert_allclose(x[known], goes["x_m"])
     row = train.joined("pile_threshold").iloc[0]
-    at = units.of_row(row, goes["ustar0_m_s"], single.quantity(row))
+    at = units.told_by(row, goes["ustar0_m_s"], single.quantity(row))
     np.testing.assert_allclose(told[known], at)
 
 

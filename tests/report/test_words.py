@@ -13,6 +13,7 @@ from orchestrator.report.figures import shields as overview
 from orchestrator.report.results import Results
 from orchestrator.report.shields import LABEL, SHAPE
 from orchestrator.study import fields
+from orchestrator.tables.quoted import reported
 from tests import small_study
 from tests.report.conftest import changed, copies, legend_of, only
 
@@ -146,10 +147,10 @@ def test_each_fluid_has_a_row_and_a_sentence(results: Results) -> None:
 
 def test_seeds_are_one_row_with_their_range(results: Results) -> None:
     thetas = (0.04, 0.05, 0.09)
-    ustar = float(results.at_fraction["ustar0_m_s"].iloc[0])
+    wind = float(results.at_fraction["wind_10m_m_s"].iloc[0])
     ends = {
-        "ustar0_low_m_s": ustar * np.sqrt(0.04 / 0.06),
-        "ustar0_high_m_s": ustar * np.sqrt(0.09 / 0.06),
+        "wind_10m_low_m_s": wind * np.sqrt(0.04 / 0.06),
+        "wind_10m_high_m_s": wind * np.sqrt(0.09 / 0.06),
     }
     seeds = (
         {"seed": n, "packing": "disordered", "shields": t, **ends}
@@ -189,7 +190,8 @@ def test_a_threshold_that_is_not_usable_says_so(results: Results) -> None:
     bad = results.tables["pile_threshold"].assign(
         usable=False, verdict="not usable", why_not="Re* 2 is below 30"
     )
-    study = changed(results, pile_threshold=bad)
+    against = bad[["scene_id", "fraction", "why_not"]].assign(reason="law", remedy="")
+    study = changed(results, pile_threshold=bad, reason=against)
     worth = answers.card(study).worth
     assert (worth.mark, worth.word) == ("bad", "not usable: Re* 2 is below 30")
     heads = [remark.head for remark in remarks.remarks(study)]
@@ -212,7 +214,7 @@ def test_over_rougher_ground_a_weaker_wind_has_the_same_friction_velocity(
     for speed in (ustar, *winds):
         assert f"{speed:#.3g} m/s" in said
     # over grains that are as rough as such ground the wind is no weaker
-    said = remarks.over_ground(heap.exemplars.assign(z0_m=2e-4)).text
+    said = remarks.over_ground(reported(heap.exemplars.assign(z0_m=2e-4))).text
     assert "0.1 mm" not in said
     assert f"{winds[2]:#.3g} m/s" in said
 

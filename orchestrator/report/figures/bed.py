@@ -253,7 +253,7 @@ def draw(results: Results) -> Iterator[Figure]:
         share = percent(steps.totals[shown] / pile.packing.count)
         told = ", ".join(labels.told(row, ["alpha_deg", "d_m", *telling]))
         told_by = single.quantity(row)
-        flows = units.of_row(row, steps.flow, told_by)
+        flows = units.told_by(row, steps.flow, told_by)
         name = f"bed-alpha{pile.bed.slope_deg:g}"
         if name in seen:
             name = f"{name}-{row['method']}"

@@ -106,17 +106,17 @@ def _draw_card(row: pd.Series, others: Sequence[str], table: pd.DataFrame) -> Ca
     alike: Look = {"label": "beds that differ in chance", "color": ANSWER, "lw": 0.6}
     for scene in others:
         points = table[table["scene_id"] == scene]
-        flow = units.of_row(row, points["ustar0_m_s"], told)
+        flow = units.told_by(row, points["ustar0_m_s"], told)
         _draw_curve(ax, flow, points["fraction_moved"], alike)
     points = table[table["scene_id"] == row["scene_id"]]
     moved = points["fraction_moved"]
     factors = [(1.0, COMPUTED)]
     if not single.is_level(row):
         factors.append((units.measured_over_computed(row), BESIDE))
-    at = single.in_unit(row, float(row["ustar0_m_s"]), told)
+    at = float(row[told.column()])
     reach = [at]
     for factor, look in factors:
-        flow = units.of_row(row, factor * points["ustar0_m_s"], told)
+        flow = units.told_by(row, factor * points["ustar0_m_s"], told)
         _draw_curve(ax, flow, moved, look)
         reach += _reach(flow, moved)
     fraction = float(row["fraction"])

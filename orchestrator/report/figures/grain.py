@@ -1,6 +1,5 @@
 """One grain: its threshold by force law and by size."""
 
-import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -83,8 +82,8 @@ def of_grain(row: pd.Series) -> Canvas:
     d = here["d_m"].to_numpy()
     found = of_rows(here)
     ustar = np.where(found["holds"], found["ustar"], np.nan)
-    computed = units.of_rows(here, ustar, told)
-    measured = units.of_rows(here, _curve(row, d), told)
+    computed = units.told_by(here, ustar, told)
+    measured = units.told_by(here, _curve(row, d), told)
     curves = pd.DataFrame({"mm": 1e3 * d, "computed": computed, "measured": measured})
     canvas = style.canvas(2.6)
     left, right = canvas.subplots(1, 2)
@@ -105,10 +104,10 @@ def _by_law(ax: Axes, row: pd.Series, told: Quantity) -> None:
     """A line of dots: the threshold under each law."""
     found = []
     for name, (ustar, holds) in answers.by_law(row).items():
-        found.append((holds, single.in_unit(row, ustar, told), name))
+        found.append((holds, float(units.told_by(row, ustar, told)), name))
     found.sort(key=lambda one: (one[0], one[1] if one[0] else -one[1]))
     asked = str(row["force_law"])
-    measured = single.in_unit(row, single.measured_ustar(row, row["ustar0_m_s"]), told)
+    measured = float(row[f"measured_{told.column()}"])
     for place, (holds, value, name) in enumerate(found):
         look: Look = {"ms": 4.5, "mew": 1.0}
         if name == asked:
@@ -141,8 +140,7 @@ def _by_law(ax: Axes, row: pd.Series, told: Quantity) -> None:
 
 def _measured_lines(ax: Axes, row: pd.Series, told: Quantity) -> None:
     """A dashed line where the threshold was measured, and the field's range."""
-    ustar = float(row["ustar0_m_s"])
-    measured = single.in_unit(row, single.measured_ustar(row, ustar), told)
+    measured = float(row[f"measured_{told.column()}"])
     ax.axvline(measured, color=INK, lw=1.1, ls=MEASURED, zorder=1)
     name = "wind tunnels" if is_gas(float(row["rho_f_kg_m3"])) else "flumes"
     look: Look = {
@@ -154,22 +152,10 @@ def _measured_lines(ax: Axes, row: pd.Series, told: Quantity) -> None:
     ax.annotate(name, (measured, 1.0), xytext=(4, 0), **look)
     if not row["measured_rows"] > 0:
         return
-    ends = []
-    for theta in (row["measured_low"], row["measured_high"]):
-        ratio = math.sqrt(float(theta) / _measured_theta(row))
-        at = single.measured_ustar(row, ustar) * ratio
-        ends.append(single.in_unit(row, at, told))
-    ax.axvspan(*ends, color=RANGE, lw=0, zorder=0)
+    low, high = (row[f"measured_{told.column(end)}"] for end in ("_low", "_high"))
+    ax.axvspan(low, high, color=RANGE, lw=0, zorder=0)
     sites = "field" if is_gas(float(row["rho_f_kg_m3"])) else "80 %"
-    ax.annotate(sites, (ends[0], 1.0), xytext=(-4, 0), ha="right", **look)
-
-
-def _measured_theta(row: pd.Series) -> float:
-    """The Shields number of the measured threshold of a grain."""
-    density = float(row["rho_f_kg_m3"])
-    weight = (float(row["rho_sol_kg_m3"]) - density) * float(row["g_m_s2"])
-    ustar = float(row["measured_level_ustar_m_s"])
-    return density * ustar**2 / (weight * float(row["d_m"]))
+    ax.annotate(sites, (low, 1.0), xytext=(-4, 0), ha="right", **look)
 
 
 def _by_size(ax: Axes, row: pd.Series, curves: pd.DataFrame, told: Quantity) -> None:
@@ -178,7 +164,7 @@ def _by_size(ax: Axes, row: pd.Series, curves: pd.DataFrame, told: Quantity) -> 
     mm, computed, measured = curves.to_numpy().T
     ax.plot(mm, computed, color=ANSWER, lw=1.5)
     ax.plot(mm, measured, color=INK, lw=1.1, ls=MEASURED)
-    value = single.in_unit(row, float(row["ustar0_m_s"]), told)
+    value = float(row[told.column()])
     ax.plot([1e3 * size], [value], "o", color=ANSWER, ms=6, mec="white")
     # both curves rise to the right: what is below them is free there
     is_below = value < measured[len(measured) // 2]

@@ -7,7 +7,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
-from orchestrator.report import answers, labels, sheets, single, style, theory, units
+from orchestrator.report import answers, labels, sheets, style, theory
 from orchestrator.report.figures import Kind
 from orchestrator.report.results import Results, case_names
 from orchestrator.report.style import ANSWER, INK, MEASURED, NONE, PALE, Figure
@@ -119,7 +119,7 @@ def _draw_series(
     """A curve of a sweep: computed, with intervals and hollow points, and measured."""
     part = part.sort_values(column)
     x = scale * part[column].to_numpy(float)
-    y = units.of_rows(part, part["ustar0_m_s"], told)
+    y = part[told.column()].to_numpy(float)
     look = {"ls": DASHES[number], "label": name}
     ax.plot(x, y, color=ANSWER, lw=1.5, **look)
     low = part[told.column("_low")].to_numpy(float)
@@ -129,11 +129,8 @@ def _draw_series(
     marker = MARKERS[number]
     ax.plot(x[usable], y[usable], marker, color=ANSWER, ms=5)
     ax.plot(x[~usable], y[~usable], marker, color=NONE, mfc="white", ms=5)
-    measured = [
-        single.measured_ustar(row, row["ustar0_m_s"]) for _, row in part.iterrows()
-    ]
-    told_ = units.of_rows(part, measured, told)
-    ax.plot(x, told_, color=INK, lw=1.1, ls=MEASURED, zorder=1.5)
+    measured = part[f"measured_{told.column()}"].to_numpy(float)
+    ax.plot(x, measured, color=INK, lw=1.1, ls=MEASURED, zorder=1.5)
 
 
 FIGURE = Kind(order=90, draws=draw, uses=("pile_threshold", "single_grain"))

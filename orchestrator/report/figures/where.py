@@ -169,9 +169,9 @@ def _thresholds(ax: Axes, row: pd.Series, grains: pd.DataFrame, told: Quantity) 
     goes = np.isfinite(grains["ustar0_m_s"]) & (grains["ustar0_m_s"] > 0)
     x = grains.loc[goes, "x_m"].to_numpy(float)
     ustar = grains.loc[goes, "ustar0_m_s"].to_numpy(float)
-    computed = units.of_row(row, ustar, told)
+    computed = units.told_by(row, ustar, told)
     factor = units.measured_over_computed(row)
-    measured = units.of_row(row, factor * ustar, told)
+    measured = units.told_by(row, factor * ustar, told)
     cuts = _parted(x)
     _band(ax, row, x, ustar, told)
     ax.plot(*_broken(x, measured, cuts), **BESIDE)
@@ -193,8 +193,8 @@ def _band(ax: Axes, row: pd.Series, x: Any, ustar: Any, told: Quantity) -> None:
     if not (math.isfinite(error) and error < 1):
         return
     least, most = within(1.0, error)
-    low = units.of_row(row, ustar * math.sqrt(least), told)
-    high = units.of_row(row, ustar * math.sqrt(most), told)
+    low = units.told_by(row, ustar * math.sqrt(least), told)
+    high = units.told_by(row, ustar * math.sqrt(most), told)
     for part in np.split(np.arange(len(x)), _parted(x)):
         ax.fill_between(x[part], low[part], high[part], color=PALE, lw=0)
 
@@ -250,7 +250,7 @@ def _line(
         where = f"x of {bed.profile.name}, m"
     part = percent(row["fraction"])
     if np.isfinite(row["ustar0_m_s"]):
-        flow = single.in_unit(row, float(row["ustar0_m_s"]), told)
+        flow = float(row[told.column()])
         where += f"; thick: the {part} that moves by {flow:.3g} {told.unit}"
     ax.set(xlabel=where, ylabel="z, m", ylim=(low, None))
     arrow: Look = {"xycoords": "axes fraction", "color": FLOW, "weight": "bold"}
@@ -263,7 +263,7 @@ def _line(
 def _first(axes: Sequence[Axes], row: pd.Series, pile: Pile, told: Quantity) -> None:
     """Mark the place where motion starts, with its flow."""
     x = float(row["first_x_m"])
-    value = single.in_unit(row, float(row["first_ustar0_m_s"]), told)
+    value = float(row[f"first_{told.column()}"])
     for ax in axes:
         ax.axvline(x, color=ANSWER, lw=0.8, ls=":", zorder=0.5)
     top = axes[0]
