@@ -207,5 +207,5 @@ def test_an_unknown_law_is_answered_with_the_known_ones(
 
 
 def test_no_subclass_takes_part_in_the_interval_unless_it_says_so() -> None:
-    assert all(each.in_interval for each in LAWS.values())
+    assert Bridged.in_interval
     assert not type("Weaker", (Bridged,), {"name": "weaker"}).in_interval  # type: ignore[attr-defined]
