@@ -107,15 +107,36 @@ def code_of(kind: "type[Case]") -> str:
         room = module.relative_to(PACKAGE).parts[0]
         own = PACKAGE / room
         below = ROOMS[: ROOMS.index(room)] if room in ROOMS else ROOMS
+    return _digest_of([*(PACKAGE / part for part in below), own], [kind.template])
+
+
+@cache
+def code_of_all() -> str:
+    """Compute one digest of the whole package and of all templates.
+
+    Returns
+    -------
+    str
+        SHA-256 as of `code_of`.
+    """
+    root = templates()
+    lists = sorted(root.rglob(FILES))
+    names = [path.parent.relative_to(root).as_posix() for path in lists]
+    return _digest_of([PACKAGE], names)
+
+
+def _digest_of(places: Iterable[Path], template_names: Iterable[str]) -> str:
+    """One digest of files, of all files in folders, and of the files of templates."""
     digests = {}
-    for place in (own, *(PACKAGE / room for room in below)):
+    for place in places:
         inside = place.rglob("*") if place.is_dir() else [place]
         for path in inside:
             if path.is_file() and path.suffix != ".pyc":
                 name = path.relative_to(place.parent).as_posix()
                 digests[name] = files.digest_file(path)
-    for name, _, content in template_files(kind.template):
-        digests[f"{kind.template}/{name}"] = sha256(content).hexdigest()
+    for template in template_names:
+        for name, _, content in template_files(template):
+            digests[f"{template}/{name}"] = sha256(content).hexdigest()
     return digest_text(canonical_json(digests))
 
 

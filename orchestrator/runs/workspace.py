@@ -7,7 +7,6 @@ import os
 import socket
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping
-from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -312,7 +311,7 @@ class Workspace(Folder):
         return {
             "question": digest_text(question),
             "cases": dict(ids),
-            "code": _code_digest(),
+            "code": case_states.code_of_all(),
             "sha256": self.written(),
         }
 
@@ -389,21 +388,6 @@ class Workspace(Folder):
             remedy = "to draw the others, move tables away"
             remedy = f"`orchestrator study` runs them again; {remedy}"
             raise OrchestratorError(what, str(self.root), remedy)
-
-
-@cache
-def _code_digest() -> str:
-    """Digest of all files of the package and of the templates, with their names."""
-    digests = {}
-    for root in (files.PACKAGE, case_states.templates()):
-        for folder, _, names in os.walk(root):
-            for name in names:
-                path = Path(folder, name)
-                if path.suffix == ".pyc":
-                    continue
-                key = f"{root.name}/{path.relative_to(root)}"
-                digests[key] = files.digest_file(path)
-    return digest_text(canonical_json(digests))
 
 
 def beside(root: Path, *parents: Path) -> tuple[Path, ...]:
