@@ -24,7 +24,7 @@ SHOWN = {
     "stockpile": "erosion.svg",
     "cone": "stress.svg",
     "hills": "hills.svg",
-    "poured": "poured-dem.svg",
+    "poured": "bed-alpha0.svg",
     "mixture": "hiding.svg",
     "shields": "shields.svg",
     "paper": "fractions-reynolds-alpha15.svg",

@@ -271,6 +271,8 @@ def _first(axes: Sequence[Axes], row: pd.Series, pile: Pile, told: Quantity) -> 
     is_left = x < np.mean(top.get_xlim())
     look: Look = {"textcoords": "offset points", "va": "top", "color": ANSWER}
     look |= {"ha": "left" if is_left else "right", "weight": "bold", "gid": "first"}
+    # it may lie on the curves of other forms
+    look["bbox"] = {"fc": "white", "ec": "none", "pad": 1.0, "alpha": 0.8}
     text = (
         f"motion starts at x = {counted.place(x, pile.bed)} m, {value:.3g} {told.unit}"
     )
