@@ -60,7 +60,7 @@ def test_each_criterion_has_a_curve_of_its_own_with_its_name(tmp_path: Path) -> 
     (figure,) = overview.draw(made)
     (ax,) = axes_of(figure)
     found = curves(ax)
-    assert sorted(name.partition(": ")[2] for name in found) == [
+    assert sorted(name.rpartition(", ")[2] for name in found) == [
         theory.GOING,
         theory.LEAVING,
     ]
