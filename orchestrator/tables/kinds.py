@@ -43,13 +43,15 @@ def tested_as(table: Any) -> list[str]:
     ----------
     table
         A table, or a mapping of columns, of thresholds with those of `OF_KIND` that
-        they have.
+        they have; one without beds is of single grains.
 
     Returns
     -------
     list of str
         For each threshold `GRAIN`, `STRIP`, or nothing.
     """
+    if "bed" not in table:
+        return [GRAIN] * len(table["reynolds"])
     return [_kind(row) for row in _rows_of(table)]
 
 
