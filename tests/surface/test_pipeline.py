@@ -133,7 +133,7 @@ def test_maps_lie_where_the_surface_lies(folder: Path) -> None:
     by_x = heap.steps[0]
     with rasterio.open(folder / "maps" / "1-ustar_over_ustar0-270.tif") as dataset:
         step, _ = dataset.res
-        east, north = dataset.transform * (0, 0)
+        east, north = dataset.bounds.left, dataset.bounds.top
         values = dataset.read(1)[::-1]
     # cells are nodes of the surface, and the form lies about its middle
     assert step / by_x == pytest.approx(round(step / by_x))
