@@ -247,7 +247,8 @@ class Grain:
         Parameters
         ----------
         **numbers
-            The new fields, which broadcast with the others.
+            The new fields, which broadcast with the others; with another roughness the
+            gap is z0 again, unless it is given.
 
         Returns
         -------
@@ -255,6 +256,8 @@ class Grain:
             The changed grains.
         """
         kept = {each.name: getattr(self, each.name) for each in fields(self)}
+        if "roughness" in numbers:
+            del kept["gap"]
         return Grain(**{**kept, **numbers})
 
     def _each(self, change: Callable[[FloatArray], FloatArray]) -> "Grain":

@@ -326,7 +326,7 @@ class ForceLaw(ABC):
         with np.errstate(all="ignore"):
             above_sublayer = np.maximum(ustar, at.ustar(SUBLAYER))
             wall = velocity.smooth_wall_roughness(above_sublayer, at.viscosity)
-            smooth = at.changed(roughness=at.roughness + wall)
+            smooth = at.changed(roughness=at.roughness + wall, gap=at.gap)
             over = self.speed(ustar, at) / self.speed(ustar, smooth)
         return np.asarray(np.where(reynolds < SUBLAYER, 1.0, over))
 

@@ -19,7 +19,7 @@ from orchestrator.physics.grain import Grain
 from orchestrator.study import fields, scopes, study
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import changed
-from orchestrator.tables.kinds import tested_as
+from orchestrator.tables import kinds
 
 TOOL = Path(__file__).parents[2] / "tools" / "tested.py"
 FLUMES = ("flumes, visual", "flumes, fixed intensity", "flumes, reference transport")
@@ -94,7 +94,7 @@ def test_the_interval_of_a_kind_holds_its_rows_in_flumes() -> None:
         "reynolds": 5.0,
     }
     grain |= {"alpha_s": 1.615, "cohesion_n_m": 0.0, "rho_f_kg_m3": 1000.0}
-    grain |= {"rho_sol_kg_m3": 2650.0, "g_m_s2": 9.81}
+    grain |= {"rho_sol_kg_m3": 2650.0, "nu_m2_s": 1e-6, "g_m_s2": 9.81}
     low, high, rows, held = found(grain)
     ratio = (beds["shields"] / at.shields)[here]
     # it is right for all angles and d/z0 of its range, and the widest
@@ -119,7 +119,7 @@ def found(row: dict[str, Any]) -> list[float]:
     """The tested interval of a threshold."""
     table = {name: np.array([value], object) for name, value in row.items()}
     if "bed" in row:
-        table[beside.TESTED_AS] = np.array(tested_as(table), object)
+        table[beside.TESTED_AS] = np.array(kinds.tested_as(table), object)
     return [float(each) for each in beside.tested(table)[:, 0]]
 
 

@@ -332,3 +332,10 @@ def test_what_a_law_does_not_know_is_neither_never_nor_at_once() -> None:
         with pytest.raises(InputError, match="from which flow 1 of 3 leave"):
             check_known(found, "blind")
         check_known(found[1:], "blind")
+
+
+def test_a_grain_on_another_bed_has_the_gap_of_that_bed() -> None:
+    rougher = SAND.changed(roughness=2e-4)
+    assert float(rougher.gap) == 2e-4
+    assert float(rougher.changed(diameter=2e-3).gap) == 2e-4
+    assert float(SAND.changed(roughness=2e-4, gap=1e-5).gap) == 1e-5
