@@ -8,9 +8,13 @@ from pathlib import Path
 import pandas as pd
 
 from orchestrator import tables
+from orchestrator.study.fields import OF_METHOD, OF_QUESTION
 
 LISTED = Path(__file__).with_name("columns.csv")
-"""The columns of each table, in their order."""
+"""The columns of each table, in their order; `FIELDS` stands for those that are fields of
+a study file."""
+FIELDS = {"scenes": OF_QUESTION, "methods": OF_METHOD}
+"""The columns of fields, by the table that has them."""
 TABLES = {
     "scenes": "a scene: the values of its fields, and the groups that ask for it",
     "methods": "a scene: how it was answered, and why",
@@ -50,13 +54,22 @@ END = """
 """
 
 
+def listed() -> pd.DataFrame:
+    """The columns of each table, a row for each."""
+    rows = []
+    for table, column in pd.read_csv(LISTED).itertuples(index=False):
+        columns = FIELDS[table] if column == "FIELDS" else (column,)
+        rows += [{"table": table, "column": each} for each in columns]
+    return pd.DataFrame(rows)
+
+
 def text() -> str:
     """Write the page."""
-    listed = pd.read_csv(LISTED)
+    every = listed()
     lines = [f"| [{name}](#{name}) | {row} |" for name, row in TABLES.items()]
     for name in TABLES:
         lines += ["", f"## {name}", "", "| column | meaning |", "|---|---|"]
-        for column in listed.loc[listed["table"] == name, "column"]:
+        for column in every.loc[every["table"] == name, "column"]:
             meaning = tables.COLUMNS[column]
             told = meaning.replace("*", r"\*").replace("|", r"\|").replace("<", r"\<")
             lines.append(f"| `{column}` | {told} |")

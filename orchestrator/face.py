@@ -254,6 +254,7 @@ def run(
     _check_path("source", source)
     if out is not None:
         _check_path("out", out)
+    [*guests.offers()]  # they have hints on the keys of their own beds
     asked = study.load(source, tolerance)
     place = Path(out or Path("results") / asked.name)
     finished = pipeline.run(asked, place, workers=workers)

@@ -24,6 +24,27 @@ def test_three_names_are_public_and_importing_them_is_cheap() -> None:
         orchestrator.nothing  # noqa: B018
 
 
+HINT = """
+import orchestrator
+try:
+    orchestrator.run("pile.toml")
+except Exception as error:
+    print(error)
+"""
+
+
+def test_a_key_of_the_bed_of_a_guest_is_explained_in_a_new_python(
+    tmp_path: Path,
+) -> None:
+    text = "grain.diameter = 1e-3\nbed.kind = 'pile'\nflow.from_deg = 90.0\n"
+    (tmp_path / "pile.toml").write_text(text)
+    command = [sys.executable, "-c", HINT]
+    ended = subprocess.run(
+        command, cwd=tmp_path, capture_output=True, timeout=HANGS_S, check=True
+    )
+    assert b"flow.from_deg: beds in three dimensions alone have it" in ended.stdout
+
+
 def test_thresholds_of_arrays_have_a_row_for_each_point() -> None:
     d = np.array([1e-4, 2e-4, 1e-3])
     line = orchestrator.threshold(d, slope_deg=15.0)
