@@ -51,5 +51,7 @@ def table(
     for cells in shown:
         drawn.add_row(*map(Text, cells))
     out = StringIO()
-    Console(file=out, width=WIDEST, color_system=None).print(drawn)
+    # in a notebook rich would show the table itself, and write nothing
+    console = Console(file=out, width=WIDEST, color_system=None, force_jupyter=False)
+    console.print(drawn)
     return [line.rstrip() for line in out.getvalue().splitlines()]
