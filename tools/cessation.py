@@ -14,7 +14,7 @@ from unittest.mock import patch
 import numpy as np
 import pandas as pd
 
-from orchestrator.lab.validate import FOLDER, measured
+from orchestrator.lab.validate import FOLDER, measured_grains
 from orchestrator.physics import saltation
 from orchestrator.physics.laws import SphereDrag
 from orchestrator.types import FloatArray
@@ -41,7 +41,7 @@ def main() -> pd.DataFrame:
     """Model over measurement of each row, by drag law."""
     rows = pd.read_csv(FOLDER / "cessation.csv")
     rows = rows[rows["set"] == SET].sort_values("d_m", ignore_index=True)
-    grains = measured(rows, RATIO)
+    grains = measured_grains(rows, RATIO)
     table = rows[["source", "d_m", "shields"]].copy()
     table["clift_gauvin"] = saltation.thresholds(grains).cessation / rows["shields"]
     for column, level in LEVELS.items():

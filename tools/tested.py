@@ -23,7 +23,7 @@ from orchestrator.lab.validate import (
     INTENSITY,
     MODELS,
     going_on,
-    measured,
+    measured_grains,
     single,
 )
 from orchestrator.physics import saltation
@@ -125,12 +125,12 @@ def of_grains() -> pd.DataFrame:
     widest of those of its ends and of its middle.
     """
     beds = pd.read_csv(FOLDER / "beds.csv").rename(columns={"shields": "measured"})
-    grains = measured(beds)
+    grains = measured_grains(beds)
     beds = beds.assign(galileo=grains.galileo, density_ratio=grains.density_ratio)
     made: list[Row] = []
     for name, span in RATIOS.items():
         ratios = sorted({name, *span})
-        hops = {each: saltation.hops(measured(beds, each)) for each in ratios}
+        hops = {each: saltation.hops(measured_grains(beds, each)) for each in ratios}
         further = {
             each: going_on(beds, GUST, leaves=False, ratio=each) for each in ratios
         }

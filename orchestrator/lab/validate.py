@@ -163,7 +163,7 @@ def single(
     Onset
         Thresholds of leaving the pocket, of shape (rows,).
     """
-    grain = measured(beds, ratio).changed(entrainment_angle_deg=beta_deg)
+    grain = measured_grains(beds, ratio).changed(entrainment_angle_deg=beta_deg)
     return of_grains(grain, law)
 
 
@@ -224,14 +224,14 @@ def going_on(
     FloatArray
         Shields numbers of the mean flow, of shape (rows,).
     """
-    grains = measured(beds, ratio)
+    grains = measured_grains(beds, ratio)
     if not leaves:
         return saltation.tabulated(grains).initiation(gust)
     steady = single(beds, "bridged-gravel", 60, ratio).shields
     return Criteria(steady, grains, gust).shields
 
 
-def measured(beds: pd.DataFrame, ratio: float = 30) -> Grain:
+def measured_grains(beds: pd.DataFrame, ratio: float = 30) -> Grain:
     """Make the grains of measured beds.
 
     Parameters
@@ -330,7 +330,7 @@ def compared(
         }
     )
     ends = pd.read_csv(FOLDER / "cessation.csv").rename(columns={"shields": "measured"})
-    ceases = saltation.tabulated(measured(ends)).cessation
+    ceases = saltation.tabulated(measured_grains(ends)).cessation
     without_gusts: dict[str, _Answers] = {}
     rows = []
     for model in MODELS:
@@ -369,7 +369,7 @@ def compared(
 def _measured_beds() -> pd.DataFrame:
     """The measured beds, with Galileo number and pull of a contact over the weight."""
     beds = pd.read_csv(FOLDER / "beds.csv").rename(columns={"shields": "measured"})
-    grains = measured(beds)
+    grains = measured_grains(beds)
     return beds.assign(
         galileo=grains.galileo,
         sure=READ,

@@ -249,7 +249,7 @@ def test_grains_that_go_on_are_as_near_as_the_documents_say() -> None:
     # in water a grain that leaves stops with its gust; in air one that leaves goes on
     alone = validate.going_on(beds, validate.GUST, leaves=False)
     in_water = beds["rho_f_kg_m3"] > 100
-    can_hop = saltation.hops(validate.measured(beds))
+    can_hop = saltation.hops(validate.measured_grains(beds))
     assert (alone[in_water & can_hop] == shields[in_water & can_hop]).mean() > 0.95
     assert (alone[~in_water] < shields[~in_water]).all()
     # one that cannot hop goes on where the mean stress turns it over
@@ -260,7 +260,7 @@ def test_grains_that_go_on_are_as_near_as_the_documents_say() -> None:
 def test_a_shallow_flow_is_why_steep_beds_hold_their_grains() -> None:
     beds = pd.read_csv(validate.FOLDER / "beds.csv")
     steep = beds[beds["set"] == "steep flumes"].iloc[::4]
-    shallow = validate.measured(steep)
+    shallow = validate.measured_grains(steep)
     deep = shallow.changed(fall=0.0)
     in_deep = saltation.thresholds(deep).cessation / steep["shields"]
     in_shallow = saltation.thresholds(shallow).cessation / steep["shields"]
