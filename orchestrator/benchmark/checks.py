@@ -35,7 +35,7 @@ Question = tuple[str, float, float | None]
 """Quantity, exact value, and the argument of a quantity that is a function."""
 
 
-def checks() -> Iterator[Problem]:
+def all_checks() -> Iterator[Problem]:
     """Make the scenes that check the contact law.
 
     Yields

@@ -7,7 +7,7 @@ from pathlib import Path
 from orchestrator.command import Command, Parser
 
 
-def options(command: Parser) -> None:
+def add_options(command: Parser) -> None:
     """Add the parts of the command.
 
     Parameters
@@ -158,7 +158,7 @@ COMMAND = Command(
         "benchmark export pack": "write the scenes that are formulas",
         "benchmark run pack --solver './mine {case} {out}'": "judge a solver",
     },
-    options=options,
+    options=add_options,
     run=lambda _: 0,  # one of its parts is required, and runs
 )
 """The command."""

@@ -18,7 +18,14 @@ from rich.progress import BarColumn, Progress, TextColumn
 
 from orchestrator.benchmark import judge, pack, page
 from orchestrator.benchmark.export import Ours
-from orchestrator.benchmark.judge import ANSWER, ANSWER_BYTES, MIB, OURS, USED, name_of
+from orchestrator.benchmark.judge import (
+    ANSWER,
+    ANSWER_BYTES,
+    MIB,
+    OURS,
+    USED,
+    solver_name,
+)
 from orchestrator.benchmark.pack import Pack
 from orchestrator.digits import number
 from orchestrator.errors import InputError, printable
@@ -120,7 +127,7 @@ def run(root: Path, command: str, out: Path | None, options: Options) -> Outcome
     InputError
         If the pack, the command or the directory cannot be used.
     """
-    chosen = pack.read(root.absolute())
+    chosen = pack.read_pack(root.absolute())
     words = split(command)
     solver = options.name or _name_of_program(words)
     if solver == OURS:
@@ -139,10 +146,10 @@ def run(root: Path, command: str, out: Path | None, options: Options) -> Outcome
         for name in shown({name: chosen.scenes[name]["level"] for name in names}):
             _solve(words, chosen.root / pack.SCENES / name, options, folder, name)
             answer, times = ours.answer(name)
-            folder.note(f"{OURS}/{name}/{ANSWER}", pack.csv(answer))
+            folder.note(f"{OURS}/{name}/{ANSWER}", pack.csv_of(answer))
             folder.note(f"{OURS}/{name}/{USED}", text_of(times))
         pack.verify(chosen.root, chosen.manifest)
-        return _written(chosen, judge.judge(chosen, names, [out]), folder)
+        return _written(chosen, judge.judge_solvers(chosen, names, [out]), folder)
 
 
 def shown(levels: Mapping[str, int]) -> Iterator[str]:
@@ -218,9 +225,9 @@ def compare(
         If the pack or a directory cannot be used, if `run` noted another pack for the
         answers, or if two solvers have one name.
     """
-    chosen = pack.read(root.absolute())
+    chosen = pack.read_pack(root.absolute())
     names = chosen.chosen(options.levels, options.patterns)
-    solvers = [OURS, *map(name_of, results)]
+    solvers = [OURS, *map(solver_name, results)]
     for place, solver in zip(results, solvers[1:], strict=True):
         if not place.is_dir():
             what = "there is no such directory"
@@ -241,7 +248,7 @@ def compare(
     if is_of_run and out == results[0].absolute():
         kind = workspace.RESULTS
         name = about["name"]
-    judged = judge.judge(chosen, names, results)
+    judged = judge.judge_solvers(chosen, names, results)
     with workspace.claimed(out, kind, name) as folder:
         if kind == workspace.COMPARISON:
             _note_pack(folder, chosen)
@@ -264,7 +271,7 @@ def _of_unknown_pack(place: Path, chosen: Pack) -> list[str]:
     """Say that nothing tells which pack answers belong to, unless `run` wrote them."""
     if "pack" in workspace.read_marker(place, workspace.RESULTS):
         return []
-    solver = name_of(place)
+    solver = solver_name(place)
     name = printable(chosen.root.name)
     text = (
         f"{solver}: nothing in its directory tells which pack was answered, as "
@@ -399,7 +406,7 @@ def _written(
         by_quantity = judge.by_quantity(numbers)
         folder.put(QUANTITIES, text_of_table(by_quantity, "%.6g"))
         folder.put(VERDICTS, text_of_table(_solver_first(theirs), "%.6g"))
-        page.write(chosen, numbers, verdicts, folder, notes)
+        page.write_page(chosen, numbers, verdicts, folder, notes)
     lines = []
     for row in judge.failures(theirs).itertuples():
         lines.append(f"{row.solver}: {row.scenes}: {row.why}")

@@ -112,7 +112,7 @@ def export(root: Path, source: Path | None, levels: Collection[int]) -> int:
             problem = replace(problem, seconds=seconds)
         listed.append(problem)
     programs = case.programs(space.cases, planned.cases)
-    return pack.write(root, listed, (asked.name, asked.text), programs)
+    return pack.write_pack(root, listed, (asked.name, asked.text), programs)
 
 
 def _export_formulas(root: Path, levels: Collection[int]) -> int:
@@ -126,7 +126,7 @@ def _export_formulas(root: Path, levels: Collection[int]) -> int:
     if 2 in levels and _has_decks():
         programs[ENGINE.PROGRAM] = ENGINE.version()
     listed = problems(asked, plan.make(asked), {}, Path(), _kinds(levels))
-    return pack.write(root, listed, (asked.name, asked.text), programs)
+    return pack.write_pack(root, listed, (asked.name, asked.text), programs)
 
 
 def _kinds(levels: Collection[int]) -> list[str]:
@@ -194,14 +194,14 @@ def problems(
         The problems, by level but for single grains, whose two come together.
     """
     if "collision" in kinds:
-        for check in checks.checks():
+        for check in checks.all_checks():
             yield _with_ours(check) if _has_decks() else check
     names = scene_names(planned, asked)
     yield from _of_grains(asked, planned, results, names, kinds)
     if "flow" in kinds:
         for run, solve in _solves(planned).items():
             name = names[solve.flow.id[:12]]
-            yield replace(scenes.flow(name, solve, results), runs=(run,))
+            yield replace(scenes.flow_scene(name, solve, results), runs=(run,))
     yield from _of_piles(planned, results, cases, names, kinds)
 
 
@@ -222,7 +222,7 @@ def _of_grains(
             continue
         name = names[scene.id]
         if "closed-form" in kinds:
-            yield scenes.closed_form(name, scene)
+            yield scenes.formula_scene(name, scene)
         if OF_POCKET in kinds and scenes.has_pivot(scene):
             problem = scenes.pivot(name, scene, ustar.get(scene.id, np.nan))
             answered = planned.decisions[scene.id].scene

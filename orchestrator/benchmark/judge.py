@@ -47,10 +47,10 @@ NOT_RUN = "it was not run"
 """Message of a solver that has no directory for a scene."""
 
 Key = tuple[str, str, str]
-"""Scene, quantity and `place_of` of a question."""
+"""Scene, quantity and `seven_digits` of a question."""
 
 
-def name_of(place: Path) -> str:
+def solver_name(place: Path) -> str:
     """The name of the solver of a directory of results.
 
     Parameters
@@ -67,7 +67,7 @@ def name_of(place: Path) -> str:
     return printable(str(noted or place.absolute().name))
 
 
-def place_of(at: str) -> str:
+def seven_digits(at: str) -> str:
     """The number ``at`` of a question, to seven digits.
 
     Parameters
@@ -102,7 +102,7 @@ class Answers:
     Attributes
     ----------
     numbers
-        Each answer by scene, quantity and `place_of`.
+        Each answer by scene, quantity and `seven_digits`.
     used
         A row for each scene, by its name: ``message``, the reason why its answer does
         not count, or empty; `TIMES` in s, s and MiB, and `STEPS`, NaN where one is not
@@ -155,7 +155,7 @@ class Answers:
 
 
 def _answer(path: Path) -> dict[tuple[str, str], float]:
-    """The answers of a file, by quantity and `place_of`.
+    """The answers of a file, by quantity and `seven_digits`.
 
     Raises OSError or ValueError with the reason why the file does not count.
     """
@@ -177,7 +177,7 @@ def _answer(path: Path) -> dict[tuple[str, str], float]:
         line = f"line {number}, {','.join(row)[:80]!r},"
         try:
             quantity, at, value = row
-            key = (quantity, place_of(at))
+            key = (quantity, seven_digits(at))
             answer = number_of(value)
         except ValueError:
             what = "is not a quantity, its at and a finite number"
@@ -201,7 +201,7 @@ def _measured(value: object) -> float:
     return number
 
 
-def judge(
+def judge_solvers(
     chosen: Pack, names: Sequence[str], results: Sequence[Path]
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Compare the answers of solvers with the expected ones.
@@ -234,7 +234,7 @@ def judge(
     for place in results:
         theirs = Answers.read(place, names)
         ours = Answers.read(place / OURS, names)
-        table = _compared(expected, name_of(place), theirs, ours)
+        table = _compared(expected, solver_name(place), theirs, ours)
         numbers.append(table)
         verdict = _verdicts(chosen, names, table, theirs, ours.used)
         verdicts.append(verdict)
@@ -250,7 +250,7 @@ def _compared(
     expected: pd.DataFrame, solver: str, theirs: Answers | None, ours: Answers
 ) -> pd.DataFrame:
     """The expectations with the answers of a solver, by default of our own runs."""
-    places = expected["at"].map(place_of)
+    places = expected["at"].map(seven_digits)
     keys = list(zip(expected["scene"], expected["quantity"], places, strict=True))
     table = expected.assign(solver=solver)
     stated = zip(keys, expected["ours"], strict=True)
@@ -358,7 +358,7 @@ def _incomplete(rows: pd.DataFrame, count: float | None) -> str:
 
 def _unasked(table: pd.DataFrame, numbers: Mapping[Key, float]) -> dict[str, str]:
     """By scene, an answer to no question of it, or steps that are no number of them."""
-    places = table["at"].map(place_of)
+    places = table["at"].map(seven_digits)
     asked = set(zip(table["scene"], table["quantity"], places, strict=True))
     found = {}
     for key, number in numbers.items():
@@ -400,7 +400,7 @@ def failures(verdicts: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     verdicts
-        The verdicts of `judge`.
+        The verdicts of `judge_solvers`.
 
     Returns
     -------
@@ -428,7 +428,7 @@ def by_quantity(numbers: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     numbers
-        The numbers of `judge`.
+        The numbers of `judge_solvers`.
 
     Returns
     -------
@@ -473,7 +473,7 @@ def patterns(numbers: pd.DataFrame) -> list[str]:
     Parameters
     ----------
     numbers
-        The numbers of `judge`.
+        The numbers of `judge_solvers`.
 
     Returns
     -------
@@ -538,7 +538,7 @@ def summary(verdicts: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     verdicts
-        The verdicts of `judge`.
+        The verdicts of `judge_solvers`.
 
     Returns
     -------
@@ -569,7 +569,7 @@ def in_words(verdicts: pd.DataFrame) -> list[str]:
     Parameters
     ----------
     verdicts
-        The verdicts of `judge`.
+        The verdicts of `judge_solvers`.
 
     Returns
     -------

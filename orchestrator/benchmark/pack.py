@@ -1,8 +1,8 @@
 """A benchmark pack on disk: its scenes, questions and expected answers.
 
-docs/benchmark.md is the contract for solvers. `read` refuses a pack whose files are not
-those of its manifest, or whose names or links lead out of it: a pack may come from
-anywhere.
+docs/benchmark.md is the contract for solvers. `read_pack` refuses a pack whose files
+are not those of its manifest, or whose names or links lead out of it: a pack may come
+from anywhere.
 """
 
 import json
@@ -172,10 +172,10 @@ class Problem:
         (folder / SCENE).write_text(text + "\n", encoding="utf-8")
         questions = self.expected[["quantity", "at"]]
         for stem, table in {**self.tables, "ask": questions}.items():
-            (folder / f"{stem}.csv").write_text(csv(table), encoding="utf-8")
+            (folder / f"{stem}.csv").write_text(csv_of(table), encoding="utf-8")
 
 
-def csv(table: pd.DataFrame) -> str:
+def csv_of(table: pd.DataFrame) -> str:
     """Write a table of a pack.
 
     Parameters
@@ -333,7 +333,7 @@ class Pack:
         return sorted(names, key=lambda name: self.scenes[name]["level"])
 
 
-def read(root: Path) -> Pack:
+def read_pack(root: Path) -> Pack:
     """Read a pack.
 
     Parameters
@@ -447,7 +447,7 @@ def _expected(path: Path, scenes: Mapping[str, Row]) -> pd.DataFrame:
     return table
 
 
-def write(
+def write_pack(
     root: Path,
     problems: Iterable[Problem],
     study: tuple[str, str],
@@ -491,9 +491,9 @@ def write(
         seconds = [one.seconds for one in listed]
         times = pd.DataFrame({"scene": scene_names, "seconds": seconds})
         files = {
-            EXPECTED: csv(expected[["scene", *COLUMNS]]),
-            LIST: csv(pd.DataFrame(one.entries for one in listed)),
-            TIMES: csv(times.dropna()),
+            EXPECTED: csv_of(expected[["scene", *COLUMNS]]),
+            LIST: csv_of(pd.DataFrame(one.entries for one in listed)),
+            TIMES: csv_of(times.dropna()),
             STUDY: text,
             ABOUT: _readme(programs),
         }

@@ -96,7 +96,7 @@ AXES: dict[str, tuple[str, str, Look]] = {
 """Labels of a quantity's axes, and their limits."""
 
 
-def write(
+def write_page(
     chosen: Pack,
     numbers: pd.DataFrame,
     verdicts: pd.DataFrame,
@@ -110,7 +110,7 @@ def write(
     chosen
         The pack.
     numbers, verdicts
-        The tables of `judge.judge`.
+        The tables of `judge.judge_solvers`.
     folder
         The directory.
     notes
@@ -127,7 +127,7 @@ def write(
         # the name of a solver may have letters that the font has not
         warnings.filterwarnings("ignore", "Glyph .* missing from font")
         beds = _beds(numbers, theirs) + _shields(chosen, numbers)
-        listed = thresholds(numbers)
+        listed = pile_thresholds(numbers)
         of_beds: list[Element] = [*beds]
         if len(listed):
             of_beds += [Paragraphs(THRESHOLDS, "lead"), Table.of(listed)]
@@ -206,13 +206,13 @@ def _looks(table: pd.DataFrame) -> dict[str, Look]:
     return looks
 
 
-def thresholds(numbers: pd.DataFrame) -> pd.DataFrame:
+def pile_thresholds(numbers: pd.DataFrame) -> pd.DataFrame:
     """List the threshold Shields numbers of piles.
 
     Parameters
     ----------
     numbers
-        The table of `judge.judge`.
+        The table of `judge.judge_solvers`.
 
     Returns
     -------

@@ -72,7 +72,7 @@ ENTRIES = {
 """Entries of the scenes of a study, by kind: what has an effect on the answer."""
 
 
-def parameters(scene: Scene, kind: str) -> Row:
+def parameters_of(scene: Scene, kind: str) -> Row:
     """List the entries of a scene in a problem.
 
     Parameters
@@ -103,7 +103,7 @@ def parameters(scene: Scene, kind: str) -> Row:
     return entries
 
 
-def closed_form(name: str, scene: Scene) -> Problem:
+def formula_scene(name: str, scene: Scene) -> Problem:
     """Make a problem of level 1: the forces on a grain and its threshold.
 
     Parameters
@@ -127,7 +127,7 @@ def closed_form(name: str, scene: Scene) -> Problem:
     rows.append(expectation("ustar_m_s", ustar, FORMULA))
     rows.append(expectation("reynolds", float(exact.reynolds), FORMULA))
     rows.append(expectation("shields", float(exact.shields), FORMULA))
-    return Problem(name, "closed-form", parameters(scene, "closed-form"), {}, rows)
+    return Problem(name, "closed-form", parameters_of(scene, "closed-form"), {}, rows)
 
 
 def pivot(name: str, scene: Scene, ours: float) -> Problem:
@@ -167,7 +167,7 @@ def pivot(name: str, scene: Scene, ours: float) -> Problem:
     )
     grains = three_grains(centres * d, sizes * d)
     tables = {"grains": grains, "load_steps": load_steps}
-    return Problem(name, OF_POCKET, parameters(scene, OF_POCKET), tables, [row])
+    return Problem(name, OF_POCKET, parameters_of(scene, OF_POCKET), tables, [row])
 
 
 def has_pivot(scene: Scene) -> bool:
@@ -213,7 +213,7 @@ def _flow_tables(pile: Pile) -> tuple[Row, dict[str, pd.DataFrame]]:
     return entries, {"bed": corners}
 
 
-def flow(name: str, pile: Pile, results: Tables) -> Problem:
+def flow_scene(name: str, pile: Pile, results: Tables) -> Problem:
     """Make a problem of level 3: the stress on the bed of a pile whose flow is solved.
 
     Parameters
@@ -272,7 +272,7 @@ def bed(
     total = int(end["count"])
     carried_off = int(end["carried_off"])
     judged = _judged(kind, pile, carried_off > 0)
-    given = parameters(pile.scene, kind)
+    given = parameters_of(pile.scene, kind)
     tables: dict[str, pd.DataFrame] = {}
     rows = []
     if kind == "line":

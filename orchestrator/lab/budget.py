@@ -370,8 +370,8 @@ def experiment(study: Study, out: Path) -> Experiment:
         moved = measure(listed, runs)
         if moved.empty:
             return {}, ()
-        shared = shares(moved)
-        tables = {"changes": moved, "shares": shared, "budget": known(shared)}
+        shared = shares_of_choices(moved)
+        tables = {"changes": moved, "shares": shared, "budget": largest_shares(shared)}
         return tables, _sections(listed, moved, shared, runs)
 
     # a flow model may refuse a bed: only runs of the scenes as they are asked count
@@ -434,7 +434,7 @@ def measure(listed: Sequence[Change], runs: Runs) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def shares(moved: pd.DataFrame) -> pd.DataFrame:
+def shares_of_choices(moved: pd.DataFrame) -> pd.DataFrame:
     """Find how far down and up the alternatives of a choice move each scene.
 
     Parameters
@@ -457,13 +457,13 @@ def shares(moved: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(ends).reset_index()
 
 
-def known(shared: pd.DataFrame) -> pd.DataFrame:
+def largest_shares(shared: pd.DataFrame) -> pd.DataFrame:
     """Find the largest share of each choice in a class: what the package keeps.
 
     Parameters
     ----------
     shared
-        The rows of `shares`.
+        The rows of `shares_of_choices`.
 
     Returns
     -------

@@ -156,7 +156,7 @@ def experiment(study: Study, out: Path) -> Experiment:
         compared = errors(measured)
         if compared.empty:
             return {}, ()
-        means = together(compared)
+        means = join_points(compared)
         rows = compared.merge(means[["packing", *PAIR, "pareto"]], how="left")
         rows = rows.fillna({"pareto": False})
         known = known_errors(measured)
@@ -378,7 +378,7 @@ def _compared(
     return rows.assign(**columns)
 
 
-def together(points: pd.DataFrame) -> pd.DataFrame:
+def join_points(points: pd.DataFrame) -> pd.DataFrame:
     """Put the points of each pair and packing together.
 
     Parameters
@@ -536,7 +536,7 @@ def _sections(pairs: pd.DataFrame, known: pd.DataFrame) -> list[Section]:
             chart(pairs, HEADS),
         ),
     ]
-    means = table_of(pairs)
+    means = pairs_table(pairs)
     title = "The rungs, and what is known of them"
     of_rungs = _tables_of_rungs(known)
     accuracy = Paragraphs(words["accuracy"], "lead")
@@ -549,13 +549,13 @@ def _sections(pairs: pd.DataFrame, known: pd.DataFrame) -> list[Section]:
     ]
 
 
-def table_of(pairs: pd.DataFrame) -> pd.DataFrame:
+def pairs_table(pairs: pd.DataFrame) -> pd.DataFrame:
     """List the pairs of rungs with their numbers in the charts, costs and errors.
 
     Parameters
     ----------
     pairs
-        The pairs, by `together`.
+        The pairs, by `join_points`.
 
     Returns
     -------
@@ -652,7 +652,7 @@ def chart(pairs: pd.DataFrame, columns: Mapping[str, str]) -> Canvas:
     Parameters
     ----------
     pairs
-        The pairs, by `together`.
+        The pairs, by `join_points`.
     columns
         Heads of the panels by the columns of errors, one panel for each.
 

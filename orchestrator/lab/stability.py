@@ -98,7 +98,7 @@ class Place(NamedTuple):
     references: tuple[Scene, ...]
 
 
-class Map(NamedTuple):
+class StabilityMap(NamedTuple):
     """A map.
 
     Attributes
@@ -124,7 +124,7 @@ class Map(NamedTuple):
         return [float(value) for value in values]
 
 
-def load(path: Path) -> Map:
+def read_map(path: Path) -> StabilityMap:
     """Read a map's file.
 
     Parameters
@@ -146,7 +146,7 @@ def load(path: Path) -> Map:
             scenes = _scenes(data, changes, path.name)
             references = _scenes(data, {**changes, **of_reference}, path.name)
             places.append(Place(x, y, scenes, references))
-    return Map(path.stem, data, tuple(places))
+    return StabilityMap(path.stem, data, tuple(places))
 
 
 def _axis(axis: Mapping[str, Any]) -> Iterator[tuple[Any, Mapping[str, Any]]]:
@@ -201,7 +201,7 @@ def experiment(out: Path, folder: Path = FOLDER) -> Experiment:
     Experiment
         The experiment.
     """
-    maps = [load(path) for path in sorted(folder.glob("*.toml"))]
+    maps = [read_map(path) for path in sorted(folder.glob("*.toml"))]
     asked = {}
     for each in maps:
         for place in each.places:
@@ -209,7 +209,7 @@ def experiment(out: Path, folder: Path = FOLDER) -> Experiment:
                 asked[scene.id] = as_written(scene)
 
     def results(runs: Runs) -> Results:
-        judged = [judge(each, runs) for each in maps]
+        judged = [judge_map(each, runs) for each in maps]
         table = pd.concat(judged, ignore_index=True)
         return {"maps": table}, _sections(maps, table)
 
@@ -223,16 +223,16 @@ def experiment(out: Path, folder: Path = FOLDER) -> Experiment:
     )
 
 
-def _sections(maps: Sequence[Map], table: pd.DataFrame) -> list[Section]:
+def _sections(maps: Sequence[StabilityMap], table: pd.DataFrame) -> list[Section]:
     """The page: all maps in one figure, and each with its question."""
-    whole = Figure("maps", TITLE, "", (), draw(maps, table))
+    whole = Figure("maps", TITLE, "", (), draw_maps(maps, table))
     sections = [
         Section("", [_card(table)]),
         Section("All maps", [whole, Paragraphs(MAPS_TEXT, "lead")]),
     ]
     for each in maps:
         title = each.data["title"]
-        figure = Figure(f"map-{each.name}", title, "", (), draw([each], table))
+        figure = Figure(f"map-{each.name}", title, "", (), draw_maps([each], table))
         question = Paragraphs(each.data["question"], "lead")
         limits = each.data.get("limits", ())
         said = [Limits(limits)] if limits else []
@@ -266,7 +266,7 @@ def _card(table: pd.DataFrame) -> Card:
     )
 
 
-def judge(one: Map, runs: Runs) -> pd.DataFrame:
+def judge_map(one: StabilityMap, runs: Runs) -> pd.DataFrame:
     """Judge every run of a map.
 
     Parameters
@@ -316,7 +316,9 @@ def _first_failure(place: Place, runs: Runs) -> _Judged | None:
     return next((failure for failure in failures if failure), None)
 
 
-def _judged(one: Map, place: Place, runs: Runs, fraction: float | None) -> _Judged:
+def _judged(
+    one: StabilityMap, place: Place, runs: Runs, fraction: float | None
+) -> _Judged:
     """Judge a run that did not fail by its error against its reference."""
     error = max(_errors(one, place, runs, fraction), key=abs, default=math.nan)
     if math.isnan(error):
@@ -344,7 +346,7 @@ def _failure(scene: Scene, runs: Runs) -> _Judged | None:
 
 
 def _errors(
-    one: Map,
+    one: StabilityMap,
     place: Place,
     runs: Runs,
     fraction: float | None,
@@ -395,7 +397,7 @@ COLUMNS = 2
 """Maps beside each other in a figure of several."""
 
 
-def draw(maps: Sequence[Map], table: pd.DataFrame) -> Canvas:
+def draw_maps(maps: Sequence[StabilityMap], table: pd.DataFrame) -> Canvas:
     """Draw maps as grids of cells.
 
     Parameters
@@ -403,7 +405,7 @@ def draw(maps: Sequence[Map], table: pd.DataFrame) -> Canvas:
     maps
         The maps.
     table
-        The rows of `judge`.
+        The rows of `judge_map`.
 
     Returns
     -------
@@ -442,7 +444,7 @@ def _samples(verdicts: set[str]) -> list[Patch]:
     return samples
 
 
-def _panel(ax: Axes, one: Map, table: pd.DataFrame, font: float) -> None:
+def _panel(ax: Axes, one: StabilityMap, table: pd.DataFrame, font: float) -> None:
     """Draw one map, with texts of some size (points)."""
     columns = _ticked(ax.xaxis, table["x"], one.data["x"]["label"])
     lines = _ticked(ax.yaxis, table["y"], one.data["y"]["label"])

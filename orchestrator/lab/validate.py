@@ -295,7 +295,7 @@ def _answers(model: Model, strips: Strips, beds: pd.DataFrame) -> _Answers:
     return _Answers(clear, level, shields, strips.hiding(model.fields))
 
 
-def compared(
+def compare_models(
     strips: Strips,
     hump: pd.DataFrame,
     lengths: Mapping[str, float],
@@ -385,7 +385,7 @@ def scores(rows: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     rows
-        The comparison, as of `compared`.
+        The comparison, as of `compare_models`.
 
     Returns
     -------
@@ -451,7 +451,7 @@ def experiment(study: Study, out: Path) -> Experiment:
             **_reversed_flow("hump", hump, runs),
         }
         over = over_hump(planned.piles[hump.id].stress(runs.cases))
-        rows = compared(Strips(strips, runs.cases), over, lengths)
+        rows = compare_models(Strips(strips, runs.cases), over, lengths)
         scored = scores(rows)
         return {"measured": rows, "scores": scored}, _sections(rows, scored)
 
@@ -640,7 +640,7 @@ def diagram(rows: pd.DataFrame) -> Canvas:
     Parameters
     ----------
     rows
-        The comparison, as of `compared`.
+        The comparison, as of `compare_models`.
 
     Returns
     -------

@@ -36,7 +36,7 @@ def cards(study: "Study", tables: "Tables") -> "list[Guest]":
         return []
     from orchestrator.paper import claims
 
-    judged = claims.judge(tables)
+    judged = claims.judge_claims(tables)
     if all(one.verdict == "no data" for one in judged):
         return []
     return [claims.guest(judged, tables, CLAIMS)]

@@ -101,7 +101,7 @@ class Judged:
         return f"Not explained: {there}."
 
 
-def judge(tables: Tables) -> list[Judged]:
+def judge_claims(tables: Tables) -> list[Judged]:
     """Judge every claim of the paper.
 
     Parameters
@@ -156,10 +156,12 @@ def guest(judged: Sequence[Judged], tables: Tables, file: str) -> Guest:
         return [Section(title, [Text(Markup(text))], "claims", "Claims")]
 
     files = {file: frame(judged).to_csv(index=False)}
-    return Guest(sections, files, card(judged, tables), sheet(judged, file), True)
+    return Guest(
+        sections, files, claims_card(judged, tables), claims_sheet(judged, file), True
+    )
 
 
-def card(judged: Sequence[Judged], tables: Tables) -> Card:
+def claims_card(judged: Sequence[Judged], tables: Tables) -> Card:
     """Make the answer card: how many claims hold.
 
     Parameters
@@ -223,7 +225,7 @@ def _worth(tables: Tables, lacking: int) -> Worth:
     return Worth("care", "usable, with gaps", f"{advice}reason.")
 
 
-def sheet(judged: Sequence[Judged], file: str) -> Sheet:
+def claims_sheet(judged: Sequence[Judged], file: str) -> Sheet:
     """List the claims for a terminal.
 
     Parameters
@@ -276,7 +278,7 @@ def _claims() -> Iterator[Claim]:
         measure = entry.pop("measure", "")
         entry["figures"] = tuple(entry["figures"])
         if pairs:
-            entry["measure"] = partial(measures.along, **pairs)
+            entry["measure"] = partial(measures.rises_along, **pairs)
         else:
             entry["measure"] = getattr(measures, measure)
         yield Claim(**entry)

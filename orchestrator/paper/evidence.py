@@ -289,11 +289,11 @@ def _alike(grains: pd.DataFrame) -> pd.DataFrame:
     """The grains of the commonest combination of what is not of `GRAIN`."""
     if grains.empty:
         return grains
-    combination = grains.groupby(others(grains, *GRAIN), dropna=False).ngroup()
+    combination = grains.groupby(other_columns(grains, *GRAIN), dropna=False).ngroup()
     return grains[combination == combination.mode()[0]]
 
 
-def others(table: pd.DataFrame, *along: str) -> list[str]:
+def other_columns(table: pd.DataFrame, *along: str) -> list[str]:
     """Name the columns in which two rows agree that differ in some columns alone.
 
     Parameters
@@ -354,7 +354,7 @@ def pairs(
         A row for each pair, with its ``force_law`` and the ``ratio`` of the value at
         the higher end to that at the lower; NaN where one of them is missing.
     """
-    series = table.groupby(others(table, along, *ignore), dropna=False).ngroup()
+    series = table.groupby(other_columns(table, along, *ignore), dropna=False).ngroup()
     ordered = table.assign(series=series).sort_values(["series", along], kind="stable")
     before = ordered.shift()
     beside = (ordered["series"] == before["series"]) & (ordered[along] > before[along])

@@ -16,7 +16,7 @@ from orchestrator.paper.evidence import (
     REGIMES,
     Comparison,
     Evidence,
-    others,
+    other_columns,
     pairs,
     parts,
 )
@@ -98,7 +98,7 @@ def by_regime(
         yield Comparison(f"{regime}: {name}", values, above, **others)
 
 
-def along(
+def rises_along(
     evidence: Evidence, table: str, along: str, rises: bool, name: str
 ) -> Comparisons:
     """Whether thresholds of single grains or of piles rise, or fall, along a column.
@@ -467,7 +467,7 @@ def saturation(evidence: Evidence) -> Comparisons:
     name = f"n/N at {LATER:g} τ₃₀"
     ends = {"d_m": "largest d over smallest", "alpha_deg": "steepest over flattest"}
     for column, pair in ends.items():
-        values = table.groupby(others(table, column), dropna=False)[column]
+        values = table.groupby(other_columns(table, column), dropna=False)[column]
         is_least = table[column] == values.transform("min")
         is_largest = table[column] == values.transform("max")
         ratio = pairs(table[is_least | is_largest], column, "later")["ratio"]
@@ -522,7 +522,7 @@ def fraction(evidence: Evidence) -> Comparisons:
     by_scene = {curve["scene_id"].iloc[0]: curve for curve in evidence.curves}
     firsts = pd.DataFrame([curve.iloc[0] for curve in by_scene.values()])
     rows = []
-    for _, same in parts(firsts, *others(firsts, "alpha_deg")):
+    for _, same in parts(firsts, *other_columns(firsts, "alpha_deg")):
         series = [by_scene[key] for key in same.sort_values("alpha_deg")["scene_id"]]
         for flat, steep in pairwise(series):
             reached = _fraction_at(steep, _stress_at(flat, 0.5))
@@ -617,7 +617,7 @@ def _within_drag_law(name: str, table: pd.DataFrame) -> Comparisons:
     yield Comparison(what, particle_reynolds <= law.drag_end, is_judged=False)
 
 
-def stress(evidence: Evidence) -> Comparisons:
+def eq10_against_wall(evidence: Evidence) -> Comparisons:
     """Eq. 10 against the wall stress, in the thresholds of piles.
 
     Parameters

@@ -81,7 +81,7 @@ DRAWN = 4
 """Most piles of the figure."""
 
 
-class Surface(NamedTuple):
+class PileSurface(NamedTuple):
     """The surface of a pile.
 
     Attributes
@@ -154,7 +154,7 @@ class Surface(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Pile:
+class Stockpile:
     """A pile with the surfaces that it has without and with obstacles, at least one.
 
     They are alike in everything else: shape, grains, flow and how that is solved.
@@ -172,21 +172,23 @@ class Pile:
     """
 
     name: str
-    surfaces: Sequence[Surface]
+    surfaces: Sequence[PileSurface]
     is_flat: bool
     has_bare: bool
 
     @property
-    def by_epa(self) -> list[Surface]:
+    def by_epa(self) -> list[PileSurface]:
         """The surfaces by which AP-42 answers it: flat ground, or its four piles."""
         threshold = self.surfaces[0].threshold
         if self.is_flat:
             faces = AREAS[:1].assign(part="all", ratio=1.0)
-            return [Surface("AP-42, flat ground", faces, FLAT, threshold)]
+            return [PileSurface("AP-42, flat ground", faces, FLAT, threshold)]
         every = AREAS.assign(part="all", ratio=OVER_FLAT * AREAS["us_over_ur"])
         found = []
         for name, faces in every.groupby("pile"):
-            found.append(Surface(f"AP-42, {name}", faces, PILE / OVER_FLAT, threshold))
+            found.append(
+                PileSurface(f"AP-42, {name}", faces, PILE / OVER_FLAT, threshold)
+            )
         return found
 
 
@@ -244,7 +246,7 @@ def _form(scene: Scene) -> list[str]:
     return words
 
 
-def solved(scene: Scene, threshold: float | None, cases: Path) -> Surface:
+def solved(scene: Scene, threshold: float | None, cases: Path) -> PileSurface:
     """Find the surface of a pile by its flow.
 
     Parameters
@@ -270,7 +272,7 @@ def solved(scene: Scene, threshold: float | None, cases: Path) -> Surface:
         threshold = float(own.friction_velocity)
     over_wind = float(log_law_ustar(1.0, WIND_HEIGHT, scene.solve_roughness))
     name = " and a ".join(map(str, scene.obstacles)) or "no obstacle"
-    return Surface(name, faces, over_wind, threshold)
+    return PileSurface(name, faces, over_wind, threshold)
 
 
 def _faces(bed: PileBed, line: BedLine, stress: WallStress) -> pd.DataFrame:
@@ -303,7 +305,7 @@ def _rises(bed: PileBed) -> bool:
 
 def grouped(
     scenes: Sequence[Scene], threshold: float | None, cases: Path
-) -> list[Pile]:
+) -> list[Stockpile]:
     """Find the piles of some scenes, each without and with its obstacles.
 
     Parameters
@@ -333,7 +335,7 @@ def grouped(
         line = of_scene(bare).line
         base = _base(line.x, line.z, line.h)
         is_flat = not _rises(bed) or line.h < FLAT_BELOW * base
-        found.append(Pile(name, surfaces, is_flat, bare in members))
+        found.append(Stockpile(name, surfaces, is_flat, bare in members))
     return found
 
 
@@ -456,28 +458,30 @@ def check_winds(fluids: Iterable[Fluid], where: str) -> None:
             raise InputError(what, f"{where}: fluid.density", remedy)
 
 
-def _results(found: Sequence[Pile], winds: Sequence[float], source: str) -> Results:
+def _results(
+    found: Sequence[Stockpile], winds: Sequence[float], source: str
+) -> Results:
     """The table and the page of some piles."""
-    table = rows(found, winds)
+    table = erosion_rows(found, winds)
     caption = TEXTS["figure"]
     if len(found) > DRAWN:
         caption += f" The first {DRAWN} of {len(found)} piles are drawn."
     drawing = picture(found[:DRAWN], winds)
     figure = Figure("erosion", "Stress and loss", caption, (), drawing)
-    told = "\n\n".join([*sentences(found, winds, source), TEXTS["sure"]])
+    told = "\n\n".join([*erosion_sentences(found, winds, source), TEXTS["sure"]])
     in_sentences = Paragraphs(told, fold=IN_SENTENCES)
     parts = Paragraphs(TEXTS["rows"], "lead")
     limits = Limits(TEXTS["limits"].split("\n\n"))
     sources = Paragraphs(TEXTS["sources"], "lead")
     sections = [
-        Section("", [card(found, winds, source), figure, in_sentences]),
+        Section("", [erosion_card(found, winds, source), figure, in_sentences]),
         Section("Parts", [parts, limits, Table.of(table)]),
         Section("The tables of AP-42", [sources, *map(Table.of, (AREAS, MATERIALS))]),
     ]
     return {"erosion": table}, sections
 
 
-def rows(found: Sequence[Pile], winds: ArrayLike) -> pd.DataFrame:
+def erosion_rows(found: Sequence[Stockpile], winds: ArrayLike) -> pd.DataFrame:
     """List the parts of the surfaces of some piles.
 
     Parameters
@@ -510,7 +514,7 @@ def rows(found: Sequence[Pile], winds: ArrayLike) -> pd.DataFrame:
     return pd.DataFrame(listed)
 
 
-def _row(part: Surface, whole: float, winds: ArrayLike) -> Row:
+def _row(part: PileSurface, whole: float, winds: ArrayLike) -> Row:
     """The numbers of a part of a surface; `whole` is the sum of all its shares."""
     ratio = part.faces["ratio"].to_numpy()
     share = 100 * part.faces["share"].to_numpy() / whole
@@ -528,8 +532,8 @@ def _row(part: Surface, whole: float, winds: ArrayLike) -> Row:
     return row
 
 
-def sentences(
-    found: Sequence[Pile], winds: Sequence[float], source: str
+def erosion_sentences(
+    found: Sequence[Stockpile], winds: Sequence[float], source: str
 ) -> Iterator[str]:
     """Say what wind takes from each pile, by both, and what its obstacles take away.
 
@@ -572,7 +576,9 @@ def sentences(
         yield told
 
 
-def card(found: Sequence[Pile], winds: Sequence[float], source: str) -> Card:
+def erosion_card(
+    found: Sequence[Stockpile], winds: Sequence[float], source: str
+) -> Card:
     """Make the answer card: what a wind takes from the first pile.
 
     Parameters
@@ -634,12 +640,12 @@ def card(found: Sequence[Pile], winds: Sequence[float], source: str) -> Card:
     )
 
 
-def _named(surface: Surface) -> str:
+def _named(surface: PileSurface) -> str:
     """The obstacles of a surface with an article, such as "a fence of 2 m at -3 m"."""
     return f"a {surface.name}"
 
 
-def picture(found: Sequence[Pile], winds: Sequence[float]) -> Canvas:
+def picture(found: Sequence[Stockpile], winds: Sequence[float]) -> Canvas:
     """Draw a row for each pile: u*/u*_0 over it, its share of the surface, P.
 
     Parameters
@@ -662,7 +668,7 @@ def picture(found: Sequence[Pile], winds: Sequence[float]) -> Canvas:
     return canvas
 
 
-def _draw(axes: Sequence[Axes], pile: Pile, winds: Sequence[float]) -> None:
+def _draw(axes: Sequence[Axes], pile: Stockpile, winds: Sequence[float]) -> None:
     """Draw the row of one pile: three panels."""
     left, middle, right = axes
     axis = np.linspace(0, 1.4 * max(winds), 141)
@@ -690,7 +696,7 @@ def _draw(axes: Sequence[Axes], pile: Pile, winds: Sequence[float]) -> None:
     right.vlines(winds, 0, right.get_ylim()[1], color="0.7", lw=0.8, zorder=0)
 
 
-def _draw_shares(ax: Axes, surface: Surface, colour: str, line_style: str) -> None:
+def _draw_shares(ax: Axes, surface: PileSurface, colour: str, line_style: str) -> None:
     """Draw u*/u*_0 over the share of the surface where it is larger."""
     faces = surface.faces.sort_values("ratio", ascending=False)
     above = 100 * faces["share"].cumsum() / faces["share"].sum()

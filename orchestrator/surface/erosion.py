@@ -42,8 +42,8 @@ class Wind:
     """
 
     from_deg: float
-    whole: erosion.Surface
-    heaps: Sequence[erosion.Surface]
+    whole: erosion.PileSurface
+    heaps: Sequence[erosion.PileSurface]
 
     @classmethod
     def of(cls, answer: Answer, direction: Direction) -> "Wind":
@@ -136,14 +136,14 @@ class Heaps:
         return self.winds[0]
 
     @cached_property
-    def piles(self) -> list[erosion.Pile]:
+    def piles(self) -> list[erosion.Stockpile]:
         """Each heap as a pile of its own, with its surface by every direction."""
         found = []
         for place, heap in enumerate(self.heaps):
             surfaces = [wind.heaps[place] for wind in self.winds]
             is_flat = heap.height < erosion.FLAT_BELOW * 2 * heap.radius
             name = self._name_of(place, heap)
-            found.append(erosion.Pile(name, surfaces, is_flat, has_bare=False))
+            found.append(erosion.Stockpile(name, surfaces, is_flat, has_bare=False))
         return found
 
     def _name_of(self, place: int, heap: Heap) -> str:
@@ -198,7 +198,7 @@ class Heaps:
 
 def _surface_of(
     answer: Answer, from_deg: float, faces: pd.DataFrame, heap: Heap
-) -> erosion.Surface:
+) -> erosion.PileSurface:
     """The surface of a pile by its faces, whose shares are areas.
 
     The figure is drawn over the middle of the heap.
@@ -223,7 +223,7 @@ def _surface_of(
     off_middle = (faces["across_m"] - across).abs()
     # the middles of a row of faces lie within a part of a cell
     is_middle = off_middle <= ROW * off_middle.min()
-    return erosion.Surface(name, listed, over_wind, threshold, listed[is_middle])
+    return erosion.PileSurface(name, listed, over_wind, threshold, listed[is_middle])
 
 
 def experiment(study: SurfaceStudy) -> Experiment:
@@ -256,7 +256,7 @@ def experiment(study: SurfaceStudy) -> Experiment:
 
 
 def rows(found: Sequence[Heaps]) -> pd.DataFrame:
-    """List the parts of each heap, as `erosion.rows` does, with areas and masses.
+    """List the parts of each heap, as `erosion_rows` does, with areas and masses.
 
     Parameters
     ----------
@@ -271,7 +271,7 @@ def rows(found: Sequence[Heaps]) -> pd.DataFrame:
     tables = []
     for heaps in found:
         for pile in heaps.piles:
-            table = erosion.rows([pile], heaps.speeds)
+            table = erosion.erosion_rows([pile], heaps.speeds)
             areas = {one.name: one.area for one in pile.surfaces}
             whole = table["surface"].map(areas).fillna(pile.surfaces[0].area)
             area = whole * table["share, %"] / 100

@@ -72,7 +72,7 @@ def test_faults_are_caught_and_named(
     folder = tmp_path / "tmp"
     folder.mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(folder))
-    names = [name for name in pack.read(formulas).scenes if name[0] == "1"][
+    names = [name for name in pack.read_pack(formulas).scenes if name[0] == "1"][
         : len(FAULTS) + 1
     ]
     bodies = dict(zip(names, FAULTS, strict=False))
@@ -353,7 +353,7 @@ def test_a_run_says_one_line_for_each_level(
 ) -> None:
     choice = Options(patterns=("2-incline-*", "1-*-d0.2mm-z0.1d-*", "2-sliding-5"))
     run(formulas, tmp_path, TAIL, choice)
-    levels = [name[0] for name in pack.read(formulas).chosen((), choice.patterns)]
+    levels = [name[0] for name in pack.read_pack(formulas).chosen((), choice.patterns)]
     lines = [f"level 1: {levels.count('1')} scenes", "level 2: 7 scenes"]
     assert capsys.readouterr().err.splitlines() == lines
 
@@ -423,7 +423,7 @@ LEVEL_1 = Options((1,), seconds=60.0)
 
 def _answers(pack_of: Path, place: Path, changed: Callable[..., float]) -> Path:
     """The expected answers of level 1, each changed by quantity and scene."""
-    expected = pack.read(pack_of).expected
+    expected = pack.read_pack(pack_of).expected
     of_level = expected[expected["scene"].str.startswith("1-")]
     for name, rows in of_level.groupby("scene"):
         lines = []
@@ -502,7 +502,7 @@ def test_scenes_that_were_not_run_are_no_failures(
         formulas, tmp_path / "theirs", lambda name, all_: float(all_[name])
     )
     outcome = compare.compare(formulas, [theirs], tmp_path / "page", Options())
-    names = pack.read(formulas).scenes
+    names = pack.read_pack(formulas).scenes
     done = sum(name.startswith("1-") for name in names)
     assert outcome.failures == []
     line = f"PASSED theirs: of {len(names)} scenes {done} passed, 0 failed, 0 declined"

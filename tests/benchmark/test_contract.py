@@ -199,7 +199,7 @@ def test_the_rules_count_what_the_deck_counts(
     assert count.moved_in == moved_in
     assert count.carried == set(table.loc[table["carried_off"] == 1, "id"])
     answer = answers(bed, count.moved_in, count.carried)
-    chosen = pack.read(root)
+    chosen = pack.read_pack(root)
     asked = chosen.expected[chosen.expected["scene"] == bed.scene["scene"]]
     for row in asked.to_dict("records"):
         value = answer(row["quantity"], row["at"])
@@ -398,7 +398,7 @@ def test_a_pack_brings_the_contract(formulas: Path) -> None:
 def test_the_small_pack_is_of_the_present_contract() -> None:
     """Another page needs another pack: run its study.toml, and export it into its place."""
     small = ROOT / "benchmark" / "small"
-    read = pack.read(small)
+    read = pack.read_pack(small)
     assert sorted({int(name[0]) for name in read.manifest.scenes}) == [1, 2, 3, 4, 5]
     written = (small / pack.ABOUT).read_text(encoding="utf-8")
     assert pack.contract() in written
@@ -429,7 +429,7 @@ mobile_layers = {layers}
 """
     (scene,) = study.parse(text, name="a", where="a").scenes
     ours = Geometry(scene).packing
-    found = packed({**scenes.parameters(scene, "line"), "mobile_layers": layers})
+    found = packed({**scenes.parameters_of(scene, "line"), "mobile_layers": layers})
     centres = [(float(x), float(z)) for x, z in ours.centres]
     kinds = (
         ours.windward,
@@ -467,7 +467,9 @@ def test_the_mean_on_the_face_is_that_of_the_page(all_levels: Path) -> None:
     ratio = np.sign(stress["tau_wall"]) * np.sqrt(np.abs(stress["tau_wall"]))
     on_face = (stress["s_m"] > 0) & (stress["s_m"] < length)
     mean = np.average(ratio[on_face], weights=stress["length_m"][on_face])
-    expected = pack.read(all_levels).expected.set_index(["scene", "quantity"])["value"]
+    expected = pack.read_pack(all_levels).expected.set_index(["scene", "quantity"])[
+        "value"
+    ]
     assert expected[scene["scene"], "windward_mean"] == pytest.approx(mean, rel=1e-7)
     along = expected[scene["scene"], "ustar_over_ustar0"].to_numpy()
     assert along == pytest.approx(ratio.to_numpy(), rel=1e-7)

@@ -91,7 +91,7 @@ def test_any_double_is_judged_and_drawn(
     all_levels: Path, tmp_path: Path, value: float
 ) -> None:
     """Answers far beyond the numbers of the model fail; tables, charts and page are written."""
-    chosen = pack.read(all_levels)
+    chosen = pack.read_pack(all_levels)
     texts = {}
     for name in NAMES:
         quantities = chosen.expected.loc[
@@ -171,7 +171,7 @@ def test_a_verdict_is_that_of_the_numbers(
     all_levels: Path, tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
 ) -> None:
     """Finite numbers in place of the right ones: passed if and only if all lie within."""
-    chosen = pack.read(all_levels)
+    chosen = pack.read_pack(all_levels)
     texts = {}
     for name in NAMES:
         places = st.integers(0, int((chosen.expected["scene"] == name).sum()) - 1)
@@ -179,7 +179,7 @@ def test_a_verdict_is_that_of_the_numbers(
         texts[name] = _text(chosen, name, changed)
     place = tmp_path_factory.mktemp("answers") / "any"
     results = _results(chosen, place, texts, data.draw(USED))
-    numbers, verdicts = judge.judge(chosen, NAMES, [results])
+    numbers, verdicts = judge.judge_solvers(chosen, NAMES, [results])
     _check(chosen, numbers, verdicts)
     passed = verdicts[verdicts["solver"] == "any"].set_index("scene")["passed"]
     for name, text in texts.items():
@@ -192,14 +192,14 @@ def test_any_file_has_a_verdict(
     all_levels: Path, tmp_path_factory: pytest.TempPathFactory, lines: Any, used: Any
 ) -> None:
     """Files of any text fail by a message on one line."""
-    chosen = pack.read(all_levels)
+    chosen = pack.read_pack(all_levels)
     rows = [",".join(line) for line in lines]
     text = (
         "\n".join(["quantity,at,value", *rows, ""]).encode("utf-8", "replace").decode()
     )
     place = tmp_path_factory.mktemp("answers") / "any"
     results = _results(chosen, place, {"2-incline-20": text}, used)
-    numbers, verdicts = judge.judge(chosen, ["2-incline-20"], [results])
+    numbers, verdicts = judge.judge_solvers(chosen, ["2-incline-20"], [results])
     _check(chosen, numbers, verdicts)
     (message,) = verdicts.loc[verdicts["solver"] == "any", "message"]
     assert message
@@ -213,10 +213,10 @@ def test_what_is_no_number_is_said(
     all_levels: Path, tmp_path: Path, number: str
 ) -> None:
     """Texts that Python reads as numbers, though no table of a program has them, count no more."""
-    chosen = pack.read(all_levels)
+    chosen = pack.read_pack(all_levels)
     text = f"quantity,at,value\nacceleration_over_g,,{number}\n"
     results = _results(chosen, tmp_path / "any", {"2-incline-20": text})
-    _, verdicts = judge.judge(chosen, ["2-incline-20"], [results])
+    _, verdicts = judge.judge_solvers(chosen, ["2-incline-20"], [results])
     assert "line 2, " in verdicts["message"].iloc[0]
     assert (
         "is not a quantity, its at and a finite number" in verdicts["message"].iloc[0]

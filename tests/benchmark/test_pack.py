@@ -64,11 +64,11 @@ def test_all_names_are_documented_and_those_of_the_schema(
     formulas: Path, all_levels: Path, lift_off: Path, poured: Path
 ) -> None:
     """Solvers read these names: one that is changed is a new schema, and a line of the page."""
-    packs = [pack.read(root) for root in (formulas, all_levels, lift_off, poured)]
+    packs = [pack.read_pack(root) for root in (formulas, all_levels, lift_off, poured)]
     entries = [given for read in packs for given in read.scenes.values()]
     present = {(name, str(given["kind"])) for given in entries for name in given}
     for kind in ("pile", "line"):  # no pack here has these
-        names = (*scenes.parameters(_scene(DISORDERED), kind), "lift_off")
+        names = (*scenes.parameters_of(_scene(DISORDERED), kind), "lift_off")
         present |= {(name, kind) for name in names}
     assert present == _documented()
     assert pack.SCHEMA == 2
@@ -79,7 +79,7 @@ def test_all_names_are_documented_and_those_of_the_schema(
 
 
 def test_levels_times_and_our_answers(all_levels: Path) -> None:
-    chosen = pack.read(all_levels)
+    chosen = pack.read_pack(all_levels)
     assert {given["level"] for given in chosen.scenes.values()} == {1, 2, 3, 4, 5}
     judged = chosen.expected[chosen.expected["tolerance"].notna()]
     margin = (judged["tolerance"] + 1e-8) * judged["value"].abs()
@@ -156,7 +156,7 @@ def test_pivots_are_of_every_law_that_holds_and_rolls_its_grain(
 def test_where_details_decide_only_what_they_do_not_is_judged(
     level_rows: Path, lift_off: Path, all_levels: Path
 ) -> None:
-    rows: Any = pack.read(level_rows).expected.set_index("quantity")
+    rows: Any = pack.read_pack(level_rows).expected.set_index("quantity")
     count = rows.loc["moved", "value"].iloc[-1] + rows.loc["not_moved", "value"]
     tolerances = rows.loc["shields"].set_index("at")["tolerance"]
     assert tolerances[["0.1", "0.3"]].eq(0.03).all()
@@ -170,7 +170,7 @@ def test_where_details_decide_only_what_they_do_not_is_judged(
         < moved.loc[~judged, "high"].min()
     )
     # where lift carries grains off, which collide, thresholds are known less well
-    chosen = pack.read(lift_off)
+    chosen = pack.read_pack(lift_off)
     ((_, given),) = chosen.scenes.items()
     lifted: Any = chosen.expected.set_index("quantity")
     last = lifted.loc["moved"].iloc[-1]
@@ -181,7 +181,9 @@ def test_where_details_decide_only_what_they_do_not_is_judged(
     )
     assert lifted.loc["shields", "tolerance"].eq(0.2).all()
     # rows along the face are judged to their end, and nothing is said of lift
-    table = pack.read(all_levels).expected.set_index("scene").filter(like="4-", axis=0)
+    table = (
+        pack.read_pack(all_levels).expected.set_index("scene").filter(like="4-", axis=0)
+    )
     assert table["tolerance"].notna().all()
     assert "carried_off" not in set(table["quantity"])
 
@@ -192,12 +194,12 @@ def test_export_twice_and_without_liggghts(
     export(tmp_path / "again", None, ())
     export(tmp_path / "again", None, ())
     first, again = (
-        pack.read(root).manifest.sha256 for root in (formulas, tmp_path / "again")
+        pack.read_pack(root).manifest.sha256 for root in (formulas, tmp_path / "again")
     )
     assert {name for name in first if first[name] != again.get(name)} <= {pack.TIMES}
     monkeypatch.setenv("PATH", str(tmp_path))
     export(tmp_path / "pack", None, (2,))
-    chosen = pack.read(tmp_path / "pack")
+    chosen = pack.read_pack(tmp_path / "pack")
     assert chosen.manifest.programs == {}
     assert chosen.expected["ours"].isna().all()
     assert pd.read_csv(tmp_path / "pack" / "times.csv").empty
@@ -239,7 +241,7 @@ def test_single_grains_that_no_dem_has_answered_are_exported(tmp_path: Path) -> 
     asked = study.parse(text, name="grains", where="grains.toml")
     pipeline.run(asked, tmp_path / "study", workers=1)
     export(tmp_path / "pack", tmp_path / "study", ())
-    chosen = pack.read(tmp_path / "pack")
+    chosen = pack.read_pack(tmp_path / "pack")
     pivots = chosen.expected[chosen.expected["scene"].str.startswith("2-grain")]
     assert len(pivots) == 2
     assert pivots["ours"].isna().all()

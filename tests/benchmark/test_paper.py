@@ -66,7 +66,7 @@ def test_fresh_piles_are_as_expected(
     for pile in planned.piles.values():
         flow, bed = (names[name] for name in (pile.flow.id[:12], pile.scene.id))
         pair = (
-            scenes.flow(flow, pile, results),
+            scenes.flow_scene(flow, pile, results),
             scenes.bed(bed, "pile", pile.scene.id, pile, results, tmp_path),
         )
         for problem in pair:
@@ -89,7 +89,7 @@ def test_it_is_called_a_table_and_no_pack() -> None:
     with pytest.raises(
         InputError, match=r"a table of expected answers, and no pack.*README"
     ):
-        pack.read(FOLDER)
+        pack.read_pack(FOLDER)
     for page in ("docs/README.md", "docs/benchmark.md"):
         text = (ROOT / page).read_text(encoding="utf-8")
         (line,) = (

@@ -98,13 +98,15 @@ def test_the_share_of_a_choice_is_the_range_of_its_alternatives() -> None:
         ("cell", "half", -0.1),
         ("cell", "twice", 0.3),
     )
-    shares = budget.shares(moved).set_index("choice")
+    shares = budget.shares_of_choices(moved).set_index("choice")
     assert list(shares.loc["law", ["shields_low", "shields_high"]]) == [0.0, 0.2]
     assert list(shares.loc["cell", ["shields_low", "shields_high"]]) == [0.1, 0.3]
     assert shares.loc["cell", "ustar0_high"] == pytest.approx(0.15)
     # of a class the largest is kept
-    worse = budget.shares(_moved(("law", "a", -0.4), scene="b"))
-    known = budget.known(pd.concat([shares.reset_index(), worse])).set_index("choice")
+    worse = budget.shares_of_choices(_moved(("law", "a", -0.4), scene="b"))
+    known = budget.largest_shares(pd.concat([shares.reset_index(), worse])).set_index(
+        "choice"
+    )
     assert list(known.loc["law", ["shields_low", "shields_high", "scenes"]]) == [
         0.4,
         0.2,

@@ -140,7 +140,7 @@ def test_errors_are_relative_to_the_reference_and_the_front_is_not_beaten() -> N
     assert rows["cost_core_s"]["quick", "static"] == pytest.approx(0.2)
     assert math.isnan(rows["error_50"]["quick", FAST])
     np.testing.assert_allclose(table["reference_error"], 0.01)
-    pairs = ladder.together(table).set_index(["flow_rung", "grain_rung"])
+    pairs = ladder.join_points(table).set_index(["flow_rung", "grain_rung"])
     assert pairs["largest"][FLOW_REFERENCE] == pytest.approx(-0.02)
     best = {("quick", "static"), FLOW_REFERENCE, REFERENCE, AGAIN}
     assert set(pairs.index[pairs["pareto"]]) == best
@@ -178,7 +178,7 @@ def test_known_errors_stand_beside_the_uncertainty_of_the_reference() -> None:
 
 
 def test_points_are_the_errors_of_the_pairs() -> None:
-    pairs = ladder.together(ladder.errors(_table()))
+    pairs = ladder.join_points(ladder.errors(_table()))
     (ax,) = ladder.chart(pairs, {"largest": ""}).axes
     xy = [np.ravel(line.get_xydata()) for line in ax.lines if line.get_gid() == "point"]
     np.testing.assert_array_equal(
@@ -187,11 +187,11 @@ def test_points_are_the_errors_of_the_pairs() -> None:
 
 
 def test_the_legends_of_the_charts_are_short_and_the_table_has_the_numbers() -> None:
-    pairs = ladder.together(ladder.errors(_table()))
+    pairs = ladder.join_points(ladder.errors(_table()))
     canvas = ladder.chart(pairs, {"largest": ""})
     for legend in canvas.legends:
         assert len(legend.get_texts()) <= 7
-    table = ladder.table_of(pairs).set_index("number")
+    table = ladder.pairs_table(pairs).set_index("number")
     for text in canvas.axes[0].texts:
         number, _, name = text.get_text().partition(": ")
         row = table.loc[[int(number)]].iloc[0]

@@ -9,7 +9,7 @@ from matplotlib.patches import Rectangle
 
 from orchestrator.fidelity import known, limits
 from orchestrator.lab import stability
-from orchestrator.lab.stability import FOLDER, NOTICED, Map
+from orchestrator.lab.stability import FOLDER, NOTICED, StabilityMap
 from orchestrator.runs import workspace
 
 SMALL = """
@@ -31,7 +31,7 @@ forces = { law = "high" }
     "path", sorted(FOLDER.glob("*.toml")), ids=lambda path: path.stem
 )
 def test_a_maps_file_spans_its_axes(path: Path) -> None:
-    read = stability.load(path)
+    read = stability.read_map(path)
     across, down = ({place[axis] for place in read.places} for axis in (0, 1))
     assert len(read.places) == len(across) * len(down)
     assert (across == {None}) == ("fractions" in read.data["x"])
@@ -100,9 +100,9 @@ def test_each_cell_shows_its_worst_run() -> None:
     columns = ["map", "x", "y", "verdict", "caught", "error", "note"]
     table = pd.DataFrame(rows, columns=columns)
     axes = {"x": {"label": "x"}, "y": {"label": "y"}}
-    maps = [Map(name, {"title": name, **axes}, ()) for name in ("m", "words")]
+    maps = [StabilityMap(name, {"title": name, **axes}, ()) for name in ("m", "words")]
     for shown in (maps, maps[:1]):
-        ax = stability.draw(shown, table).axes[0]
+        ax = stability.draw_maps(shown, table).axes[0]
         cells = [patch for patch in ax.patches if isinstance(patch, Rectangle)]
         drawn = {cell.get_xy(): cell.get_gid() for cell in cells}
         assert drawn == {(0, 0): "good", (0, 1): "wrong", (1, 0): "exploded"}

@@ -35,7 +35,7 @@ NAMES = [
 
 def judge(tables: Tables, **changed: pd.DataFrame) -> dict[str, Judged]:
     """The verdicts by the name of the measure, some tables of the study being replaced."""
-    return dict(zip(NAMES, claims.judge({**tables, **changed}), strict=True))
+    return dict(zip(NAMES, claims.judge_claims({**tables, **changed}), strict=True))
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +115,7 @@ def test_a_reason_explains_its_verdict_or_is_none(
 ) -> None:
     asked = {name: results.tables[name] for name in ("scenes", "methods")}
     for tables in (results.tables, exact, asked):
-        for one in claims.judge(tables):
+        for one in claims.judge_claims(tables):
             assert (one.why == one.claim.why) == (one.verdict == one.claim.verdict)
 
 
@@ -177,8 +177,8 @@ def test_the_transition_and_other_fluids_are_not_judged(results: Results) -> Non
     assert not in_regime.all()
     grains = tables["single_grain"]
     absurd = grains.assign(shields_dem=grains["shields_dem"].where(in_regime, 1e9))
-    judged = claims.judge({**tables, "single_grain": absurd})
-    assert claims.frame(judged).equals(claims.frame(claims.judge(tables)))
+    judged = claims.judge_claims({**tables, "single_grain": absurd})
+    assert claims.frame(judged).equals(claims.frame(claims.judge_claims(tables)))
     water = judge(tables, scenes=tables["scenes"].assign(rho_f_kg_m3=1000.0))
     assert {one.verdict for one in water.values()} == {"no data"}
 

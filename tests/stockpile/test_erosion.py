@@ -23,8 +23,8 @@ def test_the_classes_of_ap42_and_its_potential_by_hand() -> None:
         "share"
     ].tolist()
     # u* in a wind of 20 m/s is 0.4, 1.2, 1.8 m/s; 36, 50 and 14 % of the area of pile B1
-    surface = erosion.Surface("", pd.DataFrame(), 0.0, threshold=1.12)
-    by_epa = erosion.Pile("", [surface], is_flat=False, has_bare=True).by_epa
+    surface = erosion.PileSurface("", pd.DataFrame(), 0.0, threshold=1.12)
+    by_epa = erosion.Stockpile("", [surface], is_flat=False, has_bare=True).by_epa
     hand = 0.5 * (58 * 0.08**2 + 25 * 0.08) + 0.14 * (58 * 0.68**2 + 25 * 0.68)
     assert by_epa[1].potential([20.0, 10.0]) == pytest.approx([hand, 0.0])
     assert by_epa[2].faces["ratio"].tolist() == pytest.approx(
