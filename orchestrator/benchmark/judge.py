@@ -87,7 +87,7 @@ def seven_digits(at: str) -> str:
 
     Examples
     --------
-    >>> place_of("0.333333333"), place_of("")
+    >>> seven_digits("0.333333333"), seven_digits("")
     ('0.3333333', '')
     """
     if not at.strip():

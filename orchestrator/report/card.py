@@ -275,6 +275,8 @@ def lines(card: Card) -> Iterator[str]:
 
 def _numbers(numbers: Sequence[Number]) -> Iterator[str]:
     """The figures below each other, with their intervals, and what each is."""
+    if not numbers:
+        return
     has_interval = any(number.interval for number in numbers)
     has_measured = any(number.beside for number in numbers)
     heads = ["answer"]

@@ -8,13 +8,16 @@ from collections.abc import Mapping
 from functools import cache
 from io import StringIO
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from orchestrator import digits, solvers
 from orchestrator.errors import SolverError
 from orchestrator.types import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 PROGRAM = "liggghts"
 TEMPLATES = "liggghts"
@@ -272,7 +275,9 @@ def write_grains(
     (directory / "grains.data").write_text(text)
 
 
-def read_frames(path: Path, columns: tuple[str, ...]) -> tuple[IntArray, pd.DataFrame]:
+def read_frames(
+    path: Path, columns: tuple[str, ...]
+) -> tuple[IntArray, "pd.DataFrame"]:
     """Read a text dump: a frame for each time step that was listed.
 
     Parameters
@@ -294,6 +299,9 @@ def read_frames(path: Path, columns: tuple[str, ...]) -> tuple[IntArray, pd.Data
     SolverError
         If the file is missing, cut short or not a dump of these columns.
     """
+    # `doctor` names a pandas that does not load
+    import pandas as pd
+
     try:
         text = path.read_text(encoding="ascii")
         frames = [frame.split("\n", 8) for frame in text.split("ITEM: TIMESTEP\n")[1:]]

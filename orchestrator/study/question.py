@@ -168,6 +168,11 @@ def check(question: Question) -> None:
     ----------
     question
         The question.
+
+    Raises
+    ------
+    UnfitError
+        With the field, why it does not fit, and the remedy.
     """
     if question.grain.sizes is not None:
         _check_sizes(question.grain.sizes, question.grain.diameter)

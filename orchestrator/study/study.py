@@ -108,9 +108,41 @@ S = TypeVar("S", bound=Point, default=Scene)
 
 
 def _alone(scenes: Sequence[S]) -> Iterator[Sequence[S]]:
-    """Each scene, which answers itself."""
+    """Take each scene alone, which answers itself.
+
+    Parameters
+    ----------
+    scenes
+        The scenes.
+
+    Yields
+    ------
+    sequence of Point
+        One of them.
+    """
     for scene in scenes:
         yield [scene]
+
+
+def _as_read(data: Mapping[str, Any], where: str, files: Files) -> Mapping[str, Any]:
+    """Take the tables of a study file as they are: the kind of beds names no files.
+
+    Parameters
+    ----------
+    data
+        The tables.
+    where
+        The name of the study file.
+    files
+        Reads the files that it names.
+
+    Returns
+    -------
+    mapping
+        The tables.
+    """
+    del where, files
+    return data
 
 
 @dataclass(frozen=True)
@@ -153,9 +185,7 @@ class Kind(Generic[S]):
     hint: Hint
     fields: Sequence[Quantity] = ()
     resolved: Callable[[Sequence[S]], Iterator[Sequence[S]]] = _alone
-    with_files: Callable[[Mapping[str, Any], str, Files], Mapping[str, Any]] = (
-        lambda data, where, files: data
-    )
+    with_files: Callable[[Mapping[str, Any], str, Files], Mapping[str, Any]] = _as_read
     file: type[File] = File
     without: Sequence[str] = ()
     most: int = MOST_SCENES

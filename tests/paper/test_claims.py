@@ -194,7 +194,8 @@ def test_a_study_of_the_paper_alone_gets_a_report_card(
     )
     (tmp_path / "cases").mkdir()
     grains = {
-        name: results.tables[name] for name in ("scenes", "methods", "single_grain")
+        name: results.tables[name]
+        for name in ("scenes", "methods", "single_grain", "reason")
     }
     whole = replace(results, study=replace(results.study, text=text), tables=grains)
     cards = paper.cards(whole.study, whole.tables)

@@ -359,8 +359,13 @@ def test_grains_of_a_pile_that_go_on_have_the_interval_of_one_grain(
         assert not rows["tested_rows"].any()
         return
     grain = {
-        **{"d_m": 5e-4, "z0_m": 5e-4 / 30, "rho_f_kg_m3": 1.225, "g_m_s2": 9.81},
-        **{"rho_sol_kg_m3": 2650.0, "alpha_s": 1.615, "cohesion_n_m": 0.0},
+        **{"d_m": 5e-4, "z0_m": 5e-4 / 30, "rho_f_kg_m3": 1.225, "nu_m2_s": 1.46e-5},
+        **{
+            "rho_sol_kg_m3": 2650.0,
+            "alpha_s": 1.615,
+            "cohesion_n_m": 0.0,
+            "g_m_s2": 9.81,
+        },
         **{"alpha_deg": 12.0, "beta_deg": 60.0, "reynolds": 9.0},
         **{"force_law": "bridged", "criterion": "goes on"},
     }
