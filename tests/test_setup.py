@@ -3,6 +3,7 @@
 import os
 import shutil
 import subprocess
+import tomllib
 import venv
 import zipfile
 from hashlib import sha256
@@ -10,6 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
+from orchestrator.extras import NEEDS
 
 pytestmark = pytest.mark.long
 
@@ -94,3 +97,10 @@ def test_set_up_says_what_it_installs_in_one_line(
         "setup: installing what requirements.lock pins",
         "setup: installing what requirements-gis.lock pins",
     ]
+
+
+def test_a_missing_extra_is_installed_by_what_the_package_asks_for() -> None:
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    extras = tomllib.loads(text)["project"]["optional-dependencies"]
+    for extra, requirement in NEEDS.items():
+        assert requirement in extras[extra]

@@ -555,4 +555,4 @@ def test_without_the_extra_one_line_says_what_to_install(
     )
     said = refused(tmp_path, content, name)
     assert "the extra [gis]: rasterio is not installed" in said
-    assert "pip install 'orchestrator[gis]'" in said
+    assert "pip install 'rasterio>=1.4'" in said
