@@ -94,7 +94,7 @@ def _drawn(
                         figure = style.saved(figure, folder)
                     found.append(figure)
             except Exception as error:
-                fault = f"{kind.draws.__module__}: {type(error).__name__}: {error}"
+                fault = f"{kind.name}: {type(error).__name__}: {error}"
                 faults.append(fault)
                 print(f"a figure could not be drawn: {fault}", file=sys.stderr)
             terminal.check()

@@ -274,7 +274,7 @@ def test_a_figure_that_failed_is_drawn_the_next_time(
     for _ in range(2):
         assert cli.main(words) == 1
         printed = capsys.readouterr()
-        assert "fail: MemoryError: for this test" in printed.err
+        assert "shields: MemoryError: for this test" in printed.err
         assert "the same command draws it again" in printed.err
         assert "At which wind does a grain of 1 mm start to move?" in printed.out
         assert "MemoryError: for this test" in (out / "report.html").read_text()

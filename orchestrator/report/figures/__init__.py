@@ -47,6 +47,8 @@ class Kind:
         Further tables that it is drawn from where they have rows.
     files
         Finds the cases whose bulky files it is drawn from, which are kept for it.
+    name
+        The name of its file, by `kinds`.
     """
 
     order: int
@@ -54,6 +56,7 @@ class Kind:
     needs: tuple[str, ...] = ()
     uses: tuple[str, ...] = ()
     files: Callable[[Results], Sequence[Case]] = no_files
+    name: str = ""
 
     def draw(self, results: Results) -> Iterator[Figure]:
         """Make its figures.
@@ -97,7 +100,7 @@ def kinds(packages: Sequence[str] = ()) -> list[Kind]:
     for package in (__name__, *packages):
         for module in iter_modules(import_module(package).__path__):
             kind: Kind = import_module(f"{package}.{module.name}").FIGURE
-            found.append(kind)
+            found.append(replace(kind, name=module.name))
     return sorted(found, key=lambda kind: kind.order)
 
 
