@@ -117,7 +117,7 @@ def thresholds(
     if not table["valid"].any():
         place = int(np.argmax(table["answer"]))
         reason = f"{table['law'][place]}: {verdict.texts(against[place])}"
-        remedy = "are all numbers in SI units?"
+        remedy = "write all numbers in SI units"
         raise InputError(f"no force law holds; {reason}", "threshold", remedy)
     if bed_slope is not None:
         table |= river.uniform_flow(table, bed_slope)

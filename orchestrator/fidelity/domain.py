@@ -152,7 +152,8 @@ def _lee_slope(scene: Scene) -> Iterator[float]:
 def _sizes(scene: Scene) -> Iterator[str]:
     if scene.is_poured:
         sizes = scene.grain.sizes
-        yield NONE if sizes is None else type(sizes).__name__
+        word = "log-normal" if isinstance(sizes, LogNormal) else "a sieve table"
+        yield NONE if sizes is None else word
 
 
 def _sigma(scene: Scene) -> Iterator[float]:

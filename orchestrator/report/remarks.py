@@ -75,7 +75,9 @@ def remarks(results: Results) -> list[Remark]:
         said.append(PAPER_FLUID)
     usual = [FIRST_MOTION]
     if table["rho_f_kg_m3"].map(is_gas).any():
-        usual = [over_ground(table), DRY_GRAINS, FIRST_MOTION]
+        usual = [DRY_GRAINS, FIRST_MOTION]
+        if sheets.quantity(table) is WIND:
+            usual.insert(0, over_ground(table))
     return said + usual[: max(0, MOST - len(said))]
 
 

@@ -14,7 +14,7 @@ from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import LAWS
 from orchestrator.report import counted, labels, single
 from orchestrator.report.results import Results, measured_hills, split
-from orchestrator.report.subjects import MEAN, STRESS, TERMS, WIND, Quantity, is_gas
+from orchestrator.report.subjects import MEAN, STRESS, TERMS, WIND, Quantity, has_wind
 from orchestrator.study import fields
 from orchestrator.tables.facts import needs_run
 
@@ -73,9 +73,11 @@ def quantity(rows: pd.DataFrame) -> Quantity:
     Returns
     -------
     Quantity
-        In gases the wind, in liquids with a depth the mean velocity, else the stress.
+        Of winds their speed, of other flows with a depth the mean velocity, else the
+        stress.
     """
-    if rows["rho_f_kg_m3"].map(is_gas).all():
+    flows = zip(rows["rho_f_kg_m3"], rows["depth_m"].astype(float), strict=True)
+    if all(has_wind(*flow) for flow in flows):
         return WIND
     if MEAN.column() in rows and rows[MEAN.column()].notna().all():
         return MEAN
@@ -114,9 +116,9 @@ def _of_piles(results: Results, every: pd.DataFrame) -> Sheet:
     if not _fits(every, [*keys, "fraction"]):
         return _sheet(here, keys if _fits(here, keys) else RANGES, "pile_threshold")
     sheet = _sheet(every, [*keys, "fraction"], "pile_threshold")
+    if PART not in sheet.frame:
+        return sheet
     if every["scene_id"].nunique() > 1:
-        if PART not in sheet.frame:
-            return sheet
         return replace(sheet, frame=_first_grains(results, every, keys, sheet.frame))
     first = _first_grain(every.iloc[0], sheet.frame, {PART: "first grain"})
     return replace(sheet, frame=first)

@@ -20,6 +20,7 @@ from orchestrator.report.subjects import (
     WIND,
     Quantity,
     fluid,
+    has_wind,
     is_gas,
     length,
     solid,
@@ -92,9 +93,10 @@ def quantity(row: Row) -> Quantity:
     Returns
     -------
     Quantity
-        In gases the wind, in liquids with a depth the mean velocity, else the stress.
+        Of a wind its speed, of other flows with a depth the mean velocity, else the
+        stress.
     """
-    if is_gas(float(row["rho_f_kg_m3"])):
+    if has_wind(float(row["rho_f_kg_m3"]), known(row.get("depth_m"))):
         return WIND
     if known(row.get(MEAN.column())) > 0:
         return MEAN

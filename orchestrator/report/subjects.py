@@ -71,6 +71,8 @@ class Quantity(NamedTuple):
         return f"{self.stem}{end}_{unit}"
 
 
+WIND_HEIGHT_M = 10.0
+"""Height above the ground at which a wind is told, m."""
 WIND = Quantity("wind_10m", "m/s", "wind", "wind", "10 m above the ground")
 MEAN = Quantity("mean_velocity", "m/s", "flow", "mean velocity", "over the depth")
 STRESS = Quantity("stress", "Pa", "flow", "stress", "of the flow on the bed")
@@ -92,6 +94,29 @@ def is_gas(density: float) -> bool:
         Whether it is lighter than any liquid.
     """
     return density < GAS_BELOW
+
+
+def has_wind(density: float, depth: float) -> bool:
+    """Say whether a flow is a wind that is told 10 m above the ground.
+
+    Parameters
+    ----------
+    density
+        Density of the fluid, kg/m3.
+    depth
+        Depth of the flow, m; NaN where it has none.
+
+    Returns
+    -------
+    bool
+        Whether it is of a gas, and that high.
+
+    Examples
+    --------
+    >>> has_wind(1.225, float("nan")), has_wind(1.225, 0.1), has_wind(1000.0, 20.0)
+    (True, False, False)
+    """
+    return is_gas(density) and not depth < WIND_HEIGHT_M
 
 
 def fluid(density: float, viscosity: float) -> str:
