@@ -15,7 +15,7 @@ from pathlib import Path
 from PIL import Image
 
 PICTURE = Path(__file__).parents[1] / "docs" / "figures" / "result-page.png"
-SIZE = (1280, 1690)  # pixels
+SIZE = (1280, 1860)  # pixels
 COLOURS = 96
 CALLOUTS = (
     "h1",
@@ -25,7 +25,7 @@ CALLOUTS = (
     ".worth",
     ".bed-box",
     ".slide",
-    "#picture",
+    "#picture a[href$='share.svg']",
     "#thresholds table",
     "#limits",
     "nav",

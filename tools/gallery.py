@@ -43,7 +43,7 @@ NOTES = {
 }
 """What is added to the section of a preset."""
 WIDE = 900  # pixels
-COLOURS = 64
+COLOURS = 256
 HEAD = """\
 # Gallery of results
 
@@ -129,7 +129,8 @@ def draw(figure: Path, picture: Path) -> None:
         if box is None:
             raise SystemExit(f"{figure}: chromium drew nothing")
         shown = whole.crop((0, 0, WIDE, box[3]))
-        shown.quantize(COLOURS).save(picture, optimize=True)
+        few = shown.quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
+        few.save(picture, optimize=True)
 
 
 if __name__ == "__main__":

@@ -49,6 +49,8 @@ RC: dict[Any, Any] = {
 """Settings that differ from matplotlib's defaults."""
 WIDTH = 7.0
 """Width of a figure across two columns of a paper, inches."""
+NARROW = 4.4
+"""Width of a drawing that a narrow page shows whole, with letters to read, inches."""
 SIDES = (0.66, 0.12)
 """Margins of panels, left and right, inches."""
 UNDER = 0.42

@@ -100,7 +100,7 @@ def _of_the_card(results: Results) -> Iterator[Figure]:
 def _draw_card(row: pd.Series, others: Sequence[str], table: pd.DataFrame) -> Canvas:
     """The curves of a bed and of those that differ in chance alone, and its answer."""
     told = single.quantity(row)
-    canvas = style.canvas(1.7)
+    canvas = style.canvas(2.0, style.NARROW)
     ax = canvas.subplots()
     table = table[np.isfinite(table["ustar0_m_s"]) & (table["ustar0_m_s"] > 0)]
     alike: Look = {"label": "beds that differ in chance", "color": ANSWER, "lw": 0.6}
@@ -126,7 +126,8 @@ def _draw_card(row: pd.Series, others: Sequence[str], table: pd.DataFrame) -> Ca
     ax.annotate(text, (at, fraction), xytext=(7, -8), **bold)
     ax.set(xlim=(0.9 * min(reach), 1.02 * max(reach)), ylim=(0, 1), ylabel="n/N")
     ax.set_xlabel(f"{told.name}, {told.unit}")
-    ax.legend(handles=style.samples([ax]), loc="upper left")
+    handles = style.samples([ax])
+    canvas.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     return canvas
 
 

@@ -11,8 +11,14 @@ from orchestrator.physics.grain import Grain
 from orchestrator.report import answers, sheets, style, theory
 from orchestrator.report.figures import Kind
 from orchestrator.report.results import Results, case_names
-from orchestrator.report.style import ANSWER, INK, PALE, Figure
+from orchestrator.report.style import ANSWER, INK, PALE, Figure, Look
 
+DISC: Look = {"ls": "", "marker": "o", "color": ANSWER, "ms": 6, "label": "computed"}
+RING: Look = {**DISC, "mfc": "white", "mew": 1.4, "label": "fewer than ten grains"}
+SQUARE: Look = {"ls": "", "marker": "s", "color": INK, "ms": 5}
+SQUARE["label"] = "fitted to measurements"
+TOGETHER: Look = {"color": ANSWER, "lw": 1, "ls": ":", "zorder": 0.5}
+TOGETHER["label"] = "all sizes together"
 CAPTION = (
     "Orange: computed, with the interval that so few grains leave; rings: fewer than "
     "ten grains. Squares: the function that Wilcock and Crowe (2003) fitted to "
@@ -59,16 +65,19 @@ def _sizes(row: pd.Series, here: pd.DataFrame) -> Canvas:
     top = 1.15 * np.nanmax([*value[np.isfinite(value)], *measured, at])
     count = len(here)
     places = np.arange(count)[::-1]
-    canvas = style.canvas(0.6 + 0.2 * count)
+    canvas = style.canvas(0.9 + 0.2 * count, style.NARROW)
     ax = canvas.subplots()
     right = np.nan_to_num(high, nan=2 * top)
     ax.hlines(places, np.nan_to_num(low), right, color=PALE, lw=8, zorder=1)
-    ax.plot(value[~few], places[~few], "o", color=ANSWER, ms=6)
-    ax.plot(value[few], places[few], "o", color=ANSWER, mfc="white", mew=1.4, ms=6)
-    ax.plot(measured, places, "s", color=INK, ms=5)
-    ax.axvline(at, color=ANSWER, lw=1, ls=":", zorder=0.5)
+    ax.plot(value[~few], places[~few], **DISC)
+    if np.isfinite(value[few]).any():
+        ax.plot(value[few], places[few], **RING)
+    ax.plot(measured, places, **SQUARE)
+    ax.axvline(at, **TOGETHER)
     ax.set_yticks(places, _names(float(row["d_m"]), here))
     ax.set(xlim=(0, top), ylim=(-0.6, count - 0.4), xlabel="stress on the bed, Pa")
+    handles = style.samples([ax])
+    canvas.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     return canvas
 
 

@@ -68,7 +68,8 @@ def _sweep(
     info = labels.words(column)
     scale = 1e3 if info.unit == "m" else 1.0
     unit = "mm" if info.unit == "m" else info.unit
-    canvas = style.canvas(2.4)
+    is_one = len(series) == 1
+    canvas = style.canvas(2.4, style.NARROW if is_one else style.WIDTH)
     ax = canvas.subplots()
     sizes: set[float] = set()
     for number, (name, part) in enumerate(series):
@@ -80,8 +81,11 @@ def _sweep(
             ax.set_xticks(sorted(sizes))
     ax.set(ylim=(0, None), xlabel=f"{info.label}, {unit}".rstrip(", "))
     ax.set_ylabel(f"{told.name}, {told.unit}")
-    if len(series) > 1:
-        canvas.legend(*ax.get_legend_handles_labels(), loc="outside right upper")
+    handles = style.samples([ax])
+    if is_one:
+        canvas.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    else:
+        canvas.legend(handles=handles, loc="outside right upper")
     return canvas
 
 
@@ -100,7 +104,7 @@ def _series(rows: pd.DataFrame, column: str) -> list[tuple[str, pd.DataFrame]]:
     """The parts of a sweep that agree in all but one column, with their names."""
     others = [name for name in labels.varying(rows, column) if name != "fraction"]
     if not others:
-        return [("", rows)]
+        return [("computed", rows)]
     parts = []
     for _, part in rows.groupby(others, dropna=False, sort=False):
         parts.append((", ".join(labels.told(part.iloc[0], others)), part))
@@ -130,7 +134,8 @@ def _draw_series(
     ax.plot(x[usable], y[usable], marker, color=ANSWER, ms=5)
     ax.plot(x[~usable], y[~usable], marker, color=NONE, mfc="white", ms=5)
     measured = part[f"measured_{told.column()}"].to_numpy(float)
-    ax.plot(x, measured, color=INK, lw=1.1, ls=MEASURED, zorder=1.5)
+    name = "with the measured threshold" if number == 0 else "_"
+    ax.plot(x, measured, color=INK, lw=1.1, ls=MEASURED, zorder=1.5, label=name)
 
 
 FIGURE = Kind(order=90, draws=draw, uses=("pile_threshold", "single_grain"))
