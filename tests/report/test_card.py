@@ -12,7 +12,7 @@ from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.reported import in_units
 from orchestrator.physics.threshold import thresholds_of
 from orchestrator.physics.velocity import measurable_speeds
-from orchestrator.report import answers, figures, single, units
+from orchestrator.report import answers, figures, single, style, units
 from orchestrator.report.card import Card, Number, Worth, lines
 from orchestrator.report.figures import fractions
 from orchestrator.report.figures import grain as of_one
@@ -116,6 +116,13 @@ def test_an_air_study_shows_what_was_measured_in_air(results: Results) -> None:
     # the paper's own gas stands beside water, as in the paper
     (paper,) = overview.draw(only(results, "pile"))
     assert [label for label in legend_of(paper) if "water" in label]
+
+
+def test_the_growth_of_motion_fits_a_narrow_page(results: Results) -> None:
+    growth = next(fractions.draw(only(results, "pile")))
+    assert growth.canvas
+    assert growth.canvas.get_figwidth() == style.NARROW
+    assert "with the measured threshold" in legend_of(growth)
 
 
 def test_one_bed_has_its_picture_and_its_growth_at_the_head(results: Results) -> None:
