@@ -136,8 +136,11 @@ def run(
         left = space.left(planned.cases) if changed else []
         if left:
             what = f"{len(left)} cases are not asked for any more"
+            names = "names them"
+            if len(left) == 1:
+                what, names = "1 case is not asked for any more", "names it"
             what = f"the study file has changed: {what}"
-            print(f"{what}; `orchestrator status {out}` names them", file=sys.stderr)
+            print(f"{what}; `orchestrator status {out}` {names}", file=sys.stderr)
         return Finished(space.page, len(todo), failures, answer, undrawn)
 
 

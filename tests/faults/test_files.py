@@ -205,7 +205,7 @@ def test_cases_of_an_earlier_file_are_named_and_kept(finished: Bench) -> None:
     finished.source.write_text(text.replace("[7e-4, 1e-3]", "[1e-3]"))
     code, printed = finished.command("study")
     assert code == 0, printed
-    assert "the study file has changed: 1 cases are not asked for any more" in printed
+    assert "the study file has changed: 1 case is not asked for any more" in printed
     for word in ("status", "prune"):
         code, printed = finished.command(word)
         assert code == 0, printed

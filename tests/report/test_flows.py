@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from orchestrator.report import remarks, sheets
+from orchestrator.report import page, remarks, sheets
 from tests import small_study
 
 TEXT = """
@@ -31,3 +31,10 @@ def test_a_table_of_one_fraction_has_a_row_for_it_alone(tmp_path: Path) -> None:
     assert len(sheet.frame) == 1
     assert sheets.PART not in sheet.frame
     assert "part that has moved: 30 %" in sheet.shared
+
+
+def test_a_page_of_no_cases_tells_of_none(tmp_path: Path) -> None:
+    results = small_study.run(tmp_path, TEXT)
+    told = str(page.said("files", results=results, case=""))
+    assert "columns.csv" in told
+    assert "Allrun" not in told
