@@ -2,9 +2,10 @@
 
 import sys
 import tomllib
+from abc import ABC, abstractmethod
 from argparse import Namespace
-from collections.abc import Callable, Container, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +28,6 @@ from orchestrator.study.scene import Scene
 from orchestrator.study.source import Source
 from orchestrator.study.study import Study
 from orchestrator.tables import csv
-
-Results = tuple[Mapping[str, pd.DataFrame], Sequence[Section]]
 
 
 def page_texts(module: str, about: str) -> Mapping[str, str]:
@@ -102,18 +101,38 @@ class Runs:
 
 
 @dataclass(frozen=True)
-class Experiment:
-    """What an experiment runs and makes.
+class Results:
+    """What an experiment makes of its runs.
+
+    Attributes
+    ----------
+    tables
+        Its tables, by name.
+    page
+        The sections of its page.
+    files
+        Contents of other files, by path in its directory.
+    """
+
+    tables: Mapping[str, pd.DataFrame]
+    page: Sequence[Section]
+    files: Mapping[str, bytes] = field(default_factory=dict)
+
+
+class Experiment(ABC):
+    """Scenes in, runs, tables, one page: a subclass plans the runs and reads them.
+
+    Parameters
+    ----------
+    planned
+        Its scenes and runs.
+    study
+        The study that it is on; None for scenes of its own.
 
     Attributes
     ----------
     name, title
         Its name and its title.
-    planned
-        Its scenes and runs.
-    results
-        Gives the tables by name and the sections of the page; no table where too little
-        is known.
     limit_s
         Time that a run may take, s.
     verdicts
@@ -123,8 +142,6 @@ class Experiment:
         Names of the runs whose failures count; None for all.
     source
         The study file that it is on; None for scenes of its own.
-    files
-        Makes files beside the page, by their paths; None for no file.
     shares_cases
         Whether cases that are done in another directory of results are taken from
         there: the experiment asks for runs that others ask for, too.
@@ -132,14 +149,32 @@ class Experiment:
 
     name: str
     title: str
-    planned: Plan
-    results: Callable[[Runs], Results]
     limit_s: float = TIME_LIMIT_S
     verdicts: Container[str] = ()
     failing: Container[str] | None = None
     source: Source | None = None
-    files: Callable[[Runs], Mapping[str, bytes]] | None = None
     shares_cases: bool = False
+
+    def __init__(self, planned: Plan, study: Study[Any] | None = None) -> None:
+        self.planned = planned
+        if study is not None:
+            self.limit_s = study.time_limit_s
+            self.source = study.source
+
+    @abstractmethod
+    def results(self, runs: Runs) -> Results | None:
+        """Make tables and page of the runs that are done.
+
+        Parameters
+        ----------
+        runs
+            The runs.
+
+        Returns
+        -------
+        Results or None
+            Tables and page; None where too few runs are done to say anything.
+        """
 
     def check(self, out: Path) -> None:
         """Refuse a directory that holds something else, as `run` does.
@@ -258,23 +293,22 @@ class Experiment:
         cases = space.cases
         with style.settings():
             runs = Runs(self.planned, cases, reuse.done(self.planned.cases, cases))
-            tables, sections = self.results(runs)
-            if not tables and failed:
+            made = self.results(runs)
+            if made is None and failed:
                 raise next(iter(failed.values()))
-            if not tables:
+            if made is None:
                 what = "none of its cases has run to its end"
                 remedy = "`orchestrator status` names the causes"
                 raise OrchestratorError(what, str(space.root), remedy)
-            made = self.files(runs) if self.files else {}
             with folder.renewed():
-                for key, table in tables.items():
+                for key, table in made.tables.items():
                     folder.put(f"tables/{key}.csv", csv(table))
-                for path, content in made.items():
+                for path, content in made.files.items():
                     folder.put(path, content)
                 solvers = case.programs(cases, self.planned.cases)
                 name = space.page.name
-                page.write_experiment(self.title, sections, folder, name, solvers)
-        return sections
+                page.write_experiment(self.title, made.page, folder, name, solvers)
+        return made.page
 
 
 def piles(study: Study) -> dict[Scene, PileBed]:

@@ -1,7 +1,7 @@
 """Measures the package: ladder, budget, maps of failure, validation."""
 
 from argparse import Namespace
-from importlib import import_module
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +11,7 @@ from orchestrator.surface import TRUTH
 
 if TYPE_CHECKING:
     from orchestrator.experiment import Experiment
+    from orchestrator.study.study import Study
 
 
 def _on_preset(command: Parser) -> None:
@@ -31,34 +32,50 @@ def _of_validate(command: Parser) -> None:
     command.add_argument("--surfaces", choices=("all", *TRUTH), help=text)
 
 
-def _run(options: Namespace) -> int:
+def _on_study(
+    options: Namespace, experiment: "Callable[[Study, Path], Experiment]"
+) -> int:
     """Run an experiment on a study."""
     from orchestrator.study.study import load
 
     study = load(options.source, options.tolerance)
     out = options.out or Path("results") / options.command
-    module = import_module(f"orchestrator.lab.{options.command}")
-    experiment: Experiment = module.experiment(study, out)
-    return experiment.command(options, out)
+    return experiment(study, out).command(options, out)
+
+
+def _run_ladder(options: Namespace) -> int:
+    """Run the ladder."""
+    from orchestrator.lab.ladder import Ladder
+
+    return _on_study(options, Ladder)
+
+
+def _run_budget(options: Namespace) -> int:
+    """Run the budget."""
+    from orchestrator.lab.budget import Budget
+
+    return _on_study(options, Budget)
 
 
 def _run_stability(options: Namespace) -> int:
     """Run the maps of failure."""
-    from orchestrator.lab import stability
+    from orchestrator.lab.stability import Stability
 
     out = options.out or Path("results") / options.command
-    return stability.experiment(out).command(options, out)
+    return Stability().command(options, out)
 
 
 def _run_validate(options: Namespace) -> int:
     """Run the validation, or its flows over beds in three dimensions alone."""
     if not options.surfaces:
-        return _run(options)
-    from orchestrator.surface import truth
+        from orchestrator.lab.validate import Validation
+
+        return _on_study(options, Validation)
+    from orchestrator.surface.truth import Truth
 
     names = TRUTH if options.surfaces == "all" else (options.surfaces,)
     out = options.out or Path("results") / "surfaces"
-    return truth.experiment(names).command(options, out)
+    return Truth(names).command(options, out)
 
 
 OFFER = Offer(
@@ -73,7 +90,7 @@ OFFER = Offer(
                 "ladder dune.toml --out results/mine": "measure on your own scenes",
             },
             options=_on_preset,
-            run=_run,
+            run=_run_ladder,
         ),
         Command(
             name="budget",
@@ -85,7 +102,7 @@ OFFER = Offer(
                 "budget sand.toml": "the effect of each assumption on your own study",
             },
             options=_on_preset,
-            run=_run,
+            run=_run_budget,
         ),
         Command(
             name="stability",

@@ -342,8 +342,8 @@ def changes(study: Study) -> tuple[list[Change], dict[str, Decision]]:
     return listed, asked
 
 
-def experiment(study: Study, out: Path) -> Experiment:
-    """Find what each shared choice is worth, changed alone on the piles of a study.
+class Budget(Experiment):
+    """What each shared choice is worth, changed alone on the piles of a study.
 
     Parameters
     ----------
@@ -352,42 +352,32 @@ def experiment(study: Study, out: Path) -> Experiment:
     out
         Directory of its runs.
 
-    Returns
-    -------
-    Experiment
-        The experiment.
-
     Raises
     ------
     InputError
         If the study has no pile, or a scene is beyond the limits of the methods.
     """
-    limits.check_study(study)
-    listed, asked = changes(study)
-    planned = plan.of(asked, cases=out.absolute() / "cases")
 
-    def results(runs: Runs) -> Results:
-        moved = measure(listed, runs)
+    name = "budget"
+    title = "What a threshold is worth"
+
+    def __init__(self, study: Study, out: Path) -> None:
+        limits.check_study(study)
+        self.changes, asked = changes(study)
+        super().__init__(plan.of(asked, cases=out.absolute() / "cases"), study)
+        # a flow model may refuse a bed: only runs of the scenes as they are asked count
+        # as failed
+        bases = [self.planned.piles[change.base] for change in self.changes]
+        self.failing = {run.name for pile in bases for run in pile.runs}
+
+    def results(self, runs: Runs) -> Results | None:
+        """Measure the changes whose runs are done."""
+        moved = measure(self.changes, runs)
         if moved.empty:
-            return {}, ()
+            return None
         shared = shares_of_choices(moved)
         tables = {"changes": moved, "shares": shared, "budget": largest_shares(shared)}
-        return tables, _sections(listed, moved, shared, runs)
-
-    # a flow model may refuse a bed: only runs of the scenes as they are asked count
-    # as failed
-    failing = set()
-    for change in listed:
-        failing |= {run.name for run in planned.piles[change.base].runs}
-    return Experiment(
-        "budget",
-        "What a threshold is worth",
-        planned,
-        results,
-        limit_s=study.time_limit_s,
-        failing=failing,
-        source=study.source,
-    )
+        return Results(tables, _sections(self.changes, moved, shared, runs))
 
 
 def measure(listed: Sequence[Change], runs: Runs) -> pd.DataFrame:

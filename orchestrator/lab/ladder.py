@@ -130,8 +130,8 @@ METHODS = {"quick": "#009e73", "static": "#d55e00", "DEM": "#0072b2"}
 FRONT: Look = {"color": "0.25", "lw": 0.9, "zorder": 1.5}
 
 
-def experiment(study: Study, out: Path) -> Experiment:
-    """Make the experiment on what each rung costs and how far it is off.
+class Ladder(Experiment):
+    """What each rung costs and how far it is off.
 
     Parameters
     ----------
@@ -139,39 +139,31 @@ def experiment(study: Study, out: Path) -> Experiment:
         The study with the piles.
     out
         The directory.
-
-    Returns
-    -------
-    Experiment
-        The experiment.
     """
-    limits.check_study(study)
-    pairs = decisions(study)
-    planned = plan.of(pairs, cases=out.absolute() / "cases")
 
-    def results(runs: Runs) -> Results:
-        measured = points(pairs, runs)
+    name = "ladder"
+    title = "Speed against accuracy"
+
+    def __init__(self, study: Study, out: Path) -> None:
+        limits.check_study(study)
+        self.pairs = decisions(study)
+        super().__init__(plan.of(self.pairs, cases=out.absolute() / "cases"), study)
+
+    def results(self, runs: Runs) -> Results | None:
+        """Compare the pairs of rungs whose runs are done."""
+        measured = points(self.pairs, runs)
         if measured.empty:
-            return {}, ()
+            return None
         compared = errors(measured)
         if compared.empty:
-            return {}, ()
+            return None
         means = join_points(compared)
         rows = compared.merge(means[["packing", *PAIR, "pareto"]], how="left")
         rows = rows.fillna({"pareto": False})
         known = known_errors(measured)
-        done = [pair for key, pair in pairs.items() if runs.are_done(key)]
+        done = [pair for key, pair in self.pairs.items() if runs.are_done(key)]
         tables = {"points": rows, "errors": known, "domain": measured_domain(done)}
-        return tables, _sections(means, known)
-
-    return Experiment(
-        name="ladder",
-        title="Speed against accuracy",
-        planned=planned,
-        results=results,
-        limit_s=study.time_limit_s,
-        source=study.source,
-    )
+        return Results(tables, _sections(means, known))
 
 
 def decisions(study: Study) -> dict[str, Decision]:

@@ -186,41 +186,34 @@ def _scenes(
     return tuple(written(scene) for scene in scenes)
 
 
-def experiment(out: Path, folder: Path = FOLDER) -> Experiment:
-    """Find where each method fails.
+class Stability(Experiment):
+    """Where each method fails.
 
     Parameters
     ----------
-    out
-        Directory of the runs.
     folder
         Directory of the maps, by default those of the package.
-
-    Returns
-    -------
-    Experiment
-        The experiment.
     """
-    maps = [read_map(path) for path in sorted(folder.glob("*.toml"))]
-    asked = {}
-    for each in maps:
-        for place in each.places:
-            for scene in (*place.scenes, *place.references):
-                asked[scene.id] = as_written(scene)
 
-    def results(runs: Runs) -> Results:
-        judged = [judge_map(each, runs) for each in maps]
+    name = "stability"
+    title = TITLE
+    verdicts = NOTICED
+    failing = ()
+
+    def __init__(self, folder: Path = FOLDER) -> None:
+        self.maps = [read_map(path) for path in sorted(folder.glob("*.toml"))]
+        asked = {}
+        for each in self.maps:
+            for place in each.places:
+                for scene in (*place.scenes, *place.references):
+                    asked[scene.id] = as_written(scene)
+        super().__init__(plan.of(asked))
+
+    def results(self, runs: Runs) -> Results:
+        """Judge every place of every map."""
+        judged = [judge_map(each, runs) for each in self.maps]
         table = pd.concat(judged, ignore_index=True)
-        return {"maps": table}, _sections(maps, table)
-
-    return Experiment(
-        "stability",
-        TITLE,
-        plan.of(asked),
-        results,
-        verdicts=NOTICED,
-        failing=(),
-    )
+        return Results({"maps": table}, _sections(self.maps, table))
 
 
 def _sections(maps: Sequence[StabilityMap], table: pd.DataFrame) -> list[Section]:

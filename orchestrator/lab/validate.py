@@ -412,8 +412,8 @@ def scores(rows: pd.DataFrame) -> pd.DataFrame:
     ).reset_index()
 
 
-def experiment(study: Study, out: Path) -> Experiment:
-    """Answer what was measured, on the strips, the hill and the hump of a study.
+class Validation(Experiment):
+    """What was measured, answered on the strips, the hill and the hump of a study.
 
     Parameters
     ----------
@@ -422,47 +422,43 @@ def experiment(study: Study, out: Path) -> Experiment:
     out
         Directory of its runs.
 
-    Returns
-    -------
-    Experiment
-        The experiment.
-
     Raises
     ------
     InputError
         If the study lacks strips, a hill of RUSHIL or a profile.
     """
-    strips = [scene for scene in study.scenes if scene.is_poured]
-    hills = [scene for scene in study.scenes if _is_hill(scene)]
-    humps = [scene for scene in study.scenes if getattr(scene.bed, "profile", None)]
-    if not strips or len(hills) != 1 or len(humps) != 1:
-        what = "it needs poured strips, one hill of RUSHIL and one profile, the hump"
-        raise InputError(what, study.name, "start from the preset validate")
-    asked = {scene.id: as_written(scene) for scene in study.scenes}
-    planned = plan.of(asked, cases=out.absolute() / "cases")
 
-    def results(runs: Runs) -> Results:
-        if not runs.are_done(*asked):
-            return {}, ()
-        (hill,) = hills
-        (hump,) = humps
+    name = "validate"
+    title = TITLE
+
+    def __init__(self, study: Study, out: Path) -> None:
+        self.strips = [scene for scene in study.scenes if scene.is_poured]
+        hills = [scene for scene in study.scenes if _is_hill(scene)]
+        humps = [scene for scene in study.scenes if getattr(scene.bed, "profile", None)]
+        if not self.strips or len(hills) != 1 or len(humps) != 1:
+            what = (
+                "it needs poured strips, one hill of RUSHIL and one profile, the hump"
+            )
+            raise InputError(what, study.name, "start from the preset validate")
+        (self.hill,) = hills
+        (self.hump,) = humps
+        asked = {scene.id: as_written(scene) for scene in study.scenes}
+        super().__init__(plan.of(asked, cases=out.absolute() / "cases"), study)
+
+    def results(self, runs: Runs) -> Results | None:
+        """Compare every model with every measurement, once all runs are done."""
+        piles = self.planned.piles
+        if not runs.are_done(*piles):
+            return None
         lengths = {
-            **_reversed_flow("hill", hill, runs),
-            **_reversed_flow("hump", hump, runs),
+            **_reversed_flow("hill", self.hill, runs),
+            **_reversed_flow("hump", self.hump, runs),
         }
-        over = over_hump(planned.piles[hump.id].stress(runs.cases))
-        rows = compare_models(Strips(strips, runs.cases), over, lengths)
+        over = over_hump(piles[self.hump.id].stress(runs.cases))
+        rows = compare_models(Strips(self.strips, runs.cases), over, lengths)
         scored = scores(rows)
-        return {"measured": rows, "scores": scored}, _sections(rows, scored)
-
-    return Experiment(
-        "validate",
-        TITLE,
-        planned,
-        results,
-        limit_s=study.time_limit_s,
-        source=study.source,
-    )
+        tables = {"measured": rows, "scores": scored}
+        return Results(tables, _sections(rows, scored))
 
 
 def _is_hill(scene: Scene) -> bool:

@@ -18,10 +18,10 @@ def _run(options: Namespace) -> int:
     code = guests.taken_over(study, options)
     if code is not None:
         return code
-    from orchestrator.stockpile import erosion
+    from orchestrator.stockpile.erosion import Erosion
 
     out = options.out or Path("results") / options.command
-    return erosion.experiment(study, out).command(options, out)
+    return Erosion(study).command(options, out)
 
 
 OFFER = guests.Offer(

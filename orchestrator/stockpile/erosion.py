@@ -346,20 +346,13 @@ def _base(x: Sequence[float], z: Sequence[float], height: float) -> float:
     return float(np.ptp(above)) if len(above) else 0.0
 
 
-def experiment(study: Study, out: Path) -> Experiment:
-    """Make the experiment on the erosion potential of the piles of a study.
+class Erosion(Experiment):
+    """The erosion potential of the piles of a study.
 
     Parameters
     ----------
     study
         The study.
-    out
-        The directory, which the experiment does not depend on.
-
-    Returns
-    -------
-    Experiment
-        The experiment.
 
     Raises
     ------
@@ -368,33 +361,35 @@ def experiment(study: Study, out: Path) -> Experiment:
         AP-42, if the study has no pile or one in a liquid, or if the flow over one
         cannot be solved.
     """
-    winds = study.erosion.fastest_mile
-    where = study.file or study.name
-    least, source = given_threshold(study.erosion.threshold, where)
-    asked = piles(study)
-    check_winds((scene.fluid for scene in asked), where)
-    flows = {scene: of_scene(scene) for scene in asked}
-    for scene in flows:
-        limits.check(scene, where, grains=False)
 
-    def results(runs: Runs) -> Results:
+    name = "erosion"
+    shares_cases = True
+
+    def __init__(self, study: Study) -> None:
+        self.title = study.title
+        self.winds = study.erosion.fastest_mile
+        where = study.file or study.name
+        self.least, self.threshold_from = given_threshold(
+            study.erosion.threshold, where
+        )
+        asked = piles(study)
+        check_winds((scene.fluid for scene in asked), where)
+        self.flows = {scene: of_scene(scene) for scene in asked}
+        for scene in self.flows:
+            limits.check(scene, where, grains=False)
+        runs = (run for flow in self.flows.values() for run in flow.cases)
+        super().__init__(plan.of_cases(runs), study)
+
+    def results(self, runs: Runs) -> Results | None:
+        """List the losses of the piles whose flows are done."""
         done = []
-        for scene, flow in flows.items():
+        for scene, flow in self.flows.items():
             if all(run.name in runs.done for run in flow.cases):
                 done.append(scene)
         if not done:
-            return {}, ()
-        return _results(grouped(done, least, runs.cases), winds, source)
-
-    return Experiment(
-        name="erosion",
-        title=study.title,
-        planned=plan.of_cases(run for flow in flows.values() for run in flow.cases),
-        results=results,
-        limit_s=study.time_limit_s,
-        source=study.source,
-        shares_cases=True,
-    )
+            return None
+        found = grouped(done, self.least, runs.cases)
+        return _results(found, self.winds, self.threshold_from)
 
 
 def given_threshold(asked: str | float | None, where: str) -> tuple[float | None, str]:
@@ -478,7 +473,7 @@ def _results(
         Section("Parts", [parts, limits, Table.of(table)]),
         Section("The tables of AP-42", [sources, *map(Table.of, (AREAS, MATERIALS))]),
     ]
-    return {"erosion": table}, sections
+    return Results({"erosion": table}, sections)
 
 
 def erosion_rows(found: Sequence[Stockpile], winds: ArrayLike) -> pd.DataFrame:

@@ -1,7 +1,6 @@
 """Beds in three dimensions: heights, mesh, flow, stress and thresholds."""
 
 from argparse import Namespace
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,16 +9,10 @@ from orchestrator.guests import Offer
 from orchestrator.study.hints import HINTS
 
 if TYPE_CHECKING:
-    from orchestrator.experiment import Experiment
     from orchestrator.study.study import Kind, Study
 
 TRUTH = ("ridge", "turn", "interval", "piles", "askervein")
 """Comparisons of flows over beds in three dimensions."""
-COMMANDS = {
-    "study": "orchestrator.surface.pipeline",
-    "erosion": "orchestrator.surface.erosion",
-}
-"""Commands on beds in three dimensions, and the modules of their experiments."""
 
 
 def take_over(study: "Study[Any]", options: Namespace) -> int | None:
@@ -50,11 +43,15 @@ def take_over(study: "Study[Any]", options: Namespace) -> int | None:
         if getattr(options, name, None) is not None:
             what = "a bed in three dimensions has none"
             raise InputError(what, f"--{name}", "leave it out")
-    module = import_module(COMMANDS[options.command])
-    name = study.name if options.command == "study" else options.command
-    out = options.out or Path("results") / name
-    experiment: Experiment = module.experiment(study)
-    return experiment.command(options, out)
+    if options.command == "erosion":
+        from orchestrator.surface.erosion import HeapErosion
+
+        out = options.out or Path("results") / options.command
+        return HeapErosion(study).command(options, out)
+    from orchestrator.surface.pipeline import SurfaceMotion
+
+    out = options.out or Path("results") / study.name
+    return SurfaceMotion(study).command(options, out)
 
 
 def _hint(table: str, name: str) -> tuple[str, str] | None:

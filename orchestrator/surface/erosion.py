@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.digits import number
-from orchestrator.experiment import Experiment, Results, page_texts
+from orchestrator.experiment import Results, page_texts
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.report.card import Card, Number, Worth
 from orchestrator.report.page import IN_SENTENCES, Limits, Paragraphs, Section, Table
@@ -18,7 +18,7 @@ from orchestrator.surface import cards, onset
 from orchestrator.surface.answer import HEAP, RATIO, Answer, Direction
 from orchestrator.surface.heights import Heap
 from orchestrator.surface.mesh import wind_axes
-from orchestrator.surface.pipeline import experiment_on
+from orchestrator.surface.pipeline import OverSurfaces
 from orchestrator.surface.study import SurfaceStudy
 
 ROW = 1.5
@@ -226,18 +226,13 @@ def _surface_of(
     return erosion.PileSurface(name, listed, over_wind, threshold, listed[is_middle])
 
 
-def experiment(study: SurfaceStudy) -> Experiment:
-    """Make the experiment on the erosion potential of heaps in three dimensions.
+class HeapErosion(OverSurfaces):
+    """The erosion potential of heaps in three dimensions.
 
     Parameters
     ----------
     study
         The study.
-
-    Returns
-    -------
-    Experiment
-        Its runs, and what is made of them.
 
     Raises
     ------
@@ -245,14 +240,18 @@ def experiment(study: SurfaceStudy) -> Experiment:
         If the threshold is no number that a wind can reach, nor a material of AP-42, if
         the rose blows from where no flow is, or if the fluid is a liquid.
     """
-    erosion.check_winds((scene.fluid for scene in study.scenes), study.file)
-    least, source = erosion.given_threshold(study.erosion.threshold, study.file)
 
-    def results(answers: Sequence[Answer]) -> Results:
-        found = [Heaps.of(each, study.erosion.fastest_mile) for each in answers]
-        return {"erosion": rows(found)}, sections(found, source)
+    name = "erosion"
 
-    return experiment_on(study, "erosion", least, results)
+    def __init__(self, study: SurfaceStudy) -> None:
+        erosion.check_winds((scene.fluid for scene in study.scenes), study.file)
+        self.winds = study.erosion.fastest_mile
+        super().__init__(study)
+
+    def results_of(self, found: Sequence[Answer]) -> Results:
+        """List the losses of the heaps of each surface."""
+        heaps = [Heaps.of(each, self.winds) for each in found]
+        return Results({"erosion": rows(heaps)}, sections(heaps, self.threshold_from))
 
 
 def rows(found: Sequence[Heaps]) -> pd.DataFrame:

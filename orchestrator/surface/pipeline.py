@@ -4,7 +4,8 @@ OpenFOAM gives the stress on a bed in three dimensions for each direction of the
 the closed form the threshold of a grain on each of its faces.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from abc import abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -58,18 +59,13 @@ MOST_SHARE = 0.95
 """Share of the surface up to which it is drawn against the wind."""
 
 
-def experiment(study: SurfaceStudy) -> Experiment:
-    """Make the experiment of a study on surfaces.
+class OverSurfaces(Experiment):
+    """An experiment on the flows over the surfaces of a study.
 
     Parameters
     ----------
     study
         The study.
-
-    Returns
-    -------
-    Experiment
-        Its runs, and what is made of them.
 
     Raises
     ------
@@ -77,75 +73,55 @@ def experiment(study: SurfaceStudy) -> Experiment:
         If the threshold is no number or material, or the rose blows from where no flow
         is.
     """
-    threshold, source = given_threshold(study.erosion.threshold, study.file)
 
-    def results(found: Sequence[Answer]) -> Results:
-        return tables(found), sections(found, source)
+    shares_cases = True
 
-    return experiment_on(study, "surface", threshold, results, files)
+    def __init__(self, study: SurfaceStudy) -> None:
+        self.title = study.title
+        asked = study.erosion.threshold
+        self.threshold, self.threshold_from = given_threshold(asked, study.file)
+        self.flows = {scene: flow_of(scene) for scene in study.scenes}
+        self.members = alike(study.scenes)
+        self.roses = roses_of(study, self.members)
+        super().__init__(plan.of_cases(self.flows.values()), study)
 
-
-def experiment_on(
-    study: SurfaceStudy,
-    name: str,
-    threshold: float | None,
-    results: Callable[[Sequence[Answer]], Results],
-    files: Callable[[Sequence[Answer]], Mapping[str, bytes]] = lambda found: {},
-) -> Experiment:
-    """Make an experiment on the flows of a study.
-
-    Parameters
-    ----------
-    study
-        The study.
-    name
-        The name of the experiment.
-    threshold
-        Friction velocity of every face, m/s; None: the closed form.
-    results
-        Gives the tables and the page of the surfaces of which a flow is done; there is
-        at least one.
-    files
-        Gives the files beside the page; by default none.
-
-    Returns
-    -------
-    Experiment
-        Its runs, and what is made of them.
-
-    Raises
-    ------
-    InputError
-        If the rose blows from where no flow is.
-    """
-    flows = {scene: flow_of(scene) for scene in study.scenes}
-    members = alike(study.scenes)
-    roses = roses_of(study, members)
-
-    def answers(runs: Runs) -> list[Answer]:
+    def results(self, runs: Runs) -> Results | None:
+        """Answer the surfaces of which a flow is done."""
         found = []
-        for bare, scenes in members.items():
-            done = [scene for scene in scenes if flows[scene].name in runs.done]
+        for bare, scenes in self.members.items():
+            done = [scene for scene in scenes if self.flows[scene].name in runs.done]
             if not done:
                 continue
-            rose = roses.get(bare) if len(done) == len(scenes) else None
-            found.append(_answer(done, flows, threshold, runs.cases, rose))
-        return found
+            rose = self.roses.get(bare) if len(done) == len(scenes) else None
+            found.append(_answer(done, self.flows, self.threshold, runs.cases, rose))
+        return self.results_of(found) if found else None
 
-    def made(runs: Runs) -> Results:
-        found = answers(runs)
-        return results(found) if found else ({}, ())
+    @abstractmethod
+    def results_of(self, found: Sequence[Answer]) -> Results:
+        """Make tables and page of some surfaces.
 
-    return Experiment(
-        name,
-        study.title,
-        plan.of_cases(flows.values()),
-        made,
-        study.time_limit_s,
-        source=study.source,
-        files=lambda runs: files(answers(runs)),
-        shares_cases=True,
-    )
+        Parameters
+        ----------
+        found
+            The answers; at least one.
+
+        Returns
+        -------
+        Results
+            Tables, page and files.
+        """
+
+
+class SurfaceMotion(OverSurfaces):
+    """From which wind on each part of some surfaces moves."""
+
+    name = "surface"
+
+    def results_of(self, found: Sequence[Answer]) -> Results:
+        """List directions, shares and faces, and draw the maps."""
+        return Results(
+            tables(found), sections(found, self.threshold_from), files(found)
+        )
 
 
 def flow_of(scene: SurfaceScene) -> SurfaceFlowCase:

@@ -463,50 +463,41 @@ PARTS = {
 """The comparisons by their names."""
 
 
-def experiment(names: Sequence[str]) -> Experiment:
-    """Make the experiment that compares flows over surfaces.
+class Truth(Experiment):
+    """Flows over surfaces beside measurements.
 
     Parameters
     ----------
     names
         The comparisons, of `PARTS`.
-
-    Returns
-    -------
-    Experiment
-        Its runs, and their table.
     """
-    runs: dict[str, list[Case]] = {}
-    for name in names:
-        runs[name] = [*PARTS[name].flows().values()]
-    ridges = {one.name for one in runs.get("ridge", ())}
 
-    def results(found: Runs) -> Results:
+    name = "surfaces"
+    title = "Flows over surfaces beside measurements"
+    limit_s = LIMIT_S
+    # the velocity across a ridge is nothing but round-off, whose residual need not fall
+    verdicts = (Stalled.__name__,)
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self.runs = {name: [*PARTS[name].flows().values()] for name in names}
+        super().__init__(plan.of_cases(chain(*self.runs.values())))
+        ridges = {one.name for one in self.runs.get("ridge", ())}
+        self.failing = self.planned.cases.keys() - ridges
+
+    def results(self, runs: Runs) -> Results | None:
+        """Make the table of the comparisons whose runs have ended."""
         listed: list[Row] = []
-        for name in names:
+        for name, asked in self.runs.items():
             ended = [
-                one.name in found.done or (found.cases / one.name / BED_FLOW).is_file()
-                for one in runs[name]
+                one.name in runs.done or (runs.cases / one.name / BED_FLOW).is_file()
+                for one in asked
             ]
             if all(ended):
-                listed += PARTS[name].rows(found.cases)
+                listed += PARTS[name].rows(runs.cases)
         if not listed:
-            return {}, ()
+            return None
         table = pd.DataFrame(listed)
-        return {"surfaces": table}, [section(table)]
-
-    planned = plan.of_cases(chain(*runs.values()))
-    return Experiment(
-        "surfaces",
-        "Flows over surfaces beside measurements",
-        planned,
-        results,
-        LIMIT_S,
-        # the velocity across a ridge is nothing but round-off, whose residual need not
-        # fall
-        verdicts=(Stalled.__name__,),
-        failing=planned.cases.keys() - ridges,
-    )
+        return Results({"surfaces": table}, [section(table)])
 
 
 def section(table: pd.DataFrame) -> Section:

@@ -117,7 +117,7 @@ def test_the_share_of_a_choice_is_the_range_of_its_alternatives() -> None:
 @pytest.mark.long
 def test_every_choice_has_its_share_on_a_poured_pile(tmp_path: Path) -> None:
     asked = study.parse(SMALL, name="small", where="small")
-    experiment = budget.experiment(asked, tmp_path / "out")
+    experiment = budget.Budget(asked, tmp_path / "out")
     assert not experiment.run(tmp_path / "out", workers=2).failures
     shared = pd.read_csv(tmp_path / "out" / "tables" / "shares.csv")
     names = {one.name for one in CHOICES} - {"entrainment angle"}
@@ -137,4 +137,4 @@ def test_every_choice_has_its_share_on_a_poured_pile(tmp_path: Path) -> None:
 def test_a_study_without_piles_is_refused(tmp_path: Path) -> None:
     asked = study.parse("grain = { diameter = 1e-3 }", name="one", where="one")
     with pytest.raises(InputError, match="there is no pile"):
-        budget.experiment(asked, tmp_path / "out")
+        budget.Budget(asked, tmp_path / "out")

@@ -46,7 +46,7 @@ def test_verdicts_are_those_of_real_runs(
 ) -> None:
     (tmp_path / "small.toml").write_text(SMALL)
     out = tmp_path / "out"
-    stability.experiment(out, tmp_path).run(out, workers=2)
+    stability.Stability(tmp_path).run(out, workers=2)
     said = capsys.readouterr().err
     (line,) = (line for line in said.splitlines() if "is an answer here" in line)
     assert line.startswith("1 case failed, which is an answer here; ")

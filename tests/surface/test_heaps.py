@@ -88,7 +88,9 @@ def answered(
         stress = SurfaceStress.of_faces(flow.mesh, tau, flow.axes, centre)
         stress.to_csv(directory / WALL_STRESS)
     names = {name: {"id": name} for name in experiment.planned.cases}
-    return experiment.results(Runs(experiment.planned, folder, names))
+    results = experiment.results(Runs(experiment.planned, folder, names))
+    assert results is not None
+    return results
 
 
 def lateral(cones: Sequence[tuple[float, float, float]]) -> float:
@@ -102,7 +104,7 @@ def lateral(cones: Sequence[tuple[float, float, float]]) -> float:
 @pytest.mark.parametrize("fall", [0.0, 0.015, 0.05])
 def test_areas_and_shares_are_of_the_heaps_alone(tmp_path: Path, fall: float) -> None:
     study = study_of(tmp_path, fall=fall)
-    made, _ = answered(study, pipeline.experiment(study), tmp_path / "cases")
+    made = answered(study, pipeline.SurfaceMotion(study), tmp_path / "cases").tables
     faces = made["faces-1-270"]
     on_heaps = faces[faces["heap"] > 0]
     # a face counts whose middle is on a heap: of the 200 at the edge half do. The lowest
@@ -122,7 +124,9 @@ def test_areas_and_shares_are_of_the_heaps_alone(tmp_path: Path, fall: float) ->
 
 def test_grains_feel_the_fall_that_the_flow_does_not(tmp_path: Path) -> None:
     level, falls = (
-        answered(study, pipeline.experiment(study), tmp_path / f"{fall}" / "cases")[0]
+        answered(
+            study, pipeline.SurfaceMotion(study), tmp_path / f"{fall}" / "cases"
+        ).tables
         for fall in (0.0, 0.05)
         for study in [study_of(tmp_path / f"{fall}", fall=fall)]
     )
@@ -151,8 +155,9 @@ def test_directions_that_the_interval_does_not_tell_apart_are_a_tie(
     study = study_of(tmp_path, directions=[0.0, 90.0, 180.0])
     # stresses 3 % and 30 % below those of the worst direction
     strengths = {0.0: 0.97, 90.0: 1.0, 180.0: 0.7}
-    experiment = pipeline.experiment(study)
-    _, sections = answered(study, experiment, tmp_path / "cases", strengths.__getitem__)
+    experiment = pipeline.SurfaceMotion(study)
+    strength = strengths.__getitem__
+    sections = answered(study, experiment, tmp_path / "cases", strength).page
     card = only(sections[0], Card)
     assert "2 heaps of " in card.scene
     first = card.numbers[0]
@@ -178,8 +183,9 @@ def test_a_tie_of_all_directions_has_no_worst() -> None:
 
 def test_the_page_has_places_to_a_part_of_a_cell(tmp_path: Path) -> None:
     study = study_of(tmp_path, directions=[0.0, 90.0])
-    experiment = pipeline.experiment(study)
-    made, sections = answered(study, experiment, tmp_path / "cases")
+    experiment = pipeline.SurfaceMotion(study)
+    results = answered(study, experiment, tmp_path / "cases")
+    made, sections = results.tables, results.page
     shown = only(sections[0], Table).frame
     for place, exact in zip(
         shown["first at x, m"], made["directions"]["x_m"], strict=True
@@ -201,8 +207,9 @@ def eroded(
 ) -> tuple[pd.DataFrame, Card, str]:
     """The table, the card and the sentences of the erosion of cones."""
     study = study_of(folder, cones, directions=directions, more=COAL + more)
-    experiment = erosion.experiment(study)
-    made, sections = answered(study, experiment, folder / "cases", strength)
+    experiment = erosion.HeapErosion(study)
+    results = answered(study, experiment, folder / "cases", strength)
+    made, sections = results.tables, results.page
     card = only(sections[0], Card)
     return made["erosion"], card, only(sections[0], Paragraphs).text
 
@@ -237,8 +244,9 @@ def test_a_low_heap_alone_is_flat_ground_to_ap42(tmp_path: Path) -> None:
     heights = np.maximum(np.maximum(high, low), 0.0)
     (tmp_path / "heaps.tif").write_bytes(geotiff(EAST + x, NORTH + y, heights, ""))
     study = guests.load(tmp_path / "heaps.toml", None)
-    experiment = erosion.experiment(study)
-    made, sections = answered(study, experiment, tmp_path / "cases")
+    experiment = erosion.HeapErosion(study)
+    results = answered(study, experiment, tmp_path / "cases")
+    made, sections = results.tables, results.page
     told = only(sections[0], Paragraphs).text.split("\n\n")
     assert "flat ground" not in told[0]
     assert "by AP-42, to which it is flat ground, " in told[1]
@@ -326,4 +334,4 @@ def test_a_current_takes_no_dust(tmp_path: Path) -> None:
     path.write_text(path.read_text().replace('"air"', '"water"'))
     study = guests.load(path, None)
     with pytest.raises(InputError, match=r"fluid.density: a fluid of .* is no wind"):
-        erosion.experiment(study)
+        erosion.HeapErosion(study)

@@ -10,7 +10,7 @@ from orchestrator.surface.mesh import STANDARD
 def test_the_command_has_each_comparison() -> None:
     assert tuple(truth.PARTS) == TRUTH
     assert set(truth.stored()["part"]) == set(TRUTH)
-    planned = truth.experiment(("ridge", "interval")).planned.cases
+    planned = truth.Truth(("ridge", "interval")).planned.cases
     # the section that the ridge is compared with runs first
     assert next(iter(planned)).startswith("flow-")
     assert sum(case.ranks for case in truth.interval_flows().values()) == 7
