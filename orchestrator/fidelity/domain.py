@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import pandas as pd
 
@@ -41,7 +42,6 @@ NONE, GIVEN = "none", "given"
 """Words of a field without a value, and of one whose value is a table or a file."""
 Value = float | str
 Read = Callable[[Scene], Iterable[Value]]
-Measured = Mapping[tuple[str, str, str], pd.DataFrame]
 SOLVED = (
     "method.flow.speed",
     "method.flow.viscosity",
@@ -337,15 +337,38 @@ def _rows(quantity: str, values: Iterable[Value]) -> Iterator[dict[str, Value]]:
         yield {"word": word}
 
 
+class Span(NamedTuple):
+    """The values of a quantity that were measured.
+
+    Attributes
+    ----------
+    numbers
+        The least and the most of its numbers, if it has any; the most is infinite for
+        one of `OPEN_ABOVE`.
+    words
+        Its words.
+    """
+
+    numbers: tuple[float, float] | None
+    words: tuple[str, ...]
+
+
 @cache
-def _measured() -> Measured:
-    """The rows of the file, by part, class and quantity."""
+def _measured() -> Mapping[tuple[str, str, str], Span]:
+    """What the file says, by part, class and quantity."""
     table = pd.read_csv(FILE, keep_default_na=False, na_values=[""])
-    keys = ["part", "scene_class", "quantity"]
-    return {
-        (str(part), str(name), str(quantity)): rows
-        for (part, name, quantity), rows in table.groupby(keys)
-    }
+    found = {}
+    for keys, rows in table.groupby(["part", "scene_class", "quantity"]):
+        part, name, quantity = map(str, keys)
+        ends = None
+        numbers = rows.dropna(subset=["least"])
+        if not numbers.empty:
+            ends = (float(numbers["least"].iloc[0]), float(numbers["most"].iloc[0]))
+            if math.isnan(ends[1]):
+                ends = (ends[0], math.inf)
+        words = tuple(map(str, rows["word"].dropna()))
+        found[part, name, quantity] = Span(ends, words)
+    return found
 
 
 @cache  # a study asks it of each fidelity
@@ -372,13 +395,13 @@ def outside(part: str, scene: Scene) -> str:
     for quantity in QUANTITIES:
         if not quantity.is_of(part):
             continue
-        rows = measured.get((part, name, quantity.name))
+        span = measured.get((part, name, quantity.name))
         values = [*quantity.read(scene)]
-        beyond = [value for value in values if not _is_within(value, rows)]
+        beyond = [value for value in values if not _is_within(value, span)]
         if quantity.name == FRACTIONS and len(beyond) < len(values):
             continue
         if beyond:
-            return _in_words(quantity.name, rows)
+            return _in_words(quantity.name, span)
     return ""
 
 
@@ -461,32 +484,27 @@ def _unmeasured_solve(scene: Scene) -> str:
     return f"method.flow.roughness = {roughness:.3g} m"
 
 
-def _is_within(value: Value, rows: pd.DataFrame | None) -> bool:
+def _is_within(value: Value, span: Span | None) -> bool:
     """Whether a value is one of those measured, or between them."""
-    if rows is None:
+    if span is None:
         return False
     if isinstance(value, str):
-        return bool((rows["word"] == value).any())
-    numbers = rows.dropna(subset=["least"])
-    if numbers.empty:
+        return value in span.words
+    if span.numbers is None:
         return False
-    (row,) = numbers.to_dict("records")
+    least, most = span.numbers
     margin = NEAR * abs(value)
-    is_below = value < row["least"] - margin
-    return not (is_below or value > row["most"] + margin)
+    return least - margin <= value <= most + margin
 
 
-def _in_words(name: str, rows: pd.DataFrame | None) -> str:
+def _in_words(name: str, span: Span | None) -> str:
     """A quantity with what was measured of it."""
-    if rows is None:
+    if span is None or (span.numbers is None and span.words == (NONE,)):
         return name
-    words = [str(word) for word in rows["word"].dropna()]
-    numbers = rows.dropna(subset=["least"])
-    if words == [NONE] and numbers.empty:
-        return name
-    for row in numbers.to_dict("records"):
-        least, most = row["least"], row["most"]
-        if math.isnan(most):
+    words = [*span.words]
+    if span.numbers:
+        least, most = span.numbers
+        if math.isinf(most):
             return f"{name} below {least:.3g}"
         if most - least > NEAR * abs(most):
             return f"{name} outside {least:.3g} … {most:.3g}"
