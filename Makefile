@@ -37,6 +37,7 @@ calibration: setup  ## measure known errors, maps and intervals anew, for the pa
 	$(PYTHON) tools/tested.py results/validate/tables/measured.csv > tested.csv
 	mv tested.csv orchestrator/physics/tested_strips.csv
 	$(PYTHON) tools/errors.py
+	$(PYTHON) tools/maps.py
 	$(PYTHON) tools/budget.py results/budget/tables/shares.csv
 	cp results/stability/figures/maps.png docs/stability.png
 

@@ -82,10 +82,25 @@ def test_tables_of_pages_are_those_of_their_measurements() -> None:
     for name, page, function in (
         ("errors", "ladder", "tables"),
         ("budget", "budget", "table"),
+        ("maps", "stability", "table"),
     ):
         tool = runpy.run_path(str(ROOT / "tools" / f"{name}.py"))
         text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
         assert tool["BEGIN"] + tool[function]() + tool["END"] in text
+
+
+def test_the_page_of_maps_counts_the_stored_verdicts() -> None:
+    text = (ROOT / "docs" / "stability.md").read_text(encoding="utf-8")
+    stored = pd.read_csv(ROOT / "orchestrator/fidelity/calibration/maps.csv")
+    head, _ = text.split("## What a study says")
+    rows = re.findall(r"(?m)^\| [^|]+ \| (\d+) \| (\d+) \| (\d+) \| ", head)
+    good, wrong, noticed = np.array(rows, int).sum(axis=0)
+    is_good = stored["verdict"] == "good"
+    assert good == is_good.sum()
+    assert noticed == stored["caught"].sum()
+    assert wrong == (~is_good & ~stored["caught"]).sum()
+    assert f"{stored['map'].nunique()} maps" in text.replace("seventeen", "17")
+    assert f"with {len(stored)} cells in all" in text
 
 
 def test_the_page_of_columns_has_every_column_of_every_table(results: Results) -> None:

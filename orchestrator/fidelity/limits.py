@@ -22,9 +22,9 @@ from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.study import units
 from orchestrator.study.declare import UnfitError
-from orchestrator.study.method import HELD_FROM
+from orchestrator.study.method import HELD_FROM, GrainMethod
 from orchestrator.study.parts import PileBed
-from orchestrator.study.scene import Scene
+from orchestrator.study.scene import Scene, default_first_cell_height
 from orchestrator.study.study import Study
 
 MOST_GRAINS = 1e5  # largest length of a bed with grains, diameters
@@ -40,9 +40,25 @@ LEAST_DAMPING = 0.03
 STIFFEST = 1e6
 """K d/W to which thresholds are known to be good: at 1e8 they are 6 to 11 % high."""
 COARSE_STEP = 0.05
-CLOSE_PACKED_DEG = (
-    59.0  # entrainment angle from which the grains of a row hold each other
-)
+CLOSE_PACKED_DEG = 60.0
+"""Entrainment angle from which the grains of a row hold each other: at 59.9 degrees a
+mobile row wedges the one below it apart, and thresholds are 68 % too low."""
+LONGEST_AVERAGED = 0.1
+"""Length over which a stress may be averaged, h: over 0.2 h the first grains of a crest
+leave 5 % late, over 0.4 h 13 %."""
+COARSEST = 20
+"""Cells along a face below which thresholds at 15 degrees were 5 % too high."""
+OTHER_CELL = 2.0
+"""Factor between a first cell and its default with which thresholds were found to move
+by up to 7 %, by 15 % at 8 times the default."""
+OTHER_TURBULENCE = {
+    "realizableKE": "up to 8 % lower",
+    "kOmegaSST": "5 to 8 % higher",
+}
+"""Turbulence models with thresholds that differ from those by k-epsilon, and how."""
+RAMP = 0.004
+"""Fastest rise of u* per sqrt(d/g') at which a single grain on a ramp leaves within 5 %
+of its threshold; at 0.01 it leaves 8 % late."""
 TINY = 1e-9
 """Part of the length of a bed by which a place beyond its end is at its end."""
 ANGLES = "min(friction angle, 90 deg - entrainment angle)"
@@ -226,6 +242,19 @@ def _pile(scene: Scene, bed: PileBed) -> Iterator[Limit]:
         what = f"a pile of {angle:g} deg: a mobile row is wedged apart by the row on it"
         remedy = "60 deg; single grains may have less"
         yield Limit("entrainment-layers", "bed.entrainment_angle_deg", what, remedy)
+    averaged = scene.forces.averaging_length
+    if averaged > LONGEST_AVERAGED:
+        what = f"a stress averaged over {averaged:g} h hides that of the crest"
+        what += ": thresholds of the first grains may be 5 to 13 % too high"
+        remedy = f"{LONGEST_AVERAGED:g} or less"
+        yield Limit("average", "forces.averaging_length", what, remedy, refused=False)
+    flow = scene.method.flow
+    if flow.facts.is_solved and flow.turbulence_model in OTHER_TURBULENCE:
+        what = f"with {flow.turbulence_model} thresholds were"
+        what += f" {OTHER_TURBULENCE[flow.turbulence_model]} than with kEpsilon"
+        remedy = "kEpsilon, unless its effect is what you want"
+        field = "method.flow.turbulence_model"
+        yield Limit("turbulence", field, what, remedy, refused=False)
     loaded = scene.forces.loaded_grains
     if loaded != "exposed":
         what = f"{loaded}: a grain without its force blocks those behind it"
@@ -325,6 +354,25 @@ def _solve(scene: Scene, bed: PileBed) -> Iterator[Limit]:
         remedy = "take the field of a lower viscosity or a higher speed: "
         remedy += "u*/U_e is the same"
         yield Limit("similarity", "method.flow.viscosity", what, remedy)
+    yield from _mesh(scene, bed)
+
+
+def _mesh(scene: Scene, bed: PileBed) -> Iterator[Limit]:
+    """Limits of the mesh of a solved flow, and of its scheme."""
+    default = default_first_cell_height(bed.relief, scene.solve_roughness)
+    cell = scene.method.flow.first_cell_height or default
+    if not 1 / OTHER_CELL < cell / default < OTHER_CELL:
+        what = f"the first cell is a part of the model: with {cell:.3g} m in place of"
+        what += f" {default:.3g} m thresholds may differ by 5 to 15 %"
+        field = "method.flow.first_cell_height"
+        remedy = "leave it out, unless its effect is what you want"
+        yield Limit("first-cell", field, what, remedy, refused=False)
+    cells = scene.method.flow.cells_per_face
+    if cells < COARSEST:
+        what = f"{cells} cells along a face leave thresholds about 5 % too high"
+        remedy = f"{COARSEST} or more"
+        field = "method.flow.cells_per_face"
+        yield Limit("mesh-scheme-15", field, what, remedy, refused=False)
     scheme = scene.method.flow.convection_scheme
     if scheme != "linearUpwind":
         what = f"{scheme} does not converge to the same answer, or not at all"
@@ -346,6 +394,7 @@ def _dem(scene: Scene) -> Iterator[Limit]:
         what = f"at a damping of {damping:g} a bed does not come to rest"
         yield Limit("timestep-damping", "method.grains.damping", what, "0.1 is sound")
     if not isinstance(scene.bed, PileBed):
+        yield from _ramp(rules)
         return
     if rules.waiting_time < HELD_FROM:
         what = f"load steps that wait {rules.waiting_time:g} sqrt(d/g')"
@@ -363,3 +412,15 @@ def _dem(scene: Scene) -> Iterator[Limit]:
         field = "method.grains.load_increment"
         what = f"load steps {step:.0%} apart leave the threshold that wide an interval"
         yield Limit("quiet-step", field, what, "lower it", refused=False)
+
+
+def _ramp(rules: GrainMethod) -> Iterator[Limit]:
+    """The limit of how fast the flow over a single grain rises."""
+    rise = rules.load_increment / rules.waiting_time
+    if rules.waiting_time >= HELD_FROM or rise <= RAMP * (1 + 1e-9):
+        return
+    what = f"on a ramp of more than {RAMP:.1%} per sqrt(d/g') a grain leaves late"
+    what += ": from 1 % on its threshold is 8 % and more too high"
+    remedy = f"a waiting time of {HELD_FROM:g}, unless a ramp is what you want"
+    field = "method.grains.load_increment"
+    yield Limit("rate-stiffness", field, what, remedy, refused=False)

@@ -1,15 +1,11 @@
 """Maps of failure: where in a plane of two parameters a run is good, and where not.
 
-A map's file has the tables of a study file. An axis changes fields of them: a list of
-values, each times a factor where it is a number; entries with a label and the fields
-they set; or the fractions of a pile at which the threshold of one run is read. A run
-that fails gives its own verdict. Another answer is wrong where it differs by more than
-`WRONG` from the reference of its place.
+A run that fails gives its own verdict. Another answer is wrong where it differs by more
+than `WRONG` from the reference of its place.
 """
 
 import math
-import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,29 +18,30 @@ from matplotlib.patches import Patch, Rectangle
 
 from orchestrator import plan
 from orchestrator.experiment import Experiment, Results, Runs
-from orchestrator.fidelity.decision import as_written, written
+from orchestrator.fidelity.decision import as_written
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import Motion
+from orchestrator.lab import told
+from orchestrator.lab.map_file import FOLDER, Place, StabilityMap, read_map
 from orchestrator.report import style
 from orchestrator.report.card import Card, Number, Worth
-from orchestrator.report.page import Limits, Paragraphs, Section
+from orchestrator.report.page import Limits, Paragraphs, Section, Table
 from orchestrator.report.style import Figure
 from orchestrator.runs import case
-from orchestrator.study.closed_form import resolved
-from orchestrator.study.keys import by_name
 from orchestrator.study.scene import Scene
-from orchestrator.study.study import make_scene
 from orchestrator.types import Row
 
-FOLDER = Path(__file__).parent / "maps"
-"""The maps of the package."""
 TITLE = "Where each method fails"
 MAPS_TEXT = """\
 Each cell is a real run. It is good where tau_c is within 5 % of its reference at \
 every fraction; wrong where it is not and nothing said so; noisy, exploded or stalled \
 where the run itself said so."""
-DEFAULT = "default"
-"""In a file, the value that is a field's default; TOML has none."""
+TOLD_TITLE = "What a study says of the wrong ones"
+TOLD_TEXT = """\
+A run that is wrong looks like one that is good; what tells them apart is the study. \
+It refuses, or warns of, a field that the map varies; it finds no numerical error for \
+such a scene, so that the threshold is not usable; or its interval has the reference. \
+Where a map compares two different beds, no run is at fault."""
 WRONG = 0.05
 """Relative error of tau_c from which an answer counts as wrong."""
 NOTICED = ("exploded", "noisy", "stalled")
@@ -79,113 +76,6 @@ VERDICTS = {
 """The verdicts, from the best to the worst."""
 
 
-class Place(NamedTuple):
-    """A place of a map.
-
-    Attributes
-    ----------
-    x, y
-        Its values on the axes; x is None where the run is read at several fractions.
-    scenes
-        Its scenes.
-    references
-        The scenes that they are compared with, in the same order.
-    """
-
-    x: float | str | None
-    y: float | str
-    scenes: tuple[Scene, ...]
-    references: tuple[Scene, ...]
-
-
-class StabilityMap(NamedTuple):
-    """A map.
-
-    Attributes
-    ----------
-    name
-        Its name.
-    data
-        What its file says.
-    places
-        Its places.
-    """
-
-    name: str
-    data: Mapping[str, Any]
-    places: tuple[Place, ...]
-
-    @property
-    def fractions(self) -> Sequence[float | None]:
-        """Fractions at which each run is read; None stands for those of its scene."""
-        values = self.data["x"].get("fractions")
-        if values is None:
-            return (None,)
-        return [float(value) for value in values]
-
-
-def read_map(path: Path) -> StabilityMap:
-    """Read a map's file.
-
-    Parameters
-    ----------
-    path
-        The file.
-
-    Returns
-    -------
-    Map
-        The map.
-    """
-    data = tomllib.loads(path.read_text(encoding="utf-8"))
-    of_reference = data.get("reference", {})
-    places = []
-    for y, below in _axis(data["y"]):
-        for x, beside in _axis(data["x"]):
-            changes = {**below, **beside}
-            scenes = _scenes(data, changes, path.name)
-            references = _scenes(data, {**changes, **of_reference}, path.name)
-            places.append(Place(x, y, scenes, references))
-    return StabilityMap(path.stem, data, tuple(places))
-
-
-def _axis(axis: Mapping[str, Any]) -> Iterator[tuple[Any, Mapping[str, Any]]]:
-    """The places of an axis: the label, and the fields that it sets."""
-    if "fractions" in axis:
-        fractions = [float(value) for value in axis["fractions"]]
-        yield None, {"threshold.fractions": fractions}
-    for entry in axis.get("entries", ()):
-        yield entry["label"], entry["set"]
-    for value in axis.get("values", ()):
-        yield value, _scaled(axis["fields"], value)
-
-
-def _scaled(factors: Mapping[str, float], value: float | str) -> dict[str, Any]:
-    """Fields with a value times their factors if it is a number, else as it is."""
-    if not isinstance(value, int | float):
-        return dict.fromkeys(factors, value)
-    return {name: value * factor for name, factor in factors.items()}
-
-
-def _scenes(
-    data: Mapping[str, Any],
-    changes: Mapping[str, Any],
-    where: str,
-) -> tuple[Scene, ...]:
-    """The scene with some changes, with its method.
-
-    In the transition it is one for each force law.
-    """
-    tables = by_name(data)
-    for name, value in changes.items():
-        table, _, field = name.rpartition(".")
-        tables[table].pop(field, None)
-        if value != DEFAULT:
-            tables[table][field] = value
-    scenes = next(resolved([make_scene(tables, where)]))
-    return tuple(written(scene) for scene in scenes)
-
-
 class Stability(Experiment):
     """Where each method fails.
 
@@ -213,15 +103,20 @@ class Stability(Experiment):
         """Judge every place of every map."""
         judged = [judge_map(each, runs) for each in self.maps]
         table = pd.concat(judged, ignore_index=True)
-        return Results({"maps": table}, _sections(self.maps, table))
+        said = told.counted(self.maps, table)
+        sections = _sections(self.maps, table, said)
+        return Results({"maps": table, "told": said}, sections)
 
 
-def _sections(maps: Sequence[StabilityMap], table: pd.DataFrame) -> list[Section]:
-    """The page: all maps in one figure, and each with its question."""
+def _sections(
+    maps: Sequence[StabilityMap], table: pd.DataFrame, counts: pd.DataFrame
+) -> list[Section]:
+    """The page: all maps in one figure, what is told, each with its question."""
     whole = Figure("maps", TITLE, "", (), draw_maps(maps, table))
     sections = [
         Section("", [_card(table)]),
         Section("All maps", [whole, Paragraphs(MAPS_TEXT, "lead")]),
+        Section(TOLD_TITLE, [Paragraphs(TOLD_TEXT, "lead"), Table.of(counts)]),
     ]
     for each in maps:
         title = each.data["title"]

@@ -25,6 +25,7 @@ REFUSED: list[tuple[dict[str, object], str, str]] = [
     ),
     ({"bed.slope_deg": 31.0}, "bed.slope_deg", "90 deg - entrainment angle"),
     ({"bed.entrainment_angle_deg": 55.0}, "bed.entrainment_angle_deg", "wedged"),
+    ({"bed.entrainment_angle_deg": 59.9}, "bed.entrainment_angle_deg", "wedged"),
     ({"method.flow.first_cell_height": 3e-5}, "bed.roughness", "z_e"),
     ({"method.flow.viscosity": 1e-2}, "method.flow.viscosity", "not turbulent"),
     ({"method.grains.time_step": 0.5}, "method.grains.time_step", "above 0.4"),
@@ -66,6 +67,7 @@ REFUSED: list[tuple[dict[str, object], str, str]] = [
     ({"bed.packing": "poured", "grain.friction_angle_deg": 14.0}, "bed", MOUND),
 ]
 ROLLING = {"bed.slope_deg": 69.0, "bed.entrainment_angle_deg": 20.0}
+RISING = {"method.kind": "dem", "method.grains.waiting_time": 1.0}
 WARNED: list[tuple[dict[str, object], str, str]] = [
     (
         {**GRAIN, **ROLLING, "grain.friction_angle_deg": 80.0},
@@ -73,6 +75,36 @@ WARNED: list[tuple[dict[str, object], str, str]] = [
         "half-way",
     ),
     ({"method.grains.waiting_time": 2.0}, "method.grains.waiting_time", "ramp"),
+    (
+        {**GRAIN, **RISING, "method.grains.load_increment": 0.0101},
+        "method.grains.load_increment",
+        "8 % and more too high",
+    ),
+    (
+        {**GRAIN, **RISING, "method.grains.waiting_time": 2.0},
+        "method.grains.load_increment",
+        "leaves late",
+    ),
+    (
+        {"method.flow.turbulence_model": "kOmegaSST"},
+        "method.flow.turbulence_model",
+        "5 to 8 % higher",
+    ),
+    (
+        {"forces.averaging_length": 0.2},
+        "forces.averaging_length",
+        "5 to 13 % too high",
+    ),
+    (
+        {"method.flow.first_cell_height": 1e-3},
+        "method.flow.first_cell_height",
+        "0.001 m in place of 0.0005 m",
+    ),
+    (
+        {"method.flow.cells_per_face": 10},
+        "method.flow.cells_per_face",
+        "5 % too high",
+    ),
     (
         {"method.kind": "dem", "method.grains.stiffness": 1e8},
         "method.grains.stiffness",
@@ -88,6 +120,10 @@ WARNED: list[tuple[dict[str, object], str, str]] = [
 ]
 ALLOWED: list[dict[str, object]] = [
     {**GRAIN, "bed.slope_deg": 25.0},
+    {**GRAIN, **RISING, "method.grains.load_increment": 0.004},
+    {**GRAIN, "method.kind": "dem", "method.grains.load_increment": 0.1},
+    {"forces.averaging_length": 0.1, "method.flow.cells_per_face": 20},
+    {"method.flow.turbulence_model": "RNGkEpsilon"},
     {**LONG, "bed.slope_deg": 1.0, "bed.lee_slope_deg": 34.0, "bed.height": 0.01},
     {**LONG, "bed.height": 20.0, "bed.counted": [10.0, 12.0]},
     {"method.flow.model": "waves"},

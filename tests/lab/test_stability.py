@@ -8,8 +8,9 @@ import pytest
 from matplotlib.patches import Rectangle
 
 from orchestrator.fidelity import known, limits
-from orchestrator.lab import stability
-from orchestrator.lab.stability import FOLDER, NOTICED, StabilityMap
+from orchestrator.lab import stability, told
+from orchestrator.lab.map_file import FOLDER, StabilityMap, read_map
+from orchestrator.lab.stability import NOTICED
 from orchestrator.runs import workspace
 
 SMALL = """
@@ -31,7 +32,7 @@ forces = { law = "high" }
     "path", sorted(FOLDER.glob("*.toml")), ids=lambda path: path.stem
 )
 def test_a_maps_file_spans_its_axes(path: Path) -> None:
-    read = stability.read_map(path)
+    read = read_map(path)
     across, down = ({place[axis] for place in read.places} for axis in (0, 1))
     assert len(read.places) == len(across) * len(down)
     assert (across == {None}) == ("fractions" in read.data["x"])
@@ -84,7 +85,8 @@ def test_the_limits_were_read_off_the_maps() -> None:
     held = (waits["y"] >= 6.0) & (waits["x"] <= limits.COARSE_STEP)
     assert (waits[held]["verdict"] == "good").all()
     pockets = table[table["map"] == "entrainment-layers"]
-    touching = pockets["x"].astype(float) >= limits.CLOSE_PACKED_DEG + 0.5
+    touching = pockets["x"].astype(float) >= limits.CLOSE_PACKED_DEG
+    assert touching.any()
     assert (pockets[touching]["verdict"] == "good").all()
     assert (pockets[~touching]["verdict"] != "good").mean() > 0.5
 
@@ -109,3 +111,33 @@ def test_each_cell_shows_its_worst_run() -> None:
         texts = {text.get_text() for text in ax.texts}
         assert texts == {"G\n−1.2 %", "W\n+1.2e+03 %", "X"}
         assert [mark.get_text() for mark in ax.get_xticklabels()] == ["0.5", "2"]
+
+
+def test_a_study_tells_every_stored_answer_that_is_wrong_unless_its_map_says_why_not() -> (
+    None
+):
+    table = pd.read_csv(known.FOLDER / "maps.csv")
+    maps = [read_map(path) for path in sorted(FOLDER.glob("*.toml"))]
+    found = told.told(maps, table)
+    silent = (table["verdict"] == "wrong") & ~table["caught"]
+    assert len(found) == silent.sum() > 90
+    assert set(found["told"]) <= set(told.HOW) - {told.NOTHING}
+    excused = {one.name for one in maps if "no_check" in one.data}
+    assert set(found.loc[found["told"] == told.NO_FAULT, "map"]) == excused
+    assert found.loc[found["told"].isin([told.REFUSED, told.WARNED]), "field"].all()
+    counts = told.counted(maps, table)
+    assert counts["wrong"].sum() == len(found)
+    assert (counts[[*told.HOW]].sum(axis=1) == counts["wrong"]).all()
+
+
+def test_an_answer_of_which_a_study_says_nothing_is_counted_as_such() -> None:
+    maps = [read_map(FOLDER / "layers-horizontal.toml")]
+    row = {"map": "layers-horizontal", "x": 0.5, "y": 2, "verdict": "wrong"}
+    table = pd.DataFrame([{**row, "caught": False, "error": 0.9, "note": ""}])
+    assert told.told(maps, table)["told"].tolist() == [told.NOTHING]
+    (count,) = told.counted(maps, table).to_dict("records")
+    assert (count["wrong"], count[told.NOTHING], count[told.WITHIN]) == (1, 1, 0)
+    # within the numerical error of horizontal rows
+    assert told.told(maps, table.assign(error=0.05))["told"].tolist() == [told.WITHIN]
+    # a run that noticed it is no such answer
+    assert told.told(maps, table.assign(caught=True)).empty
