@@ -55,7 +55,7 @@ given. The table `scenes` of the results has the question, the table `methods` h
 answered. The method `auto` and a tolerance may change the fields of the method
 ([ladder.md](ladder.md#how-a-scene-is-answered)); `methods` has the values that were used. A default
 that is written in the file has the same effect as one that is left out, except in `[fluid]`: any density
-or viscosity there means a fluid by its numbers, in which grains go on, and without one the fluid is the
+or viscosity there means a fluid by its numbers, in which motion must be sustained, and without one the fluid is the
 paper's gas (`kind = "paper"`). Ranges are intervals; a parenthesis excludes the end. Within the ranges, a study refuses what the [limits](#limits) name. A key
 of an earlier version is refused, and the message names the present key.
 """

@@ -51,7 +51,7 @@ DUNE, FLAT_BED = (
 FENCE = '{ kind = "fence", x = -0.3, height = 0.01 }'
 BLOCK = '{ kind = "block", x = -0.1, height = 0.01 }'
 OBSTACLES = 'method.flow.model = "flat"; bed.obstacles = [{}, {}]'
-LEAVES = 'threshold.criterion = "leaves"'
+ENTRAINED = 'threshold.criterion = "entrained"'
 AS_PROFILE = 'bed.profile = "bed.csv"; bed.counted = "windward"'
 
 
@@ -63,8 +63,8 @@ AS_PROFILE = 'bed.profile = "bed.csv"; bed.counted = "windward"'
         ("fluid.density = 9e3; grain.density = 23850.0", "", 1e-6),
         # four times the submerged density: it changes how far a grain hops, not when it leaves
         (
-            f"grain.density = {1000 + 4 * 1650.0}; fluid.viscosity = 2e-6; {LEAVES}",
-            LEAVES,
+            f"grain.density = {1000 + 4 * 1650.0}; fluid.viscosity = 2e-6; {ENTRAINED}",
+            ENTRAINED,
             1e-6,
         ),
         ("method.grains.mobile_layers = 5", "", 1e-9),

@@ -56,4 +56,6 @@ def test_the_budget_of_a_study_has_its_criterion() -> None:
     text = PILE.format(", height = 0.01")
     asked = study.parse(text, name="one", where="one")
     _, decisions = budget.changes(asked)
-    assert {one.scene.threshold.criterion for one in decisions.values()} == {"goes on"}
+    assert {one.scene.threshold.criterion for one in decisions.values()} == {
+        "sustained"
+    }

@@ -86,7 +86,7 @@ DISTANCE = 20.0
 """Way downstream after the gust from which on a grain goes on, d."""
 LONGEST = 60.0
 """Time for which the mean flow acts after the gust, sqrt(d/g'): three times what a
-grain that goes on needs in water for `DISTANCE`."""
+grain in sustained motion needs in water for `DISTANCE`."""
 PAUSE = 400.0
 """Longest time in which the grains come to rest between two load steps, sqrt(d/g'):
 one that flies at 40 d sinks for 80."""
@@ -492,7 +492,7 @@ def draw(table: pd.DataFrame) -> Canvas:
         ax.set(title=name, xscale="log")
         style.plain_ticks(ax.xaxis)
     for ax in axes[:, 0]:
-        ax.set_ylabel("grains that go on, %")
+        ax.set_ylabel("grains in sustained motion, %")
     for ax in axes[1]:
         ax.set_xlabel("Shields number $θ$")
     style.legends(canvas, [one, curve, field], [])

@@ -1,4 +1,4 @@
-"""The table of thresholds of grains that go on, at the nodes of `orchestrator.physics.saltation`.
+"""The table of thresholds of sustained motion, at the nodes of `orchestrator.physics.saltation`.
 
 python tools/saltation.py > orchestrator/physics/saltation.csv
 

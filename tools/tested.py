@@ -22,16 +22,15 @@ from orchestrator.lab.validate import (
     GUST,
     INTENSITY,
     MODELS,
-    going_on,
     measured_grains,
     single,
+    sustained,
 )
 from orchestrator.physics import saltation
 from orchestrator.physics.beside import (
     AIR_OF_QUARTZ,
+    ENTRAINED,
     GAS,
-    GOES_ON,
-    LEAVES,
     LEVEL_DEG,
     LIKE,
     LIQUID,
@@ -39,6 +38,7 @@ from orchestrator.physics.beside import (
     MOST_SLOPE_DEG,
     NUMBERS_OF_STRIPS,
     OF_STRIPS,
+    SUSTAINED,
 )
 from orchestrator.physics.laws import DEFAULT, LAWS
 from orchestrator.physics.threshold import PAPER
@@ -51,7 +51,7 @@ from orchestrator.types import Row
 FLUMES = ("flumes, visual", "flumes, fixed intensity", "flumes, reference transport")
 """Sets of level beds in flumes, whose rows an interval holds."""
 STEEP = ("steep flumes", "steep flumes, large elements")
-"""Sets of steep beds, which an interval of grains that go on holds as well."""
+"""Sets of steep beds, which an interval of sustained motion holds as well."""
 WIND = ("wind, field", "wind tunnel, curve")
 """Sets in air."""
 IN_AIR = (0.35, 52.0)
@@ -59,8 +59,8 @@ IN_AIR = (0.35, 52.0)
 DECADES = (0.1, 1.0, 10.0, 100.0, 1000.0, 1e4)
 LEAST = 10
 """Ranges of Re* of the intervals, and the fewest rows of one."""
-GOING_ON = (DEFAULT, LAWS[DEFAULT].goes_on)
-"""Force laws of the grains that go on whose intervals are found: those of the default."""
+OF_SUSTAINED = (DEFAULT, LAWS[DEFAULT].extended_by)
+"""Force laws of sustained motion whose intervals are found: those of the default."""
 BETAS = {60.0: (55.0, 60.0), 50.0: (47.5, 55.0), 45.0: (42.5, 47.5)}
 """Entrainment angles of the intervals, deg, each with the range that it stands for."""
 RATIOS = {30.0: (27.0, 33.0), 10.0: (9.0, 11.0)}
@@ -132,31 +132,35 @@ def of_grains() -> pd.DataFrame:
         ratios = sorted({name, *span})
         hops = {each: saltation.hops(measured_grains(beds, each)) for each in ratios}
         further = {
-            each: going_on(beds, GUST, leaves=False, ratio=each) for each in ratios
+            each: sustained(beds, GUST, is_entrained=False, ratio=each)
+            for each in ratios
         }
         for (beta, betas), law in itertools.product(BETAS.items(), LAWS):
-            leaves, goes_on = [], []
+            of_entrained, of_sustained = [], []
             for angle, ratio in itertools.product(sorted({beta, *betas}), ratios):
                 at = single(beds, law, angle, ratio)
-                leaves.append(pd.Series(np.where(at.valid, at.shields, np.nan)))
+                of_entrained.append(pd.Series(np.where(at.valid, at.shields, np.nan)))
                 moved = saltation.motion(at.shields, further[ratio], hops[ratio], GUST)
-                goes_on.append(pd.Series(moved.shields))
+                of_sustained.append(pd.Series(moved.shields))
             place = {
                 "force_law": law,
                 **_range("beta_deg", *betas),
                 **_range("d_over_z0", *span),
             }
             in_flumes = beds["set"].isin(FLUMES)
-            level = {"criterion": LEAVES, **_range("alpha_deg", 0.0, LEVEL_DEG)}
-            for row in _of_liquids(beds[in_flumes], leaves):
+            level = {"criterion": ENTRAINED, **_range("alpha_deg", 0.0, LEVEL_DEG)}
+            for row in _of_liquids(beds[in_flumes], of_entrained):
                 made.append({**level, **place, **row})
-            if law not in GOING_ON:
+            if law not in OF_SUSTAINED:
                 continue
-            sloping = {"criterion": GOES_ON, **_range("alpha_deg", 0.0, MOST_SLOPE_DEG)}
+            sloping = {
+                "criterion": SUSTAINED,
+                **_range("alpha_deg", 0.0, MOST_SLOPE_DEG),
+            }
             in_flumes = beds["set"].isin([*FLUMES, *STEEP])
-            for row in _of_liquids(beds[in_flumes], goes_on):
+            for row in _of_liquids(beds[in_flumes], sustained):
                 made.append({**sloping, **place, **row})
-            row = _of_air(beds[beds["set"].isin(WIND)], goes_on)
+            row = _of_air(beds[beds["set"].isin(WIND)], sustained)
             made.append({**sloping, **place, **row})
     return _sorted(
         made, ["medium", "criterion", "force_law"], ["beta_deg", "d_over_z0"]
@@ -220,15 +224,17 @@ def of_strips(rows: pd.DataFrame, strip: Scene) -> pd.DataFrame:
     """
     flumes = rows[rows["set"].isin(FLUMES)]
     made: list[Row] = []
-    of_strips = (each for each in MODELS if each.name != PAPER and not each.goes_on)
-    for model, law in itertools.product(of_strips, GOING_ON):
+    of_strips = (
+        each for each in MODELS if each.name != PAPER and not each.is_sustained
+    )
+    for model, law in itertools.product(of_strips, OF_SUSTAINED):
         gusts = {"intensity": INTENSITY, "events": EVENTS} if model.gust > 1 else None
         scene = changed(strip, {**model.fields, "forces.law": law, "flow.gusts": gusts})
         beds = flumes[flumes["model"] == model.name]
         beds = beds.assign(density_ratio=beds["rho_sol_kg_m3"] / beds["rho_f_kg_m3"])
         used: dict[str, Any] = {**columns.used(scene), "fraction": MOVED}
         used["d_over_z0"] = scene.grain.diameter / scene.bed.roughness
-        kind: Row = {"criterion": LEAVES, "force_law": law}
+        kind: Row = {"criterion": ENTRAINED, "force_law": law}
         kind |= {name: used[name] or "" for name in OF_STRIPS}
         for name in ("d_over_z0", *NUMBERS_OF_STRIPS):
             kind |= _range(name, used[name] * (1 - LIKE), used[name] * (1 + LIKE))

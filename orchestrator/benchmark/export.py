@@ -22,7 +22,7 @@ from orchestrator.runs import case, engine, process, reuse
 from orchestrator.runs.workspace import Workspace
 from orchestrator.solvers.dem import ENGINE
 from orchestrator.study import fields, study
-from orchestrator.study.criterion import GOES_ON
+from orchestrator.study.criterion import SUSTAINED
 from orchestrator.study.profile import Files
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Group, Study
@@ -151,11 +151,12 @@ def _check_exportable(asked: Study, planned: Plan, where: str) -> None:
         )
     remedy = "run the study without it into another directory"
     for decision in planned.decisions.values():
-        if decision.scene.threshold.criterion == GOES_ON:
+        if decision.scene.threshold.criterion == SUSTAINED:
             raise InputError(
-                "threshold.criterion: a pack asks when grains leave their pockets",
+                "threshold.criterion: a pack asks when grains are entrained",
                 where,
-                'write threshold.criterion = "leaves", run it into another directory',
+                'write threshold.criterion = "entrained", run it into another '
+                "directory",
             )
     for pile in planned.piles.values():
         if pile.scene.threshold.update or pile.bed.width:

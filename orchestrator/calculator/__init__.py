@@ -128,17 +128,17 @@ QUANTITIES = {
     "lift_n": ("lift", "lift, N"),
 }
 """Columns of a threshold, each with its name in JSON, and its symbol and unit."""
-LEAVES, GOES_ON = "leaves", "goes on"
-CRITERIA = (LEAVES, GOES_ON)
-"""What a grain must do to count: leave its pocket, or also go on after the gust."""
+ENTRAINED, SUSTAINED = "entrained", "sustained"
+CRITERIA = (ENTRAINED, SUSTAINED)
+"""What a grain must do to count: leave its pocket, or also move on after a gust."""
 BY_FLUID = "auto"
-"""The criterion that fluid and law decide: `LEAVES` in the paper's gas and under its
-laws, `GOES_ON` in all other fluids."""
+"""The criterion that fluid and law decide: `ENTRAINED` in the paper's gas and under its
+laws, `SUSTAINED` in all other fluids."""
 OF_CRITERION = {
-    "shields_leaves": "leaves",
-    "shields_goes_on": "goes on",
-    "shields_goes_on_high": "at most",
+    "shields_entrained": "entrained",
+    "shields_sustained": "sustained",
+    "shields_sustained_high": "at most",
     "shields_cessation": "ceases",
     "decides": "decides",
 }
-"""Columns of a threshold of grains that go on, each with its head for people."""
+"""Columns of a threshold of sustained motion, each with its head for people."""

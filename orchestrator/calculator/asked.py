@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.calculator import BY_FLUID, LEAVES, OF_FLUID, PARAMETERS
+from orchestrator.calculator import BY_FLUID, ENTRAINED, OF_FLUID, PARAMETERS
 from orchestrator.errors import InputError
 from orchestrator.physics.fluids import PAPER, TEMPERATURE, numbers_of
 from orchestrator.study.units import Remark, hinted, questions
@@ -74,7 +74,7 @@ def thresholds_and_questions(
     try:
         points = _of_fluid(points, fluid, temperature)
         if fluid == PAPER and criterion == BY_FLUID:
-            criterion = LEAVES  # also where the points have numbers of their own
+            criterion = ENTRAINED  # also where the points have numbers of their own
         asked = questions(_by_field(points), fields, form)
         table = thresholds(points, law, criterion, bed_slope)
         return table, [one.text for one in asked]

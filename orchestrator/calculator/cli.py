@@ -39,9 +39,9 @@ LAW_HELP = (
     "of bridged ends; paper: Eq. 2 or 4 where each holds"
 )
 CRITERION_HELP = (
-    "what a grain must do: goes on, which is to leave its pocket in a gust and to hop "
-    "on after it; leaves, its pocket; default: leaves in the fluid paper and by the "
-    "laws paper, low and high, goes on in all others"
+    "what a grain must do: sustained, which is to leave its pocket in a gust and to "
+    "move on after it; entrained, which is to leave its pocket; default: entrained in "
+    "the fluid paper and by the laws paper, low and high, sustained in all others"
 )
 
 

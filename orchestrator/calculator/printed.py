@@ -185,24 +185,24 @@ def _place(row: "Row") -> tuple[bool, bool, float]:
 
 
 def _criteria(chosen: Sequence["Row"]) -> Iterator[str]:
-    """Both criteria of grains that go on, and which of them decides, for each law."""
+    """Both criteria of sustained motion, and which of them decides, for each law."""
     for row in chosen:
         of_law = f"{row['law']}: " if len(chosen) > 1 else ""
-        leaves = _cell(row["shields_leaves"])
-        if _is_nan(row["shields_goes_on"]):
+        dislodged = _cell(row["shields_entrained"])
+        if _is_nan(row["shields_sustained"]):
             yield (
                 f"{of_law}“{row['decides']}” decides: such a grain does not hop, the "
-                f"mean stress turns it over its neighbour from {leaves}"
+                f"mean stress turns it over its neighbour from {dislodged}"
             )
             continue
-        goes_on = _cell(row["shields_goes_on"])
+        sustained = _cell(row["shields_sustained"])
         ceases = _cell(row["shields_cessation"])
         yield (
-            f"{of_law}“{row['decides']}” decides: of the mean flow, a gust turns it "
-            f"over from {leaves}, it hops on after it from {goes_on}; motion ceases "
-            f"below {ceases}"
+            f"{of_law}“{row['decides']}” decides: a gust dislodges it from {dislodged} "
+            f"of the mean flow, saltation continues after it from {sustained}; motion "
+            f"ceases below {ceases}"
         )
-        highest = _cell(row["shields_goes_on_high"])
+        highest = _cell(row["shields_sustained_high"])
         yield f"{of_law}with the weakest rebounds of sand it is {highest}"
 
 
@@ -241,11 +241,11 @@ def _quantities(rows: Sequence["Row"]) -> dict[str, str]:
 
 
 def _whether_it_holds(row: "Row") -> str:
-    """Whether the law holds: where the grain leaves, which hopping on may exceed."""
+    """Whether the law holds: at entrainment, which hopping on may exceed."""
     if row["valid"]:
         return "yes"
-    is_further = row.get("decides") == "goes on"
-    where = "no, when it leaves" if is_further else "no"
+    is_further = row.get("decides") == "sustained"
+    where = "no, when it is entrained" if is_further else "no"
     return f"{where}: {row['why_not']}"
 
 

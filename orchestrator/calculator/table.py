@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from orchestrator.calculator import (
     BY_FLUID,
     CRITERIA,
-    GOES_ON,
-    LEAVES,
+    ENTRAINED,
     OF_FLUID,
     PARAMETERS,
     QUANTITIES,
+    SUSTAINED,
     river,
 )
 from orchestrator.errors import InputError
@@ -43,7 +43,7 @@ from orchestrator.types import Row
 Table = dict[str, NDArray[Any]]
 """Columns of equal length by their names."""
 OF_PAPER = (PAPER, *LAWS_OF["transition"])
-"""Laws of the paper, which are of grains that leave their pockets."""
+"""Laws of the paper, which are of grains that are entrained."""
 
 
 def thresholds(
@@ -99,9 +99,9 @@ def thresholds(
     grains = _grains(points)
     if criterion == BY_FLUID:
         criterion = _criterion(points, asked)
-    if criterion == GOES_ON and asked in OF_PAPER:
-        what = f"the law {asked} is of grains that leave their pockets"
-        remedy = f"take the criterion {LEAVES}, or another law"
+    if criterion == SUSTAINED and asked in OF_PAPER:
+        what = f"the law {asked} is one of entrainment alone"
+        remedy = f"take the criterion {ENTRAINED}, or another law"
         raise InputError(what, "threshold: criterion", remedy)
     if "depth" in points:
         if bed_slope is not None:
@@ -111,8 +111,8 @@ def thresholds(
     # numbers beyond all floats end as laws that do not hold
     with np.errstate(all="ignore"):
         table, against = _of_all_laws(grains, asked, criterion)
-    if criterion == GOES_ON and not np.isfinite(table["shields"]).any():
-        remedy = f"take the criterion {LEAVES}, or a larger grain"
+    if criterion == SUSTAINED and not np.isfinite(table["shields"]).any():
+        remedy = f"take the criterion {ENTRAINED}, or a larger grain"
         raise InputError(verdict.NO_START, "threshold: criterion", remedy)
     if not table["valid"].any():
         place = int(np.argmax(table["answer"]))
@@ -156,7 +156,7 @@ def _of_all_laws(
         block = _block(at, inputs)
         kind: Table = {**inputs, "force_law": block["law"]}
         if at.criteria is not None:
-            kind["criterion"] = np.full(len(block["law"]), GOES_ON, object)
+            kind["criterion"] = np.full(len(block["law"]), SUSTAINED, object)
         block["regime"] = regimes
         rows_beside = beside({**block, **kind})
         block |= rows_beside
@@ -244,7 +244,7 @@ def _judge(table: Table, against: Sequence[Sequence[Reason]]) -> None:
         "standing_out": standing_out(1.0, table["beta_deg"]),
     }
     if "decides" in table:
-        columns["criterion"] = np.full(len(flow), GOES_ON, object)
+        columns["criterion"] = np.full(len(flow), SUSTAINED, object)
     cells = zip(*(column.tolist() for column in columns.values()), strict=True)
     rows = [dict(zip(columns, row, strict=True)) for row in cells]
     reasons = []
@@ -287,7 +287,7 @@ def _criterion(points: Mapping[str, Any], asked: str) -> str:
     A fluid of which a number is given is none of the paper's, whatever the number is.
     """
     is_paper = not OF_FLUID.keys() & points.keys()
-    return LEAVES if is_paper or asked in OF_PAPER else GOES_ON
+    return ENTRAINED if is_paper or asked in OF_PAPER else SUSTAINED
 
 
 def _picked(

@@ -19,7 +19,7 @@ from orchestrator.fidelity.known import UNKNOWN, Known, known
 from orchestrator.grains.loads import LONGEST_PACKED, Geometry, has_rows_along
 from orchestrator.grains.pile import Pile
 from orchestrator.study import methods, models
-from orchestrator.study.criterion import GOES_ON, goes_on
+from orchestrator.study.criterion import SUSTAINED, is_sustained
 from orchestrator.study.fields import FIELDS, default_of
 from orchestrator.study.method import HELD_FROM
 from orchestrator.study.methods import ThresholdMethod
@@ -31,7 +31,7 @@ from orchestrator.study.study import changed, value_of
 EXACT = "the closed form is exact for a single grain in a held flow"
 LONG_BED = f"more than {LONGEST_PACKED:g} grains long"
 ALONG = f"{LONG_BED}: closed form along the bed, checked where motion starts"
-HOPS = "grains that go on: leaving and hopping have closed forms"
+HOPS = "sustained motion: entrainment and hopping have closed forms"
 ENDLESS = "the rows of the bed have no end: closed form along the bed"
 NOT_MET = "the tolerance cannot be met, no error is known"
 CHOSEN = FIDELITIES[:-1]
@@ -114,7 +114,7 @@ class Decision:
     @property
     def is_along(self) -> bool:
         """Whether the closed form along the bed answers because the bed is long."""
-        if self.scene.threshold.criterion == GOES_ON:
+        if self.scene.threshold.criterion == SUSTAINED:
             return False
         return self.fidelity is LOCAL and self.asked.method.is_open
 
@@ -155,12 +155,12 @@ def decide(scene: Scene, tolerance: float | None) -> Decision:
     Decision
         The scene that answers, its fidelity, what is known of it, and why.
     """
-    if goes_on(scene):
-        return _going_on(scene, tolerance)
+    if is_sustained(scene):
+        return _sustained(scene, tolerance)
     return _leaving(scene, tolerance)
 
 
-def _going_on(scene: Scene, tolerance: float | None) -> Decision:
+def _sustained(scene: Scene, tolerance: float | None) -> Decision:
     """The decision on a scene whose grains must go on.
 
     A single grain is answered by the closed form, a bed whose rows have no end by the
@@ -180,7 +180,7 @@ def _going_on(scene: Scene, tolerance: float | None) -> Decision:
 
 
 def _along_the_bed(scene: Scene, tolerance: float | None) -> Decision:
-    """The decision on grains that go on over rows without an end.
+    """The decision on grains in sustained motion over rows without an end.
 
     They are answered in closed form. A tolerance chooses the mesh of the flow.
     """
@@ -230,9 +230,9 @@ def with_criterion(scene: Scene) -> Scene:
     Scene
         The scene, whose grains must go on where its fluid and its forces decide so.
     """
-    if not goes_on(scene):
+    if not is_sustained(scene):
         return scene
-    return changed(scene, {"threshold.criterion": GOES_ON})
+    return changed(scene, {"threshold.criterion": SUSTAINED})
 
 
 def has_endless_rows(scene: Scene) -> bool:
@@ -368,7 +368,7 @@ def method_of(scene: Scene) -> tuple[ThresholdMethod, str]:
         return method, f"the study asks for the method {method.name}"
     misfit = methods.DEM.misfit(scene)
     if not isinstance(bed, PileBed):
-        if scene.threshold.criterion == GOES_ON:
+        if scene.threshold.criterion == SUSTAINED:
             return methods.PIVOT, HOPS
         if misfit:
             return methods.PIVOT, f"by the closed form: {misfit.what}"

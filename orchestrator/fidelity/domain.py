@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
 
 import pandas as pd
 
@@ -26,7 +25,7 @@ from orchestrator.fidelity.classes import (
 )
 from orchestrator.fidelity.fidelities import FIDELITIES
 from orchestrator.study.closed_form import outer_roughness, single_grain
-from orchestrator.study.criterion import GOES_ON, LEAVES
+from orchestrator.study.criterion import ENTRAINED, SUSTAINED
 from orchestrator.study.fields import FIELDS, SEED
 from orchestrator.study.fields import Quantity as Field
 from orchestrator.study.parts import LogNormal, PileBed
@@ -42,6 +41,7 @@ NONE, GIVEN = "none", "given"
 """Words of a field without a value, and of one whose value is a table or a file."""
 Value = float | str
 Read = Callable[[Scene], Iterable[Value]]
+Measured = Mapping[tuple[str, str, str], pd.DataFrame]
 SOLVED = (
     "method.flow.speed",
     "method.flow.viscosity",
@@ -194,7 +194,7 @@ def _lengths(scene: Scene) -> Iterator[float]:
 
 
 def _criterion(scene: Scene) -> Iterator[str]:
-    yield GOES_ON if scene.threshold.criterion == GOES_ON else LEAVES
+    yield SUSTAINED if scene.threshold.criterion == SUSTAINED else ENTRAINED
 
 
 def _galileo(scene: Scene) -> Iterator[float]:
@@ -337,38 +337,15 @@ def _rows(quantity: str, values: Iterable[Value]) -> Iterator[dict[str, Value]]:
         yield {"word": word}
 
 
-class Span(NamedTuple):
-    """The values of a quantity that were measured.
-
-    Attributes
-    ----------
-    numbers
-        The least and the most of its numbers, if it has any; the most is infinite for
-        one of `OPEN_ABOVE`.
-    words
-        Its words.
-    """
-
-    numbers: tuple[float, float] | None
-    words: tuple[str, ...]
-
-
 @cache
-def _measured() -> Mapping[tuple[str, str, str], Span]:
-    """What the file says, by part, class and quantity."""
+def _measured() -> Measured:
+    """The rows of the file, by part, class and quantity."""
     table = pd.read_csv(FILE, keep_default_na=False, na_values=[""])
-    found = {}
-    for keys, rows in table.groupby(["part", "scene_class", "quantity"]):
-        part, name, quantity = map(str, keys)
-        ends = None
-        numbers = rows.dropna(subset=["least"])
-        if not numbers.empty:
-            ends = (float(numbers["least"].iloc[0]), float(numbers["most"].iloc[0]))
-            if math.isnan(ends[1]):
-                ends = (ends[0], math.inf)
-        words = tuple(map(str, rows["word"].dropna()))
-        found[part, name, quantity] = Span(ends, words)
-    return found
+    keys = ["part", "scene_class", "quantity"]
+    return {
+        (str(part), str(name), str(quantity)): rows
+        for (part, name, quantity), rows in table.groupby(keys)
+    }
 
 
 @cache  # a study asks it of each fidelity
@@ -395,13 +372,13 @@ def outside(part: str, scene: Scene) -> str:
     for quantity in QUANTITIES:
         if not quantity.is_of(part):
             continue
-        span = measured.get((part, name, quantity.name))
+        rows = measured.get((part, name, quantity.name))
         values = [*quantity.read(scene)]
-        beyond = [value for value in values if not _is_within(value, span)]
+        beyond = [value for value in values if not _is_within(value, rows)]
         if quantity.name == FRACTIONS and len(beyond) < len(values):
             continue
         if beyond:
-            return _in_words(quantity.name, span)
+            return _in_words(quantity.name, rows)
     return ""
 
 
@@ -446,7 +423,7 @@ def unmeasured(scene: Scene) -> str:
         The property in words; empty where there is none.
     """
     is_packed = scene.method.may_pack_grains
-    if not is_packed and scene.threshold.criterion != GOES_ON:
+    if not is_packed and scene.threshold.criterion != SUSTAINED:
         return f'method.kind = "{scene.method.kind}"'
     for part in _parts(scene):
         if found := outside(part, scene):
@@ -460,7 +437,7 @@ def _parts(scene: Scene) -> Iterator[str]:
     """The parts of a pile that have an error.
 
     Over a level bed the flow has none; nor have places along a bed line, with which
-    grains that go on are answered in closed form.
+    grains in sustained motion are answered in closed form.
     """
     if not _bed(scene).is_level:
         yield FLOW
@@ -484,27 +461,32 @@ def _unmeasured_solve(scene: Scene) -> str:
     return f"method.flow.roughness = {roughness:.3g} m"
 
 
-def _is_within(value: Value, span: Span | None) -> bool:
+def _is_within(value: Value, rows: pd.DataFrame | None) -> bool:
     """Whether a value is one of those measured, or between them."""
-    if span is None:
+    if rows is None:
         return False
     if isinstance(value, str):
-        return value in span.words
-    if span.numbers is None:
+        return bool((rows["word"] == value).any())
+    numbers = rows.dropna(subset=["least"])
+    if numbers.empty:
         return False
-    least, most = span.numbers
+    (row,) = numbers.to_dict("records")
     margin = NEAR * abs(value)
-    return least - margin <= value <= most + margin
+    is_below = value < row["least"] - margin
+    return not (is_below or value > row["most"] + margin)
 
 
-def _in_words(name: str, span: Span | None) -> str:
+def _in_words(name: str, rows: pd.DataFrame | None) -> str:
     """A quantity with what was measured of it."""
-    if span is None or (span.numbers is None and span.words == (NONE,)):
+    if rows is None:
         return name
-    words = [*span.words]
-    if span.numbers:
-        least, most = span.numbers
-        if math.isinf(most):
+    words = [str(word) for word in rows["word"].dropna()]
+    numbers = rows.dropna(subset=["least"])
+    if words == [NONE] and numbers.empty:
+        return name
+    for row in numbers.to_dict("records"):
+        least, most = row["least"], row["most"]
+        if math.isnan(most):
             return f"{name} below {least:.3g}"
         if most - least > NEAR * abs(most):
             return f"{name} outside {least:.3g} … {most:.3g}"

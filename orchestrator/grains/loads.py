@@ -36,7 +36,7 @@ from orchestrator.physics.threshold import LIFT_OFF, check_known, root, threshol
 from orchestrator.runs.files import state_of
 from orchestrator.study import methods
 from orchestrator.study.closed_form import closed_form, single_grain
-from orchestrator.study.criterion import GOES_ON, hopping_on, peak_of
+from orchestrator.study.criterion import SUSTAINED, hopping_on, peak_of
 from orchestrator.study.declare import UnfitError
 from orchestrator.study.parts import PileBed, Range
 from orchestrator.study.scene import Scene
@@ -656,7 +656,7 @@ class Geometry:
         if self.scene.is_poured or self.bed.is_wedge:
             return 1.0
         is_packed = self.scene.method.may_pack_grains
-        if not is_packed and self.scene.threshold.criterion == GOES_ON:
+        if not is_packed and self.scene.threshold.criterion == SUSTAINED:
             # places along the line are of single exposed grains
             return 1.0
         loads = self.loads(cases)
@@ -791,7 +791,7 @@ class Loads:
         slopes = np.degrees(np.arctan2(z, x))
         return np.asarray(np.where(self.ratio[counted] < 0, -slopes, slopes))
 
-    def going_on(self) -> tuple[FloatArray, FloatArray]:
+    def sustained(self) -> tuple[FloatArray, FloatArray]:
         """Find the flows from which counted grains go on hopping, and their gust.
 
         Returns
@@ -815,7 +815,7 @@ class Loads:
         if endless:
             what = f"from which flow on {endless} grains go on is not known: {NO_END}"
             where = f"scene {scene.id}: threshold.criterion"
-            raise InputError(what, where, 'choose "leaves"')
+            raise InputError(what, where, 'choose "entrained"')
         shields = np.where(can_hop, found, 0.0)
         grain = single_grain(scene)
         ustar = grain.changed(diameter=grain.diameter * sizes).ustar_at(shields)

@@ -14,7 +14,7 @@ from orchestrator.grains.motion import Motion
 from orchestrator.grains.threshold import PileThreshold, of_grains, of_pile
 from orchestrator.grains.wear import FlowRun, WornFlow
 from orchestrator.runs.case import Case
-from orchestrator.study.criterion import GOES_ON
+from orchestrator.study.criterion import SUSTAINED
 from orchestrator.types import BoolArray, FloatArray
 
 
@@ -177,14 +177,14 @@ class Pile(Geometry):
             When each of them moved.
         """
         motion = self.method.motion(cases)
-        if not self.goes_on:
+        if not self.is_sustained:
             return motion
-        return motion.until(*self.loads(cases).going_on())
+        return motion.until(*self.loads(cases).sustained())
 
     @property
-    def goes_on(self) -> bool:
+    def is_sustained(self) -> bool:
         """Whether its grains must go on, not only leave their pockets."""
-        return self.scene.threshold.criterion == GOES_ON
+        return self.scene.threshold.criterion == SUSTAINED
 
     def hops_decide(self, cases: Path) -> BoolArray:
         """Find the counted grains that hopping on holds longer than their pockets.
@@ -199,7 +199,7 @@ class Pile(Geometry):
         BoolArray
             Which they are, shape (N,).
         """
-        further, over = self.loads(cases).going_on()
+        further, over = self.loads(cases).sustained()
         return np.asarray(self.method.motion(cases).flows / over < further)
 
     def thresholds(

@@ -559,7 +559,7 @@ def _of_scene(
     name = str(shared["scene"].iloc[0])
     chart = Figure(figure, ALONE, SCENE_TEXT, (), tornado(largest))
     told = _in_words(name, fraction, theta, ustar0)
-    said = f"{name}; criterion: a grain {'goes on' if base.goes_on else 'leaves'}"
+    said = f"{name}; criterion: {base.scene.threshold.criterion}"
     card = _card(said, fraction, theta, ustar0)
     section = Section("", [card, chart, Paragraphs(told, fold=IN_SENTENCES)])
     return _row(name, theta, ustar0), section

@@ -74,18 +74,18 @@ class Model(NamedTuple):
         The fields of a scene that it sets.
     gust
         Largest over mean stress of its gusts.
-    goes_on
-        Whether grains must go on hopping after the gust. Such a model has no strips,
+    is_sustained
+        Whether grains must hop on after the gust. Such a model has no strips,
         but one grain in closed form.
-    leaves
+    is_entrained
         Whether grains must leave their pockets in the gust.
     """
 
     name: str
     fields: Fields
     gust: float = 1.0
-    goes_on: bool = False
-    leaves: bool = True
+    is_sustained: bool = False
+    is_entrained: bool = True
 
 
 LONE = {"forces.exposure": "protrusion"}
@@ -96,8 +96,8 @@ GUST = peak_over_mean(INTENSITY, EVENTS)
 """Largest over mean stress of the gusts of the models that have gusts."""
 MODELS = (
     Model("paper", {"forces.law": PAPER}),
-    Model("goes on", {}, GUST, goes_on=True, leaves=False),
-    Model("leaves and goes on", {}, GUST, goes_on=True),
+    Model("sustained", {}, GUST, is_sustained=True, is_entrained=False),
+    Model("entrained and sustained", {}, GUST, is_sustained=True),
     Model("bridged", {}),
     Model("bridged, protrusion", LONE),
     Model("balanced", BALANCED),
@@ -195,11 +195,11 @@ def over_hump(stress: WallStress) -> pd.DataFrame:
     )
 
 
-def going_on(
+def sustained(
     beds: pd.DataFrame,
     gust: float,
     *,
-    leaves: bool,
+    is_entrained: bool,
     ratio: float = 30,
 ) -> FloatArray:
     """Find the mean stress from which grains go on after a gust, on measured beds.
@@ -225,7 +225,7 @@ def going_on(
         Shields numbers of the mean flow, of shape (rows,).
     """
     grains = measured_grains(beds, ratio)
-    if not leaves:
+    if not is_entrained:
         return saltation.tabulated(grains).initiation(gust)
     steady = single(beds, "bridged-gravel", 60, ratio).shields
     return Criteria(steady, grains, gust).shields
@@ -335,8 +335,8 @@ def compare_models(
     rows = []
     for model in MODELS:
         cessation = np.full(len(ends), np.nan)
-        if model.goes_on:
-            shields = going_on(beds, model.gust, leaves=model.leaves)
+        if model.is_sustained:
+            shields = sustained(beds, model.gust, is_entrained=model.is_entrained)
             answers = _Answers(np.nan, np.nan, shields, np.nan)
             cessation = ceases
         else:
@@ -489,10 +489,10 @@ Level beds are answered on three poured strips of sand, where a tenth of the exp
 grains has moved, each by its own pivot. `bridged` is the drag and lift of a grain \
 that stands alone, as high as all others; `protrusion` takes its own height over the \
 bed; `balanced` lets the drags on a patch add up to the stress of the flow; gusts are \
-the largest of 100 independent, log-normal stresses of intensity 0.4. `goes on` is the \
-least mean stress at which one grain that has left its pocket keeps hopping after such \
-a gust, in closed form; `leaves and goes on` asks as well that the gust turns it over \
-its neighbour."""
+the largest of 100 independent, log-normal stresses of intensity 0.4. `sustained` is \
+the least mean stress at which one grain that has left its pocket keeps hopping after \
+such a gust, in closed form; `entrained and sustained` asks as well that the gust \
+turns it over its neighbour."""
 SHIELDS_TEXT = """\
 Measured thresholds and those of the models, in water (solid) and in air (dotted). The \
 Galileo number has no threshold in it: both axes are independent."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from orchestrator.calculator import LEAVES
+from orchestrator.calculator import ENTRAINED
 from orchestrator.calculator.table import thresholds
 from orchestrator.fidelity.limits import FROZEN_BED
 from orchestrator.paper.evidence import (
@@ -348,7 +348,7 @@ def above_single(evidence: Evidence) -> Comparisons:
             "gravity": rows["g_m_s2"],
         }
         lists = {name: column.tolist() for name, column in points.items()}
-        exact = thresholds(lists, str(law), LEAVES)
+        exact = thresholds(lists, str(law), ENTRAINED)
         table.loc[rows.index, "single"] = exact["shields"][exact["answer"]]
     table = table.assign(ratio=table["shields"] / table["single"])
     for fraction, rows in parts(table, "fraction"):

@@ -47,8 +47,8 @@ MEASURED = (
 """Columns of what was measured at the Re*; `tables/columns.csv` explains them."""
 TESTED = ("tested_low", "tested_high", "tested_rows", "tested_held")
 """Columns of the interval; `tables/columns.csv` explains them."""
-LEAVES, GOES_ON = "leaves", "goes on"
-"""Criteria: a grain leaves its pocket, or also goes on after a gust."""
+ENTRAINED, SUSTAINED = "entrained", "sustained"
+"""Criteria: a grain leaves its pocket, or its motion is also sustained after a gust."""
 LIQUID, GAS = "liquid", "gas"
 """Media of the tested intervals."""
 GRAINS = Path(__file__).with_name("tested.csv")
@@ -68,9 +68,9 @@ numbers of a strip. So much of its weight may cohesion hold a grain that has non
 LEVEL_DEG = 1.0
 """Steepest slope of a bed that is like those of the flumes, degrees."""
 MOST_SLOPE_DEG = 30.0
-"""Slope to which an interval of grains that go on is given, degrees."""
+"""Slope to which an interval of grains in sustained motion is given, degrees."""
 FRICTION_DEG = (32.0, 50.0)
-"""Friction angles of the slope laws that bound that of grains that go on, degrees."""
+"""Friction angles of the slope laws that bound that of sustained motion, degrees."""
 NO_ROWS = (np.nan, np.nan, np.nan, 0.0)
 """Median, tenth and ninetieth percentile, and count, where nothing was measured."""
 
@@ -320,7 +320,7 @@ def _columns(table: Any) -> dict[str, NDArray[Any]]:
     columns: dict[str, NDArray[Any]] = {
         "medium": np.where(grain.fluid_density < GAS_BELOW, GAS, LIQUID),
         "force_law": np.asarray(table["force_law"], object),
-        "criterion": np.full(grain.shape, LEAVES, object),
+        "criterion": np.full(grain.shape, ENTRAINED, object),
         "reynolds": np.asarray(table["reynolds"], float),
         "density_ratio": grain.density_ratio,
         "alpha_deg": np.asarray(table["alpha_deg"], float),
@@ -329,8 +329,8 @@ def _columns(table: Any) -> dict[str, NDArray[Any]]:
         "cohesion_n_m": np.where(pull_over_weight < LIKE, 0.0, cohesion),
     }
     if "criterion" in table:
-        goes_on = np.asarray(table["criterion"], object) == GOES_ON
-        columns["criterion"] = np.where(goes_on, GOES_ON, LEAVES)
+        is_sustained = np.asarray(table["criterion"], object) == SUSTAINED
+        columns["criterion"] = np.where(is_sustained, SUSTAINED, ENTRAINED)
     for name in OF_STRIPS:
         if name in table:
             words = np.asarray(table[name], object)

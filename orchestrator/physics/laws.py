@@ -203,7 +203,7 @@ class ForceLaw(ABC):
         Name of the drag law, for messages.
     drag_end
         Particle Reynolds number at which the drag law ends.
-    goes_on
+    extended_by
         Name of the law of the same flow whose drag law goes on there; empty for none.
     protrudes
         Whether a grain's own height over the bed matters.
@@ -226,7 +226,7 @@ class ForceLaw(ABC):
     reynolds: ClassVar[tuple[float, float]] = (0.0, np.inf)
     drag_law: ClassVar[str] = "the drag law"
     drag_end: ClassVar[float] = np.inf
-    goes_on: ClassVar[str] = ""
+    extended_by: ClassVar[str] = ""
     protrudes: ClassVar[bool] = False
     in_interval: ClassVar[bool]
 
@@ -480,7 +480,7 @@ class Bridged(DragAndSaffman, in_interval=True):
 
     name = "bridged"
     label = "bridged"
-    goes_on = "bridged-gravel"
+    extended_by = "bridged-gravel"
     reference = MODEL
     protrudes = True
     sphere = SCHILLER_NAUMANN
@@ -506,7 +506,7 @@ class BridgedGravel(Bridged, in_interval=True):
     """
 
     name = "bridged-gravel"
-    goes_on = ""
+    extended_by = ""
     label = "bridged, drag of Clift & Gauvin"
     reference = (
         f"{MODEL}; drag: R. Clift and W. H. Gauvin, Can. J. Chem. Eng. 49, 1971, "
@@ -559,7 +559,7 @@ _EVERY: tuple[ForceLaw, ...] = (
 LAWS: dict[str, ForceLaw] = {each.name: each for each in _EVERY}
 """Every force law by its name."""
 DEFAULT = Bridged.name
-"""The law where none is asked for, up to the end of its drag; then its `goes_on`."""
+"""The law where none is asked for, up to the end of its drag; then `extended_by`."""
 
 
 def law(name: str) -> ForceLaw:

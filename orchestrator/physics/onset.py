@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orchestrator.physics import saltation
-from orchestrator.physics.beside import GOES_ON, LEAVES
+from orchestrator.physics.beside import ENTRAINED, SUSTAINED
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.threshold import Threshold, threshold, why_not
@@ -69,14 +69,14 @@ class Criteria:
         return self._both.goes_on
 
     @property
-    def leaves(self) -> FloatArray:
+    def entrained(self) -> FloatArray:
         """That from which the gust turns each over, or the flow one that cannot hop."""
         return np.where(
             self.can_hop, self.steady / np.asarray(self.peak, float), self.steady
         )
 
     @property
-    def goes_on(self) -> FloatArray:
+    def sustained(self) -> FloatArray:
         """That from which each hops on after the gust; NaN of one that cannot hop."""
         return np.where(self.can_hop, self._usual.initiation(self.peak), np.nan)
 
@@ -100,11 +100,11 @@ class Criteria:
             The Shields numbers, and the criterion that decides.
         """
         return {
-            "shields_leaves": self.leaves,
-            "shields_goes_on": self.goes_on,
-            "shields_goes_on_high": self.at_most,
+            "shields_entrained": self.entrained,
+            "shields_sustained": self.sustained,
+            "shields_sustained_high": self.at_most,
             "shields_cessation": self.cessation,
-            "decides": np.where(self.hops_decide, GOES_ON, LEAVES).astype(object),
+            "decides": np.where(self.hops_decide, SUSTAINED, ENTRAINED).astype(object),
         }
 
 
@@ -156,7 +156,7 @@ class Onset:
 def of_grains(
     grain: Grain,
     law: str,
-    criterion: str = LEAVES,
+    criterion: str = ENTRAINED,
     gust: ArrayLike = np.nan,
 ) -> Onset:
     """Find the thresholds of single grains by a force law and a criterion.
@@ -168,7 +168,7 @@ def of_grains(
     law
         Name of the force law.
     criterion
-        What a grain must do: `LEAVES` or `GOES_ON`.
+        What a grain must do: `ENTRAINED` or `SUSTAINED`.
     gust
         Largest over mean stress of the gusts of the flow. Without gusts, NaN, a grain
         that leaves does so in the steady flow, and one that goes on leaves in a gust of
@@ -189,7 +189,7 @@ def of_grains(
     ...     viscosity=1e-6,
     ...     entrainment_angle_deg=60.0,
     ... )
-    >>> for criterion in (LEAVES, GOES_ON):
+    >>> for criterion in (ENTRAINED, SUSTAINED):
     ...     at = of_grains(sand, "bridged", criterion)
     ...     print(at.shields.round(4), at.valid)
     [0.0242] [ True]
@@ -203,13 +203,13 @@ def of_grains(
     ustar = leaving.friction_velocity / np.sqrt(peak)
     criteria = None
     valid = leaving.valid
-    if criterion == GOES_ON:
+    if criterion == SUSTAINED:
         peak = np.where(has_gust, gust, saltation.PEAK)
         criteria = Criteria(leaving.shields, grain, peak)
         shields = criteria.shields
         ustar = grain.ustar_at(shields)
         peak = np.where(criteria.can_hop, peak, 1.0)
-        valid = valid & (~criteria.can_hop | np.isfinite(criteria.goes_on))
+        valid = valid & (~criteria.can_hop | np.isfinite(criteria.sustained))
     with np.errstate(invalid="ignore"):
         in_gust = ustar * np.sqrt(peak)
         return Onset(
@@ -251,9 +251,9 @@ def against_law(
     law = LAWS[name]
     texts = why_not(law, ustar, grain, lifts=lifts)
     further = np.zeros(len(ustar), bool)
-    if law.goes_on:
-        further = LAWS[law.goes_on].valid(ustar, grain)
-    remedy = f'choose forces.law = "{law.goes_on}"'
+    if law.extended_by:
+        further = LAWS[law.extended_by].valid(ustar, grain)
+    remedy = f'choose forces.law = "{law.extended_by}"'
     found = []
     for place, of_grain in enumerate(texts):
         helps = remedy if further[place] else ""

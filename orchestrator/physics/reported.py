@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orchestrator.physics.beside import GOES_ON
+from orchestrator.physics.beside import SUSTAINED
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.types import BoolArray, FloatArray
@@ -229,7 +229,7 @@ def has_no_law(table: Any, count: int) -> BoolArray:
     """
     if "decides" not in table:
         return np.zeros(count, bool)
-    return np.asarray(np.asarray(table["decides"], object) == GOES_ON)
+    return np.asarray(np.asarray(table["decides"], object) == SUSTAINED)
 
 
 def measured(

@@ -1,4 +1,4 @@
-"""Grains that go on: when a grain that has left its pocket keeps hopping over the bed.
+"""Sustained motion: when a grain that has left its pocket keeps hopping over the bed.
 
 A grain hops over a bed of equal grains, under a flow with the profile
 `velocity.law_of_the_wall`: the drag acts on its speed relative to the fluid, the added
@@ -728,7 +728,7 @@ def thresholds(
     rebound: Rebound = BEADS,
     steps: int = STEPS,
 ) -> Thresholds:
-    """Find the thresholds of grains that go on, steady and of cessation.
+    """Find the thresholds of grains in sustained motion, steady and of cessation.
 
     Parameters
     ----------

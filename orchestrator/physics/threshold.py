@@ -490,7 +490,7 @@ def default_laws(ustar: ArrayLike, grain: Grain) -> NDArray[np.str_]:
     with np.errstate(invalid="ignore"):  # no flow moves the grain: its u* is infinite
         reynolds = default.particle_reynolds(ustar, grain)
     has_ended = reynolds >= default.drag_end
-    return np.where(has_ended, default.goes_on, default.name)
+    return np.where(has_ended, default.extended_by, default.name)
 
 
 def regime(low: Threshold, high: Threshold) -> NDArray[np.str_]:

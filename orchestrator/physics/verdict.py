@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
 from orchestrator.physics import saltation
-from orchestrator.physics.beside import GOES_ON, LIKE, MOST_COHESION
+from orchestrator.physics.beside import LIKE, MOST_COHESION, SUSTAINED
 from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.velocity import LAMINAR_BELOW, laminar
@@ -88,9 +88,9 @@ def of_grain(row: Mapping[Any, Any], of_law: Iterable[Reason]) -> Iterator[Reaso
 
 def _not_reached(row: Mapping[Any, Any]) -> Reason:
     """Why a single grain has no threshold."""
-    if row.get("criterion") != GOES_ON:
+    if row.get("criterion") != SUSTAINED:
         return Reason("not reached", NOT_REACHED)
-    if math.isinf(row["shields_goes_on"]):
+    if math.isinf(row["shields_sustained"]):
         return Reason("not reached", NO_START)
     return Reason("not known", NO_END)
 
@@ -113,15 +113,15 @@ def of_measurements(row: Mapping[Any, Any], is_closed: bool) -> Iterator[Reason]
     """
     if not math.isfinite(row["reynolds"]):
         return
-    goes_on = row.get("criterion") == GOES_ON
-    if is_closed and goes_on and not row["tested_rows"] > 0:
+    is_sustained = row.get("criterion") == SUSTAINED
+    if is_closed and is_sustained and not row["tested_rows"] > 0:
         at = f"at Re* {row['reynolds']:.3g}"
         what = f"nothing was measured near such grains {at}"
         if row["measured_rows"] > 0:
             # rows of that Re*, but no interval for the angle, z0, slope or densities
             what = f"no interval was tested for beds and densities like these {at}"
         yield Reason("not measured", what)
-    if goes_on:
+    if is_sustained:
         yield from _held_by_cohesion(row)
     # measured are grains among their like
     size = row.get("relative_size")

@@ -20,7 +20,7 @@ from orchestrator.report.results import Results, held, split, valid
 from orchestrator.report.style import Look
 from orchestrator.report.theory import BINS, Going, Line
 from orchestrator.study import fields
-from orchestrator.study.criterion import GOES_ON
+from orchestrator.study.criterion import SUSTAINED
 from orchestrator.tables.facts import needs_run
 from orchestrator.types import BoolArray, FloatArray
 
@@ -47,7 +47,7 @@ SERIES = ("nu_m2_s", "force_law", "regime", SHAPE)
 FIELD_REYNOLDS = (8.8, 13.5)
 """Re* of the sites of `FIELD`."""
 GOING_DASH = (0, (7, 1.2, 1.5, 1.2))
-"""Dash of the curves of grains that go on."""
+"""Dash of the curves of grains in sustained motion."""
 DOTTED = "dotted: the force law does not hold"
 """Label of the part of a curve that is dotted."""
 GAP = np.full((1, 2), np.nan)
@@ -431,14 +431,14 @@ def curves_of(
 ) -> Iterator[Curve]:
     """Make the curves of what is answered, by its criteria.
 
-    Where no curve of grains that go on is known, that of their pockets stands there.
+    Where no curve of sustained motion is known, that of entrainment stands there.
 
     Parameters
     ----------
     lines
-        The closed forms of grains that leave their pockets.
+        The closed forms of grains that are entrained.
     going
-        Those of grains that go on.
+        Those of grains in sustained motion.
     criteria
         The criteria of the answers.
     name
@@ -457,11 +457,11 @@ def curves_of(
         points = np.array([curve.reynolds, curve.tau])
         label = f"{name(curve)}, {theory.GOING}"
         yield Curve(label, colour, GOING_DASH, width, points, curve.holds, ~curve.holds)
-    if going and asked == {GOES_ON}:
+    if going and asked == {SUSTAINED}:
         return
     for line in lines:
         label = name(line)
-        if GOES_ON in asked:
+        if SUSTAINED in asked:
             label = f"{label}, {theory.LEAVING}"
         holds = line.holds(REYNOLDS)
         dotted = line.near(REYNOLDS) & ~holds
@@ -647,7 +647,7 @@ def _curves_of_part(
 ) -> Iterator[Curve]:
     """The closed forms of a panel, in the colours of the laws or of the column `by`."""
     criteria = set(part["criterion"].dropna())
-    going = theory.going_on(part) if GOES_ON in criteria else []
+    going = theory.sustained_curves(part) if SUSTAINED in criteria else []
 
     def name(each: Line | Going) -> str:
         is_told = by == "force_law" or each.law not in theory.PAIR

@@ -9,7 +9,7 @@ from typing import Any
 
 from orchestrator.digits import percent
 from orchestrator.physics import verdict
-from orchestrator.physics.beside import FIELD, GOES_ON, LEVEL_DEG
+from orchestrator.physics.beside import FIELD, LEVEL_DEG, SUSTAINED
 from orchestrator.physics.reported import COUNT, MEASURED, OF_LAWS, SEEDS
 from orchestrator.report.card import Card, Number, Worth, decimals
 from orchestrator.report.subjects import (
@@ -50,13 +50,13 @@ def card(row: Row) -> Card:
     """
     told = quantity(row)
     size = length(float(row["d_m"]))
-    # rows of `threshold` have no column for the criterion, and this one for grains that
-    # go on alone
-    goes_on = row.get("criterion", GOES_ON) == GOES_ON
+    # rows of `threshold` have no column for the criterion, and this one for
+    # sustained motion alone
+    is_sustained = row.get("criterion", SUSTAINED) == SUSTAINED
     is_decided = isinstance(row.get("decides"), str)
     ending = ""
-    if goes_on and is_decided:
-        ending = " and go on"
+    if is_sustained and is_decided:
+        ending = " and keep moving"
     return Card(
         f"At which {told.flow} does a grain of {size} start to move{ending}?",
         _scene_of_grain(row),

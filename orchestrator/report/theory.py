@@ -27,7 +27,7 @@ from orchestrator.report import labels
 from orchestrator.report.page import caption
 from orchestrator.report.results import Results, split
 from orchestrator.report.subjects import fluid
-from orchestrator.study.criterion import GOES_ON
+from orchestrator.study.criterion import SUSTAINED
 from orchestrator.types import BoolArray, FloatArray
 
 PAIR = LAWS_OF["transition"]
@@ -82,12 +82,12 @@ OF_GOING_ON = (
     "g_m_s2",
     "cohesion_n_m",
 )
-"""Columns that set curves of grains that go on apart."""
+"""Columns that set curves of grains in sustained motion apart."""
 SIZES, BESIDE = 25, 4.0
 """Sizes of such a curve, and how far it reaches beyond those of a study, times."""
 MOST_FLUIDS = 3
 """Fluids up to which each has an entry of its own in a legend."""
-GOING, LEAVING = "grains that go on", "grains that leave their pockets"
+GOING, LEAVING = "sustained motion", "entrainment"
 """What lines are of, by the criterion."""
 BAGNOLD_FROM = 3.5  # Bagnold's A is 0.1 above this Re* only; it rises below
 GAS_RATIO = (
@@ -339,7 +339,7 @@ class Line:
 
 
 class Going(NamedTuple):
-    """The thresholds of grains that go on, over sizes of one kind of grain in a fluid.
+    """The thresholds of sustained motion, over sizes of one kind of grain in a fluid.
 
     Attributes
     ----------
@@ -359,7 +359,7 @@ class Going(NamedTuple):
     holds: BoolArray
 
 
-def going_on(rows: pd.DataFrame) -> list[Going]:
+def sustained_curves(rows: pd.DataFrame) -> list[Going]:
     """Find the curves of the grains among some answers that have to go on.
 
     Unlike the closed form of a pocket they depend on the grains and the fluid, and not
@@ -377,7 +377,7 @@ def going_on(rows: pd.DataFrame) -> list[Going]:
         take seconds each.
     """
     found = []
-    rows = rows[rows["criterion"] == GOES_ON]
+    rows = rows[rows["criterion"] == SUSTAINED]
     fluids = rows[["rho_f_kg_m3", "nu_m2_s"]].drop_duplicates()
     for _, group in split(rows, *OF_GOING_ON):
         first = group.iloc[0]
@@ -388,7 +388,7 @@ def going_on(rows: pd.DataFrame) -> list[Going]:
         if here.empty:
             continue
         grains = Grain.of_table(here)
-        at = of_grains(grains, str(first["force_law"]), GOES_ON, first["gust"])
+        at = of_grains(grains, str(first["force_law"]), SUSTAINED, first["gust"])
         bed = Bed._make(first[BED].tolist())
         line = Line(str(first["force_law"]), bed, np.inf, 0.0)
         within = ""
@@ -627,7 +627,7 @@ def section(results: Results) -> dict[str, Any] | None:
     """
     listed = ranked(results)
     answers = results.joined("single_grain")
-    if not listed or (len(answers) and (answers["criterion"] == GOES_ON).all()):
+    if not listed or (len(answers) and (answers["criterion"] == SUSTAINED).all()):
         return None
     return {
         "source": MEASURED_SOURCE,

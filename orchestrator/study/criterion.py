@@ -15,15 +15,15 @@ from orchestrator.physics.grain import Grain
 from orchestrator.physics.onset import Criteria
 from orchestrator.study.closed_form import closed_form, single_grain
 from orchestrator.study.parts import GrainBed
-from orchestrator.study.question import why_not_going_on
+from orchestrator.study.question import why_not_sustained
 from orchestrator.study.scene import Scene
 from orchestrator.types import BoolArray, FloatArray
 
-LEAVES, GOES_ON, AUTO = "leaves", "goes on", "auto"
+ENTRAINED, SUSTAINED, AUTO = "entrained", "sustained", "auto"
 """Words of the field `threshold.criterion`."""
 
 
-def goes_on(scene: Scene) -> bool:
+def is_sustained(scene: Scene) -> bool:
     """Tell whether the grains of a scene must go on, not only leave their pockets.
 
     Parameters
@@ -40,13 +40,13 @@ def goes_on(scene: Scene) -> bool:
     """
     criterion = scene.threshold.criterion
     if criterion != AUTO:
-        return criterion == GOES_ON
+        return criterion == SUSTAINED
     if scene.flow.gusts is not None or _is_single_by_dem(scene):
         return False
     if scene.fluid.is_paper or scene.grain.sizes is not None:
         return False
     is_alone = scene.forces.sheltering != "balanced"
-    return is_alone and not why_not_going_on(scene)
+    return is_alone and not why_not_sustained(scene)
 
 
 def _is_single_by_dem(scene: Scene) -> bool:

@@ -116,7 +116,7 @@ class Dem(ThresholdMethod):
     def misfit(self, question: Question) -> UnfitError | None:
         """Say which force or motion the solver has no term for."""
         is_single = isinstance(question.bed, GrainBed)
-        if is_single and question.threshold.criterion == "goes on":
+        if is_single and question.threshold.criterion == "sustained":
             what = "DEM of single grains knows no hops"
             return UnfitError("threshold.criterion", what, LEFT_OPEN_METHOD)
         if question.grain.cohesion > 0:

@@ -34,7 +34,8 @@ from orchestrator.types import FloatArray
 
 LAW_LABELS = {
     "auto": (
-        f"{DEFAULT}, or {LAWS[DEFAULT].goes_on} where the drag law of {DEFAULT} ends"
+        f"{DEFAULT}, or {LAWS[DEFAULT].extended_by} where the drag law of {DEFAULT} "
+        "ends"
     ),
     "paper": "Eq. 2 or Eq. 4 where each holds, both in the transition",
     **{name: law.label for name, law in LAWS.items()},
@@ -116,9 +117,10 @@ class Fluid(Part):
     "paper", the paper's gas of 1 kg/m³ and 1e-5 m²/s, which is no air of 15 °C.
 
     In the paper's gas a grain has moved when it has left its pocket; in all other
-    fluids, whatever their numbers, when it also goes on (`threshold.criterion`). A file
-    that gives neither a kind nor a density nor a viscosity is of the paper's gas. One
-    that gives a number has a fluid by its numbers, unless it writes "paper" as well.
+    fluids, whatever their numbers, when it also keeps moving (`threshold.criterion`).
+    A file that gives neither a kind nor a density nor a viscosity is of the paper's
+    gas. One that gives a number has a fluid by its numbers, unless it writes "paper" as
+    well.
     """
 
     kind: Literal["paper"] | None = field(None, column="fluid")
@@ -559,13 +561,13 @@ class Threshold(Part):
         le=0.5,
     )
     """displacement along the bed from which a grain counts as moved"""
-    criterion: Literal["auto", "leaves", "goes on"] = field("auto")
+    criterion: Literal["auto", "entrained", "sustained"] = field("auto")
     """what a grain must do
-    - auto: leaves in the paper's gas (`fluid.kind`); in every other fluid goes on, or
-      leaves where a field of the scene rules hops out: a mixture, gusts, shared stress,
-      a bed that changes, the laws of the paper, a single grain by DEM
-    - leaves: leave its pocket in the flow, as in the paper
-    - goes on: leave it in a gust of 2.28 times the mean stress, and hop on after it"""
+    - auto: entrained in the paper's gas (`fluid.kind`); in every other fluid sustained,
+      or entrained where a field of the scene rules hops out: a mixture, gusts, shared
+      stress, a bed that changes, the laws of the paper, a single grain by DEM
+    - entrained: leave its pocket in the flow, as in the paper
+    - sustained: leave it in a gust of 2.28 times the mean stress, and hop on after"""
     fractions: Annotated[tuple[Fraction, ...], List] = _pile(
         (0.1, 0.3, 0.5, 0.7), symbol="n/N", column="-", min_length=1
     )

@@ -192,8 +192,8 @@ def check(question: Question) -> None:
         _check_single_grain(question)
 
 
-def why_not_going_on(question: Question) -> str:
-    """Say why grains that go on are not known for a question.
+def why_not_sustained(question: Question) -> str:
+    """Say why grains in sustained motion are not known for a question.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ def why_not_going_on(question: Question) -> str:
     """
     law = question.forces.law
     if law in (PAPER, *LAWS_OF["transition"]):
-        return f"the law {law} is of grains that leave their pockets"
+        return f"the law {law} is one of entrainment alone"
     if question.threshold.update > 0:
         return (
             "on a bed that changes (threshold.update) stress and slope of a grain "
@@ -217,11 +217,11 @@ def why_not_going_on(question: Question) -> str:
 
 
 def _check_criterion(question: Question) -> None:
-    if question.threshold.criterion != "goes on":
+    if question.threshold.criterion != "sustained":
         return
-    what = why_not_going_on(question)
+    what = why_not_sustained(question)
     if what:
-        raise UnfitError("threshold.criterion", what, 'choose "leaves"')
+        raise UnfitError("threshold.criterion", what, 'choose "entrained"')
 
 
 def _check_sizes(mixture: Sizes, diameter: float) -> None:

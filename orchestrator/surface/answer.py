@@ -20,7 +20,7 @@ from orchestrator.surface.stress import SurfaceStress
 from orchestrator.types import FloatArray
 
 MOVES = "wind_m_s"
-LEAVES, GOES_ON = "wind_leaves_m_s", "wind_goes_on_m_s"
+ENTRAINED, SUSTAINED = "wind_entrained_m_s", "wind_sustained_m_s"
 """Columns of faces: winds in which a grain moves, leaves its pocket, and goes on."""
 RATIO = "ustar_over_ustar0"
 HEAP = "heap"
@@ -28,14 +28,14 @@ HEAP = "heap"
 LEAST, HOURS = "least_wind_m_s", "hours_a_year"
 """Maps of the least wind of all directions, and of the hours a year."""
 STARTS = "starts, m/s"
-FIRST_LEAVES = "first leaves, m/s"
+FIRST_ENTRAINED = "first entrained, m/s"
 """Columns of directions: wind in which motion starts, and the first grains leave."""
 ASKED_SHARES = (0.1, 0.5)
 """Shares of the surface whose winds the answer has."""
 OF_CURRENT = {
     MOVES: "current_m_s",
-    LEAVES: "current_leaves_m_s",
-    GOES_ON: "current_goes_on_m_s",
+    ENTRAINED: "current_entrained_m_s",
+    SUSTAINED: "current_sustained_m_s",
     LEAST: "least_current_m_s",
 }
 """What tables and maps call those columns in a liquid."""
@@ -151,7 +151,7 @@ class Ground:
         DataFrame
             A row for each face: place, area, slope, slope along the wind, angle of the
             stress to the way up the slope, u*/u*_0, and the wind `MOVES`; with the
-            closed form also `LEAVES` and `GOES_ON`, NaN where grains lie loose.
+            closed form also `ENTRAINED` and `SUSTAINED`, NaN where grains lie loose.
         """
         normal, tau = onset.with_fall(
             stress.normal, stress.tau, plane.east, plane.north
@@ -176,20 +176,20 @@ class Ground:
             return pd.DataFrame({**columns, MOVES: self.winds(local, ratio)})
         leaving, going = self._local(slope, heading)
         columns |= {
-            LEAVES: self.winds(leaving, ratio),
-            GOES_ON: self.winds(going, ratio),
+            ENTRAINED: self.winds(leaving, ratio),
+            SUSTAINED: self.winds(going, ratio),
         }
-        columns[MOVES] = columns[GOES_ON] if self.is_natural else columns[LEAVES]
+        columns[MOVES] = columns[SUSTAINED] if self.is_natural else columns[ENTRAINED]
         return pd.DataFrame(columns)
 
     def _local(
         self, slope: FloatArray, heading: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Local u* at which a grain leaves, and goes on, m/s; NaN where it is loose."""
-        leaving = onset.leaves(self.grain, self.law, slope, heading)
+        leaving = onset.entrained(self.grain, self.law, slope, heading)
         check_known(leaving, self.law)
         is_loose = leaving == 0
-        going = onset.goes_on(self.grain, leaving, slope, heading)
+        going = onset.sustained(self.grain, leaving, slope, heading)
         return np.where(is_loose, np.nan, leaving), np.where(is_loose, np.nan, going)
 
 
@@ -290,14 +290,16 @@ class Direction:
         return self.shares().wind_for(onset.STARTS)
 
     @property
-    def leaves(self) -> float | None:
+    def entrained(self) -> float | None:
         """Wind in which the first grains leave without gusts, m/s; None if that is one.
 
         It is the wind in which motion starts where no grain goes on.
         """
-        if LEAVES not in self.faces or self.faces[LEAVES].equals(self.faces[MOVES]):
+        if ENTRAINED not in self.faces or self.faces[ENTRAINED].equals(
+            self.faces[MOVES]
+        ):
             return None
-        return self.shares(LEAVES).wind_for(onset.STARTS)
+        return self.shares(ENTRAINED).wind_for(onset.STARTS)
 
     @property
     def word(self) -> str:
@@ -328,10 +330,10 @@ class Direction:
         }
         for share in ASKED_SHARES:
             row[_of(share)] = shares.wind_for(share)
-        if LEAVES in self.faces:
-            leaving = self.shares(LEAVES)
-            row[FIRST_LEAVES] = leaving.wind_for(onset.STARTS)
-            row["half leaves, m/s"] = leaving.wind_for(0.5)
+        if ENTRAINED in self.faces:
+            leaving = self.shares(ENTRAINED)
+            row[FIRST_ENTRAINED] = leaving.wind_for(onset.STARTS)
+            row["half entrained, m/s"] = leaving.wind_for(0.5)
         area = self.faces["area_m2"]
         ratio = self.faces[RATIO]
         row["mean u*/u*₀"] = float(np.average(ratio, weights=area))
@@ -396,7 +398,9 @@ class Answer:
         """The maps by name: of each direction, the least wind of all, and hours."""
         found = {}
         for each in self.directions:
-            columns = [c for c in (RATIO, MOVES, LEAVES, GOES_ON) if c in each.every]
+            columns = [
+                c for c in (RATIO, MOVES, ENTRAINED, SUSTAINED) if c in each.every
+            ]
             for column, values in self.grid.of_faces(each.every, columns).items():
                 found[f"{column}-{each.word}"] = values
         winds = [found[f"{MOVES}-{each.word}"] for each in self.directions]

@@ -271,11 +271,11 @@ def sentences(answer: Answer, source: str) -> Iterator[str]:
             f"From {last.from_deg:g}° motion starts at {last.starts:.3g} m/s, "
             f"of the {len(answer.directions)} directions the highest{tied}."
         )
-    leaves = first.leaves
-    if leaves is not None:
+    entrained = first.entrained
+    if entrained is not None:
         yield (
-            "Motion is that of grains that leave in a gust and go on after it; "
-            f"without gusts grains leave their pockets at {leaves:.3g} m/s."
+            "Motion is sustained: a gust entrains a grain, which moves on after it; "
+            f"without gusts grains are entrained at {entrained:.3g} m/s."
         )
     said = "; ".join(answer.smooth.said)
     yield f"The surface is {said}: {answer.smooth.relief:.4g} m high in the flow."

@@ -314,7 +314,7 @@ def shares(
     for label, moving, leaving, colour in curves:
         ax.plot(winds, 100 * moving, color=colour, label="moves")
         if len(leaving):
-            words = "grains leave their pockets without a gust"
+            words = "entrained without a gust"
             ax.plot(winds, 100 * leaving, color=colour, ls="--", label=words)
         colours.append(style.entry(label, colour))
     ax.set(xlim=(0, float(winds[-1])), ylim=(0, 100))

@@ -112,7 +112,7 @@ def with_fall(
     return turned / np.linalg.norm(turned, axis=1)[:, None], lifted
 
 
-def leaves(
+def entrained(
     grain: Grain, law: str, slope_deg: FloatArray, heading_deg: FloatArray
 ) -> FloatArray:
     """Find the local friction velocity at which a grain leaves its pocket on each face.
@@ -135,7 +135,7 @@ def leaves(
     return threshold_across(LAWS[law], on_face, heading_deg)
 
 
-def goes_on(
+def sustained(
     grain: Grain,
     leaving: FloatArray,
     slope_deg: FloatArray,

@@ -31,9 +31,9 @@ from orchestrator.study.scene import (
 )
 from orchestrator.surface import cards, maps
 from orchestrator.surface.answer import (
+    ENTRAINED,
     HOURS,
     LEAST,
-    LEAVES,
     MOVES,
     RATIO,
     Answer,
@@ -452,7 +452,7 @@ def _curves(answer: Answer) -> Canvas:
     for number, each in enumerate(answer.directions):
         colour = to_hex(colormaps["turbo"](0.08 + 0.84 * number / (count - 1)))
         leaving = np.array([])
-        if LEAVES in each.faces and answer.ground.is_natural:
-            leaving = each.shares(LEAVES).at(winds)
+        if ENTRAINED in each.faces and answer.ground.is_natural:
+            leaving = each.shares(ENTRAINED).at(winds)
         drawn.append((each.title, each.shares().at(winds), leaving, colour))
     return maps.shares(drawn, winds, answer.ground.stream.at)

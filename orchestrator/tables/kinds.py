@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.physics.beside import GOES_ON, GRAIN, STRIP
+from orchestrator.physics.beside import GRAIN, STRIP, SUSTAINED
 from orchestrator.study.methods import METHODS
 from orchestrator.study.shapes import SHAPES
 
@@ -78,7 +78,7 @@ def _is_alone(row: Mapping[str, Any]) -> bool:
     They do where no grains are packed, in the closed form. Equal grains in rows do
     where going on holds them longest, or where the row does not hold its first grain.
     """
-    if row.get("criterion") != GOES_ON:
+    if row.get("criterion") != SUSTAINED:
         return False
     if not METHODS[row["method"]].packs_grains:
         return True
@@ -86,13 +86,13 @@ def _is_alone(row: Mapping[str, Any]) -> bool:
         return False
     held = row.get("row_hold")
     is_free = held is not None and held < ROW_HOLD
-    return is_free or row.get("decides") == GOES_ON
+    return is_free or row.get("decides") == SUSTAINED
 
 
 def _is_strip(row: Mapping[str, Any]) -> bool:
     """Whether a bed is a level strip like those tested, all of whose grains count."""
     # the strips that were tested have grains that leave
-    if row.get("criterion") == GOES_ON:
+    if row.get("criterion") == SUSTAINED:
         return False
     # a profile and obstacles have a text
     is_level = SHAPES[row["bed_shape"]].is_level

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from orchestrator.physics.beside import LEAVES, measured_level_ustar
+from orchestrator.physics.beside import ENTRAINED, measured_level_ustar
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.onset import of_grains
@@ -307,7 +307,7 @@ def of_rows(rows: pd.DataFrame) -> dict[str, Any]:
         "leaving": np.full(len(rows), np.nan),
         "holds": np.zeros(len(rows), bool),
     }
-    criteria = np.full(len(rows), LEAVES, object)
+    criteria = np.full(len(rows), ENTRAINED, object)
     if "criterion" in rows:
         criteria = rows["criterion"].to_numpy(object)
     gust = np.full(len(rows), np.nan)

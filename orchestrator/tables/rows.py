@@ -23,7 +23,7 @@ from orchestrator.physics.velocity import outer_roughness
 from orchestrator.plan import Plan
 from orchestrator.study import fields
 from orchestrator.study.closed_form import closed_form, law_holds
-from orchestrator.study.criterion import GOES_ON, LEAVES, of_single_grain
+from orchestrator.study.criterion import ENTRAINED, SUSTAINED, of_single_grain
 from orchestrator.study.declare import UnfitError
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study, changed
@@ -44,12 +44,12 @@ SMOOTHED = {
 }
 """Columns of the flow at which motion starts, by the factor of `smoothing.compared`."""
 ALONE: Row = {
-    "criterion": LEAVES,
-    "shields_leaves": nan,
-    "shields_goes_on": nan,
-    "shields_goes_on_high": nan,
+    "criterion": ENTRAINED,
+    "shields_entrained": nan,
+    "shields_sustained": nan,
+    "shields_sustained_high": nan,
     "shields_cessation": nan,
-    "decides": LEAVES,
+    "decides": ENTRAINED,
 }
 """Columns of the criterion of a single grain that only leaves its pocket."""
 SPEEDS = ("wind_1m_m_s", "wind_10m_m_s", "current_1m_m_s", "mean_velocity_m_s")
@@ -190,9 +190,9 @@ def single_grain(
         ustar = float(exact.friction_velocity)
         shields = float(exact.shields)
         of_criterion = {**ALONE}
-        if scene.threshold.criterion == GOES_ON:
+        if scene.threshold.criterion == SUSTAINED:
             both = of_single_grain(scene)
-            of_criterion = {"criterion": GOES_ON}
+            of_criterion = {"criterion": SUSTAINED}
             for column, (value,) in both.columns().items():
                 of_criterion[column] = value
             ratio = float(both.shields[0]) / shields
@@ -481,9 +481,9 @@ def pile_grain(answer: Answer) -> Row:
         "mode": np.array(MODES)[motion.mode],
         "ustar0_m_s": threshold.of_grains(motion).value,
     }
-    if pile.goes_on:
+    if pile.is_sustained:
         by_hops = pile.hops_decide(answer.cases)
-        columns["decides"] = np.where(by_hops, GOES_ON, LEAVES)
+        columns["decides"] = np.where(by_hops, SUSTAINED, ENTRAINED)
     if pile.pouring:
         columns["size_over_d"] = packing.sizes[counted]
         columns["pivot_deg"] = pile.pivot_angles_deg
@@ -621,11 +621,11 @@ def _first_interval(answer: Answer, error: float | None) -> tuple[float, float]:
 
 def _decided(answer: Answer) -> Row:
     """The column of which criterion held most of the counted grains longer."""
-    if not answer.pile.goes_on:
-        return {"criterion": LEAVES, "decides": LEAVES}
+    if not answer.pile.is_sustained:
+        return {"criterion": ENTRAINED, "decides": ENTRAINED}
     by_hops = answer.pile.hops_decide(answer.cases)
-    decides = GOES_ON if by_hops.mean() > 0.5 else LEAVES
-    return {"criterion": GOES_ON, "decides": decides}
+    decides = SUSTAINED if by_hops.mean() > 0.5 else ENTRAINED
+    return {"criterion": SUSTAINED, "decides": decides}
 
 
 def _needed(fraction: float, count: int) -> int:

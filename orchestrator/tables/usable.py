@@ -9,7 +9,7 @@ import pandas as pd
 from orchestrator.flow.run import SPEED_HEIGHT
 from orchestrator.grains.threshold import within
 from orchestrator.physics import verdict
-from orchestrator.physics.beside import GOES_ON, TESTED_AS, beside
+from orchestrator.physics.beside import SUSTAINED, TESTED_AS, beside
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.onset import against_law
 from orchestrator.physics.threshold import standing_out
@@ -200,8 +200,8 @@ def _against_law(rows: pd.DataFrame, is_pile: bool) -> list[list[Reason]]:
     """
     ustar = np.array(rows["reynolds"] * rows["nu_m2_s"] / rows["d_m"], float)
     if not is_pile and "criterion" in rows:
-        goes_on = (rows["criterion"] == GOES_ON).to_numpy()
-        ustar[goes_on] = of_rows(rows[goes_on])["leaving"]
+        is_sustained = (rows["criterion"] == SUSTAINED).to_numpy()
+        ustar[is_sustained] = of_rows(rows[is_sustained])["leaving"]
     found: list[list[Reason]] = [[] for _ in ustar]
     for name in rows["force_law"].unique():
         places = np.flatnonzero(rows["force_law"] == name)

@@ -211,7 +211,7 @@ def test_export_twice_and_without_liggghts(
         ('bed.packing = "poured"\nbed.width = 5.0', "bed.width"),
         ("threshold.update = 0.1", "threshold.update"),
         ('forces.sheltering = "balanced"', "forces.sheltering"),
-        ('fluid.kind = "water"', 'write threshold.criterion = "leaves"'),
+        ('fluid.kind = "water"', 'write threshold.criterion = "entrained"'),
         ("", "the study is not finished"),
     ],
 )
@@ -237,7 +237,7 @@ axes."grain.diameter" = [5e-4, 2e-3]
 
 
 def test_single_grains_that_no_dem_has_answered_are_exported(tmp_path: Path) -> None:
-    text = GRAINS + 'threshold.criterion = "leaves"\nmethod.kind = "pivot"\n'
+    text = GRAINS + 'threshold.criterion = "entrained"\nmethod.kind = "pivot"\n'
     asked = study.parse(text, name="grains", where="grains.toml")
     pipeline.run(asked, tmp_path / "study", workers=1)
     export(tmp_path / "pack", tmp_path / "study", ())

@@ -90,7 +90,7 @@ def test_a_smooth_bed_has_the_wind_of_a_smooth_wall() -> None:
     """Sand on Mars: u* z0/nu = 0.011, so that z0 is nu/(9 u*) more and the wind 44 m/s, not 55."""
     air = {"fluid_density": [0.02], "viscosity": [5.5e-4], "gravity": [3.71]}
     grain = {"diameter": [1e-4], "density": [3000.0]}
-    table = thresholds({**grain, **air}, criterion="leaves")
+    table = thresholds({**grain, **air}, criterion="entrained")
     mars = {column: values[table["answer"]][0] for column, values in table.items()}
     ustar = mars["ustar_m_s"]
     z0 = 1e-4 / 30 + 5.5e-4 / (9 * ustar)

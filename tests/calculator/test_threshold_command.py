@@ -281,7 +281,7 @@ def test_refusals_are_one_line_that_names_the_option(
 def test_gravel_is_answered_by_a_law_that_holds(run: Run) -> None:
     """The drag law of the law bridged ends at a particle Reynolds number of 1000."""
     gravel = ["--diameter", "0.03", "--density", "2650", "--fluid", "water"]
-    code, out, _ = run(*gravel, "--criterion", "leaves")
+    code, out, _ = run(*gravel, "--criterion", "entrained")
     assert code == 0
     assert out.startswith("At which flow does a grain of 30 mm start to move?")
     assert "19.2 Pa" in out
@@ -301,21 +301,23 @@ def test_gravel_is_answered_by_a_law_that_holds(run: Run) -> None:
 
 def test_grains_that_go_on_have_the_larger_of_two_stresses(run: Run) -> None:
     asked = [*QUARTZ_IN_WATER, "--depth", "1", "--json"]
-    leaves = _json(run(*asked, "--criterion", "leaves"))
-    both = _json(run(*asked, "--criterion", "goes on"))
+    leaves = _json(run(*asked, "--criterion", "entrained"))
+    both = _json(run(*asked, "--criterion", "sustained"))
     for law in LAWS:
         of_law = both[law]
         gust = peak_over_mean(0.4, 100)
-        assert of_law["shields_leaves"] == pytest.approx(leaves[law]["shields"] / gust)
-        larger = max(of_law["shields_leaves"], of_law["shields_goes_on"])
+        assert of_law["shields_entrained"] == pytest.approx(
+            leaves[law]["shields"] / gust
+        )
+        larger = max(of_law["shields_entrained"], of_law["shields_sustained"])
         assert of_law["shields"] == larger
-        decides = "leaves" if larger == of_law["shields_leaves"] else "goes on"
+        decides = "entrained" if larger == of_law["shields_entrained"] else "sustained"
         assert of_law["decides"] == decides
         assert of_law["stress"] == pytest.approx(larger * 1650 * 9.81 * 5e-4)
         assert of_law["friction_velocity"] ** 2 * 1000 == pytest.approx(
             of_law["stress"]
         )
-    # its interval is that of grains that go on, not that of the same law's pivot
+    # its interval is that of grains in sustained motion, not that of the same law's pivot
     assert both["bridged"]["tested_rows"] > 10
     held = [record["bridged"]["tested_low"] for record in (both, leaves)]
     assert held[0] != pytest.approx(held[1], rel=0.01)
@@ -335,7 +337,7 @@ def test_the_interval_of_a_threshold_holds_what_was_measured(run: Run) -> None:
     assert record["wind_speed_10_m"] == pytest.approx(9.3, rel=0.15)
     assert record["tested_rows"] == 11
     assert record["tested_low"] < record["measured_curve"] < record["tested_high"]
-    assert record["shields_goes_on_high"] > record["shields"]
+    assert record["shields_sustained_high"] > record["shields"]
     # on a slope it is wider, on a steep one there is none
     on_slope = _json(run(*sand, "--slope", "15"))["bridged"]
     width = record["tested_high"] / record["tested_low"]
@@ -345,43 +347,43 @@ def test_the_interval_of_a_threshold_holds_what_was_measured(run: Run) -> None:
 def test_a_grain_that_cannot_hop_is_turned_over_by_the_mean_stress(run: Run) -> None:
     silt = ["--diameter", "6e-5", "--density", "2650", "--fluid", "water"]
     found = _json(run(*silt, "--json"))["bridged"]
-    leaves = _json(run(*silt, "--json", "--criterion", "leaves"))["bridged"]
-    assert found["decides"] == "leaves"
-    assert found["shields_goes_on"] is None
+    leaves = _json(run(*silt, "--json", "--criterion", "entrained"))["bridged"]
+    assert found["decides"] == "entrained"
+    assert found["shields_sustained"] is None
     assert found["shields"] == leaves["shields"]
     assert found["valid"]
     assert "such a grain does not hop" in run(*silt)[1]
 
 
 def test_the_papers_rule_has_no_grains_that_go_on(run: Run) -> None:
-    code, _, err = run(*D, "--law", "paper", "--criterion", "goes on")
+    code, _, err = run(*D, "--law", "paper", "--criterion", "sustained")
     assert code == 2
-    assert "--criterion: the law paper is of grains that leave" in err
+    assert "--criterion: the law paper is one of entrainment alone" in err
 
 
 def test_the_forces_on_a_grain_that_goes_on_are_those_of_the_gust(run: Run) -> None:
     # where leaving decides, the grain is turned over by the gust: the forces of its threshold
     sand = ["--diameter", "5e-4", "--density", "2650", "--fluid", "air", "--json"]
-    leaves = _json(run(*sand, "--criterion", "leaves"))["bridged"]
-    both = _json(run(*sand, "--criterion", "goes on"))["bridged"]
-    assert both["decides"] == "leaves"
+    leaves = _json(run(*sand, "--criterion", "entrained"))["bridged"]
+    both = _json(run(*sand, "--criterion", "sustained"))["bridged"]
+    assert both["decides"] == "entrained"
     assert both["drag"] == pytest.approx(leaves["drag"])
     assert both["lift"] == pytest.approx(leaves["lift"])
     assert both["friction_velocity"] < leaves["friction_velocity"]
 
 
 def test_text_says_which_criterion_decides(run: Run) -> None:
-    one = run(*QUARTZ_IN_WATER, "--depth", "1", "--criterion", "goes on")[1]
-    assert "“goes on” decides: of the mean flow" in one
+    one = run(*QUARTZ_IN_WATER, "--depth", "1", "--criterion", "sustained")[1]
+    assert "“sustained” decides: a gust dislodges it" in one
     many = run(
-        "--diameter", RANGE, "--density", "2650", *WATER, "--criterion", "goes on"
+        "--diameter", RANGE, "--density", "2650", *WATER, "--criterion", "sustained"
     )
     head, *rows = many[1].splitlines()[1:7]
-    assert "leaves" in head
+    assert "entrained" in head
     assert "decides" in head
     # grains that do not hop roll
-    assert all("leaves" in row for row in rows[:3])
-    assert all("goes on" in row for row in rows[3:5])
+    assert all("entrained" in row for row in rows[:3])
+    assert all("sustained" in row for row in rows[3:5])
 
 
 def test_a_criterion_that_is_none_and_a_grain_that_never_goes_on_are_refused(
@@ -389,14 +391,14 @@ def test_a_criterion_that_is_none_and_a_grain_that_never_goes_on_are_refused(
 ) -> None:
     code, _, err = run(*D, "--criterion", "gone")
     assert code == 2
-    assert "--criterion: no criterion 'gone' (choose leaves, goes on, auto)" in err
+    assert "--criterion: no criterion 'gone' (choose entrained, sustained, auto)" in err
     # where the largest stress that is tried is too small, it is not reached
     monkeypatch.setattr(saltation, "MOST", 0.1)
     grain = ["--density", "2650", *WATER, "--roughness", "d/5"]
     code, _, err = run(*D, *grain)
     assert code == 2
     assert "not reached" in err
-    assert run(*D, *grain, "--criterion", "leaves")[0] == 0
+    assert run(*D, *grain, "--criterion", "entrained")[0] == 0
     # beside one that goes on it has a reason
     records = _json(run("--diameter", "1e-4:1e-3:2", *grain, "--json"))
     assert records[0]["bridged"]["valid"]

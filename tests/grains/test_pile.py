@@ -315,13 +315,13 @@ def test_grains_of_poured_beds_leave_in_a_gust_and_go_on_by_their_own_sizes(
     cases = results.cases
     fields: dict[str, object] = {
         "forces.sheltering": sheltering,
-        "threshold.criterion": "leaves",
+        "threshold.criterion": "entrained",
     }
     if sheltering == "balanced":
         fields["forces.exposure"] = "protrusion"
     scene = changed(_pile(results, "pivot").scene, fields)
     leaves = Pile(scene, cases).motion(cases).flows
-    pile = Pile(changed(scene, {"threshold.criterion": "goes on"}), cases)
+    pile = Pile(changed(scene, {"threshold.criterion": "sustained"}), cases)
     both = pile.motion(cases).flows
     # the flow at which one grain of each size hops on, over its local friction velocity
     sizes = pile.packing.sizes[pile.packing.windward]

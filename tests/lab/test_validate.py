@@ -154,7 +154,7 @@ UNTESTED: dict[str, Any] = {
     **{"forces.law": "profile", "forces.lift_coefficient": 1.0},
     **{"forces.loaded_grains": "all but crest", "forces.sheltering": "balanced"},
     **{"method.kind": "dem", "threshold.fractions": (0.3,)},
-    **{"threshold.criterion": "goes on"},
+    **{"threshold.criterion": "sustained"},
 }
 """Other values of the fields of a strip for which none was tested."""
 
@@ -233,7 +233,7 @@ def test_the_rows_of_the_wind_tunnel_are_on_their_curve() -> None:
 @pytest.mark.long
 def test_grains_that_go_on_are_as_near_as_the_documents_say() -> None:
     beds = pd.read_csv(validate.FOLDER / "beds.csv")
-    shields = validate.going_on(beds, validate.GUST, leaves=True)
+    shields = validate.sustained(beds, validate.GUST, is_entrained=True)
     rows = beds.assign(model="m", ratio=shields / beds["shields"], sure="read")
     factors = validate.scores(rows).set_index("set")["factor"]
     said = {
@@ -247,7 +247,7 @@ def test_grains_that_go_on_are_as_near_as_the_documents_say() -> None:
     }
     assert factors.to_dict() == pytest.approx(said, rel=0.01)
     # in water a grain that leaves stops with its gust; in air one that leaves goes on
-    alone = validate.going_on(beds, validate.GUST, leaves=False)
+    alone = validate.sustained(beds, validate.GUST, is_entrained=False)
     in_water = beds["rho_f_kg_m3"] > 100
     can_hop = saltation.hops(validate.measured_grains(beds))
     assert (alone[in_water & can_hop] == shields[in_water & can_hop]).mean() > 0.95

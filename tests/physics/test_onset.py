@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from orchestrator.physics import saltation
-from orchestrator.physics.beside import GOES_ON, LEAVES
+from orchestrator.physics.beside import ENTRAINED, SUSTAINED
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.onset import against_law, of_grains
@@ -24,8 +24,8 @@ SAND = Grain(
 
 @pytest.mark.parametrize("law", LAWS)
 def test_a_grain_that_goes_on_needs_the_larger_of_two_mean_stresses(law: str) -> None:
-    leaving = of_grains(SAND, law, LEAVES)
-    both = of_grains(SAND, law, GOES_ON)
+    leaving = of_grains(SAND, law, ENTRAINED)
+    both = of_grains(SAND, law, SUSTAINED)
     assert both.criteria is not None
     can = saltation.hops(SAND)
     assert can.any()
@@ -37,7 +37,7 @@ def test_a_grain_that_goes_on_needs_the_larger_of_two_mean_stresses(law: str) ->
     assert both.shields[~can] == pytest.approx(leaving.shields[~can])
     decides = both.criteria.columns()["decides"]
     is_further = hopping >= leaving.shields / saltation.PEAK
-    assert ((decides == GOES_ON) == (can & is_further)).all()
+    assert ((decides == SUSTAINED) == (can & is_further)).all()
 
 
 def test_gusts_lower_the_mean_stress_and_not_the_forces() -> None:
@@ -50,7 +50,7 @@ def test_gusts_lower_the_mean_stress_and_not_the_forces() -> None:
 
 def test_numbers_of_a_threshold_agree() -> None:
     sloping = SAND.changed(slope_deg=10.0)
-    for criterion in (LEAVES, GOES_ON):
+    for criterion in (ENTRAINED, SUSTAINED):
         at = of_grains(sloping, "bridged", criterion)
         assert sloping.shields(at.friction_velocity) == pytest.approx(at.shields)
         assert sloping.ustar_at(at.shields) == pytest.approx(at.friction_velocity)

@@ -472,7 +472,7 @@ def test_alike_grains_beyond_the_table_are_followed_once(
 
 
 def test_the_table_knows_zero_from_what_is_not_known() -> None:
-    """Its empty nodes were grains that go on in any flow."""
+    """Its empty nodes were grains in sustained motion in any flow."""
     steep = Grain.of_numbers([500.0, 500.0], [1e5, 9e4], slope_deg=[-30.0, -29.0])
     found = tabulated(steep)
     assert np.isfinite([found.steady, found.cessation]).all()

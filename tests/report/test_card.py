@@ -218,7 +218,7 @@ def test_the_answer_of_a_picture_is_that_of_the_card() -> None:
         "force_law": "bridged",
     }
     leaves = answers.by_law(pd.Series(asked))["bridged"][0]
-    by_law = answers.by_law(pd.Series({**asked, "criterion": "goes on"}))
+    by_law = answers.by_law(pd.Series({**asked, "criterion": "sustained"}))
     goes_on, holds = by_law["bridged"]
     steady = thresholds_of("bridged", Grain.of_table(asked))
     assert leaves == pytest.approx(float(steady.friction_velocity))
@@ -236,7 +236,7 @@ def test_labels_of_the_picture_of_a_grain_lie_on_no_points(
     results: Results, measured: float
 ) -> None:
     grain = only(results, "grain").joined("single_grain").iloc[0].copy()
-    # of this roughness the thresholds of grains that go on are tabulated
+    # of this roughness the thresholds of grains in sustained motion are tabulated
     grain["z0_m"] = grain["d_m"] / 30
     ustar = grain["ustar_m_s"]
     columns = in_units(ustar, grain)

@@ -42,7 +42,7 @@ def curves(ax: Axes) -> dict[str, tuple[np.ndarray, np.ndarray]]:
 def test_the_curve_of_grains_that_go_on_passes_through_their_answers(
     number: int, tmp_path: Path
 ) -> None:
-    made = results(tmp_path, '["goes on"]')
+    made = results(tmp_path, '["sustained"]')
     figures = [*overview.draw(made), *one_grain.FIGURE.draw(made)]
     (ax,) = axes_of(figures[number])
     ((name, (x, y)),) = curves(ax).items()
@@ -56,13 +56,13 @@ def test_the_curve_of_grains_that_go_on_passes_through_their_answers(
 
 
 def test_each_criterion_has_a_curve_of_its_own_with_its_name(tmp_path: Path) -> None:
-    made = results(tmp_path, '["leaves", "goes on"]')
+    made = results(tmp_path, '["entrained", "sustained"]')
     (figure,) = overview.draw(made)
     (ax,) = axes_of(figure)
     found = curves(ax)
     assert sorted(name.rpartition(", ")[2] for name in found) == [
-        theory.GOING,
         theory.LEAVING,
+        theory.GOING,
     ]
     assert theory.section(made) is not None
 
@@ -71,8 +71,8 @@ def test_each_criterion_has_a_curve_of_its_own_with_its_name(tmp_path: Path) -> 
 def test_beds_that_no_table_holds_have_the_curve_of_their_pockets(
     tmp_path: Path,
 ) -> None:
-    made = results(tmp_path, '["goes on"]', roughness="d/10")
-    assert theory.going_on(made.joined("single_grain")) == []
+    made = results(tmp_path, '["sustained"]', roughness="d/10")
+    assert theory.sustained_curves(made.joined("single_grain")) == []
     (figure,) = overview.draw(made)
     (ax,) = axes_of(figure)
     (name,) = curves(ax)

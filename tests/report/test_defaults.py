@@ -15,7 +15,7 @@ def _said(packing: str, slope: float) -> tuple[str, bool]:
     text = f"""
         fluid.kind = "air"
         grain = {{ diameter = 1e-3, density = 2650.0 }}
-        threshold.criterion = "leaves"
+        threshold.criterion = "entrained"
         [bed]
         kind = "pile"
         height = 0.01

@@ -32,7 +32,7 @@ DUNE = f"""
 fluid = {{ density = 1.22, viscosity = 1.48e-5 }}
 grain = {{ diameter = 3e-4, density = 2650.0 }}
 bed = {{ kind = "pile", profile = "dune.csv", smoothing = 0.8, roughness = 1e-5 }}
-threshold.criterion = "leaves"
+threshold.criterion = "entrained"
 method.flow.expansion_ratio = 1.2
 [[group]]
 [[group]]
@@ -178,7 +178,7 @@ def test_grains_that_go_on_by_dem_are_drawn_at_the_flows_at_which_they_have_gone
     """The flows of the deck are those at which grains leave, which are other ones."""
     results = small_study.run(tmp_path, LEVEL_BY_DEM)
     pile = next(iter(results.plan.piles.values()))
-    assert pile.goes_on
+    assert pile.is_sustained
     steps = bed.read(pile, results.cases)
     assert len(steps.places) == len(steps.flow) == len(steps.totals)
     assert steps.flow.tolist() == pile.motion(results.cases).flow.tolist()

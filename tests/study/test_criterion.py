@@ -14,7 +14,7 @@ from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.pile_case import PileCase
 from orchestrator.study import study
-from orchestrator.study.criterion import goes_on, of_single_grain
+from orchestrator.study.criterion import is_sustained, of_single_grain
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import changed
 
@@ -29,7 +29,7 @@ width = 6.0
 """
 MIXTURE = f"[grain.sizes]\nsigma_g = 1.3\n{STRIP}"
 SHARING = '[forces]\nexposure = "protrusion"\nsheltering = "balanced"\n'
-BOTH = '[threshold]\ncriterion = "goes on"\n'
+BOTH = '[threshold]\ncriterion = "sustained"\n'
 CURVED = "[bed]\nkind = 'dune'\nslope_deg = 10.0\nwindward = 'curved'\n"
 
 
@@ -46,10 +46,10 @@ def _scene(text: str) -> Scene:
         (SAND + '[fluid]\nkind = "air"\n', True),
         (SAND + "[fluid]\ndensity = 1.2\nviscosity = 1.5e-5\n", True),
         (SAND + WATER + '[method]\nkind = "pivot"\n', True),
-        (SAND + WATER + '[threshold]\ncriterion = "leaves"\n', False),
+        (SAND + WATER + '[threshold]\ncriterion = "entrained"\n', False),
         # a single grain is followed by LIGGGHTS as it leaves
         (SAND + WATER + '[method]\nkind = "dem"\n', False),
-        (SAND + '[threshold]\ncriterion = "goes on"\n', True),
+        (SAND + '[threshold]\ncriterion = "sustained"\n', True),
         (SAND + WATER + '[forces]\nlaw = "paper"\n', False),
         # as `threshold` does: cohesion holds a grain in its pocket, not in its hops
         (SAND + "cohesion = 1e-5\n" + WATER, True),
@@ -65,13 +65,13 @@ def _scene(text: str) -> Scene:
     ],
 )
 def test_fluid_and_forces_decide_where_nothing_is_asked(text: str, does: bool) -> None:
-    assert goes_on(_scene(text)) is does
+    assert is_sustained(_scene(text)) is does
 
 
 @pytest.mark.parametrize(
     ("text", "word"),
     [
-        ('[forces]\nlaw = "low"\n', "the law low is of grains that leave"),
+        ('[forces]\nlaw = "low"\n', "the law low is one of entrainment alone"),
         ('[method]\nkind = "dem"\n', 'method.kind = "pivot"'),
         (
             PILE + "[threshold]\nupdate = 0.1\n",
@@ -91,10 +91,10 @@ def test_cohesion_holds_a_grain_in_its_pocket_but_not_in_its_hops() -> None:
     air = '[fluid]\nkind = "air"\n'
     loose = of_single_grain(_scene(SAND + air))
     sticky = of_single_grain(_scene(SAND + "cohesion = 2e-3\n" + air))
-    assert sticky.goes_on == loose.goes_on
+    assert sticky.sustained == loose.sustained
     assert sticky.cessation == loose.cessation
-    assert sticky.leaves[0] > 2 * loose.leaves[0]
-    assert sticky.shields == sticky.leaves
+    assert sticky.entrained[0] > 2 * loose.entrained[0]
+    assert sticky.shields == sticky.entrained
     assert not sticky.hops_decide[0]
     # and is the answer of `threshold`
     at_once = thresholds(
@@ -121,7 +121,7 @@ def test_what_answers_a_bed_whose_grains_go_on() -> None:
     for bed, method in of_bed.items():
         answer = decide(_scene(SAND + WATER + bed), None)
         assert answer.scene.method.kind == method
-        assert answer.scene.threshold.criterion == "goes on"
+        assert answer.scene.threshold.criterion == "sustained"
         assert answer.asked.threshold.criterion == "auto"
         # in the paper's fluid as before
         before = decide(_scene(SAND + bed), None)
@@ -136,14 +136,14 @@ def test_what_answers_a_bed_whose_grains_go_on() -> None:
 def test_every_method_answers_the_same_question(kind: str) -> None:
     text = SAND + WATER + PILE + f'[method]\nkind = "{kind}"\n'
     answer = decide(_scene(text), None).scene
-    assert answer.threshold.criterion == "goes on"
+    assert answer.threshold.criterion == "sustained"
     if kind != "auto":
         assert answer.method.kind == kind
 
 
 def test_a_run_of_dem_does_not_depend_on_the_criterion() -> None:
     scene = _scene(SAND + WATER + PILE + '[method]\nkind = "dem"\n')
-    other = changed(scene, {"threshold.criterion": "goes on"})
+    other = changed(scene, {"threshold.criterion": "sustained"})
     assert scene.id != other.id
     assert PileCase(scene).parameters == PileCase(other).parameters
 
@@ -179,7 +179,7 @@ def test_sand_on_a_level_bed_is_answered_as_one_grain_and_usable(
     grains = results.tables["single_grain"]
     assert beds["usable"].all()
     assert grains["usable"].all()
-    assert {*beds["decides"]} == {"leaves", "goes on"}
+    assert {*beds["decides"]} == {"entrained", "sustained"}
     for fluid in ("water", "air"):
         at_once = _by_calculator(fluid, sizes)
         gas = fluid == "air"
@@ -209,7 +209,7 @@ def _by_calculator(fluid: str, sizes: list[float]) -> np.ndarray:
 def test_a_criterion_that_is_written_is_answered_as_where_it_is_left_open(
     bed: str, tolerance: str
 ) -> None:
-    asked = ("", '[threshold]\ncriterion = "goes on"\n')
+    asked = ("", '[threshold]\ncriterion = "sustained"\n')
     answers = []
     for threshold in asked:
         text = tolerance + SAND + WATER + bed + threshold
@@ -232,7 +232,7 @@ def _shields_over(axis: str, values: tuple[float, ...], text: str = "") -> np.nd
     found = []
     for scene in made.scenes:
         answer = decide(scene, None).scene
-        assert answer.threshold.criterion == "goes on"
+        assert answer.threshold.criterion == "sustained"
         found.append(float(of_single_grain(answer).shields[0]))
     return np.array(found)
 
@@ -243,7 +243,7 @@ def test_no_number_of_the_fluid_switches_the_criterion() -> None:
     # 1 % of viscosity moves the threshold by no more
     assert np.abs(np.diff(np.log(shields))).max() < 0.01
     # and so says `threshold`, row by row
-    for criterion in ("auto", "goes on"):
+    for criterion in ("auto", "sustained"):
         rows = orchestrator.threshold(
             3.5e-4, density=2650.0, viscosity=BY_NUMBERS, criterion=criterion
         )
@@ -265,21 +265,21 @@ PAPER_GAS = '[fluid]\nkind = "paper"\n'
 @pytest.mark.parametrize(
     ("fluid", "criterion"),
     [
-        ("", "leaves"),
-        (PAPER_GAS, "leaves"),
-        (PAPER_GAS + "viscosity = 1e-3\n", "leaves"),
-        ("[fluid]\ngravity = 3.71\n", "leaves"),
-        ("[fluid]\nviscosity = 1e-5\n", "goes on"),
-        ("[fluid]\ndensity = 1.0\n", "goes on"),
-        ("[fluid]\ndensity = 1.0\nviscosity = 1e-5\n", "goes on"),
+        ("", "entrained"),
+        (PAPER_GAS, "entrained"),
+        (PAPER_GAS + "viscosity = 1e-3\n", "entrained"),
+        ("[fluid]\ngravity = 3.71\n", "entrained"),
+        ("[fluid]\nviscosity = 1e-5\n", "sustained"),
+        ("[fluid]\ndensity = 1.0\n", "sustained"),
+        ("[fluid]\ndensity = 1.0\nviscosity = 1e-5\n", "sustained"),
     ],
 )
 def test_the_word_of_the_fluid_decides(fluid: str, criterion: str) -> None:
     scene = _scene(SAND + fluid)
-    assert goes_on(scene) is (criterion == "goes on")
+    assert is_sustained(scene) is (criterion == "sustained")
     # a field that is changed leaves the fluid what it is
     other = changed(scene, {"fluid.viscosity": 2e-5})
-    assert goes_on(other) is goes_on(scene)
+    assert is_sustained(other) is is_sustained(scene)
     table = dict(scene.fluid)
     rows = orchestrator.threshold(
         3.5e-4,
@@ -289,7 +289,7 @@ def test_the_word_of_the_fluid_decides(fluid: str, criterion: str) -> None:
         viscosity=table["viscosity"],
         gravity=table["gravity"],
     )
-    assert ("decides" in rows) is (criterion == "goes on")
+    assert ("decides" in rows) is (criterion == "sustained")
 
 
 def test_the_papers_gas_by_its_word_is_that_without_a_fluid() -> None:
@@ -307,7 +307,7 @@ def test_the_papers_gas_by_its_word_is_that_without_a_fluid() -> None:
 def test_a_law_has_one_criterion_in_a_study_and_in_threshold(law: str) -> None:
     scene = _scene(f'{SAND}{WATER}[forces]\nlaw = "{law}"\n')
     rows = orchestrator.threshold(3.5e-4, density=2650.0, fluid="water", law=law)
-    assert ("decides" in rows) is goes_on(scene)
+    assert ("decides" in rows) is is_sustained(scene)
 
 
 def test_steeper_lee_slopes_of_dry_sand_move_earlier(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ QUARTZ = {
     "fluid.density": 1000.0,
     "fluid.viscosity": 1e-6,
     "bed.roughness": 1e-4,
-    "threshold.criterion": "leaves",
+    "threshold.criterion": "entrained",
 }
 PILE: Asked = {**QUARTZ, "bed.kind": "pile", "bed.height": 8e-3}
 SLOPE: Asked = {"bed.slope_deg": 20.0}

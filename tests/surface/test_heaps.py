@@ -137,7 +137,7 @@ def test_grains_feel_the_fall_that_the_flow_does_not(tmp_path: Path) -> None:
     slopes = other["slope_deg"][is_flat]
     assert slopes.to_numpy() == pytest.approx(np.degrees(np.arctan(0.05)), abs=0.1)
     assert other["heading_deg"][is_flat].to_numpy() == pytest.approx(180.0, abs=3)
-    ratio = other["wind_leaves_m_s"][is_flat] / one["wind_leaves_m_s"][is_flat]
+    ratio = other["wind_entrained_m_s"][is_flat] / one["wind_entrained_m_s"][is_flat]
     # straight down a slope b: sqrt(sin(p - b) / sin p), with p of 40 deg
     by_hand = np.sqrt(np.sin(radians(40) - np.arctan(0.05)) / np.sin(radians(40)))
     assert ratio.to_numpy() == pytest.approx(by_hand, abs=0.01)

@@ -47,7 +47,7 @@ def test_slope_and_heading_come_back_from_vectors(
 def test_a_level_face_has_the_threshold_of_a_level_bed() -> None:
     level = np.zeros(1)
     exact = thresholds_of("bridged", SAND)
-    found = onset.leaves(SAND, "bridged", level, level + 90.0)
+    found = onset.entrained(SAND, "bridged", level, level + 90.0)
     assert found[0] == pytest.approx(float(exact.friction_velocity), rel=1e-12)
 
 
@@ -55,8 +55,8 @@ def test_grains_go_on_by_the_slope_along_the_stress() -> None:
     slopes = np.array([20.0, 20.0, 20.0])
     headings = np.array([0.0, 90.0, 180.0])
     excess = (SAND.density / SAND.fluid_density - 1) * 9.81 * SAND.diameter
-    leaving = onset.leaves(SAND, "bridged", slopes, headings)
-    found = onset.goes_on(SAND, leaving, slopes, headings)
+    leaving = onset.entrained(SAND, "bridged", slopes, headings)
+    found = onset.sustained(SAND, leaving, slopes, headings)
     grains = SAND.changed(slope_deg=[20.0, 0.0, -20.0])
     going = saltation.tabulated(grains).initiation(saltation.PEAK)
     # the gust must turn the grain over its neighbours, and it must go on after that
@@ -69,8 +69,8 @@ def test_a_grain_that_cannot_hop_has_no_gust() -> None:
         diameter=1e-4, roughness=3e-6, fluid_density=1000.0, viscosity=1e-6
     )
     slopes = np.array([0.0, 20.0])
-    leaving = onset.leaves(silt, "bridged", slopes, slopes)
-    assert onset.goes_on(silt, leaving, slopes, slopes) == pytest.approx(leaving)
+    leaving = onset.entrained(silt, "bridged", slopes, slopes)
+    assert onset.sustained(silt, leaving, slopes, slopes) == pytest.approx(leaving)
 
 
 def test_a_face_without_stress_never_moves() -> None:

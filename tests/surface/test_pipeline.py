@@ -83,11 +83,11 @@ def test_each_face_moves_by_the_closed_form(folder: Path, faces: pd.DataFrame) -
     (scene,) = study.scenes
     row = faces.iloc[len(faces) // 3]
     slope, heading = np.array([row["slope_deg"]]), np.array([row["heading_deg"]])
-    local = onset.leaves(scene.grain_in_pocket, "bridged", slope, heading)[0]
+    local = onset.entrained(scene.grain_in_pocket, "bridged", slope, heading)[0]
     wind = onset.wind_of(local / row["ustar_over_ustar0"], 0.005)
-    assert row["wind_leaves_m_s"] == pytest.approx(float(wind), rel=1e-6)
-    # air is a natural fluid: motion is that of grains that go on
-    assert row["wind_m_s"] == row["wind_goes_on_m_s"]
+    assert row["wind_entrained_m_s"] == pytest.approx(float(wind), rel=1e-6)
+    # air is a natural fluid: motion is that of grains in sustained motion
+    assert row["wind_m_s"] == row["wind_sustained_m_s"]
 
 
 def test_motion_starts_where_the_answer_says(
@@ -221,10 +221,10 @@ def test_in_water_the_answer_is_a_current(
     grain = study.scenes[0].grain_in_pocket
     row = every[every["z_m"] > 5].iloc[3]
     slope, heading = np.array([row["slope_deg"]]), np.array([row["heading_deg"]])
-    local = onset.leaves(grain, "bridged", slope, heading)[0]
+    local = onset.entrained(grain, "bridged", slope, heading)[0]
     # the law begins at 0 on the ground
     current = local / row["ustar_over_ustar0"] * np.log1p(1 / 0.005) / KARMAN
-    assert row["current_leaves_m_s"] == pytest.approx(current, rel=1e-4)
+    assert row["current_entrained_m_s"] == pytest.approx(current, rel=1e-4)
     assert (out / "maps" / "1-current_m_s-270.tif").is_file()
     assert not list((out / "maps").glob("*wind*"))
     page = (out / "report.html").read_text(encoding="utf-8")

@@ -21,7 +21,7 @@ FLUIDS = {
     "air": 'fluid.kind = "air"',
     "water, grains that leave": """
 fluid.kind = "water"
-threshold.criterion = "leaves"
+threshold.criterion = "entrained"
 """,
 }
 

@@ -147,7 +147,7 @@ def of_paper(text: str) -> str:
         (pile(1e-6, CHANNEL), "laminar flow", False),
         (grain('roughness = "d/30", relative_size = 0.1'), "hidden grain", True),
         (of_paper(grain('roughness = "d/30", relative_size = 0.5')), "", False),
-        # of grains that go on, none were measured among larger ones
+        # of grains in sustained motion, none were measured among larger ones
         (grain('roughness = "d/30", relative_size = 0.5'), "interval was tested", True),
         (grain('roughness = "d/30", relative_size = 0.5'), "hidden grain", False),
         (grain(STEEP, "lift_coefficient = 30.0"), "lift over", True),
@@ -345,7 +345,7 @@ method = { kind = "peeling", flow = { model = "flat" } }
     ("text", "is_tested"),
     [
         (RIPPLE, True),
-        (f'{RIPPLE}threshold.criterion = "leaves"', False),
+        (f'{RIPPLE}threshold.criterion = "entrained"', False),
         # grains that touch one another along a level row hold one another
         (RIPPLE.replace('"pile", slope_deg = 12.0, height', '"flat", length'), False),
     ],
@@ -367,7 +367,7 @@ def test_grains_of_a_pile_that_go_on_have_the_interval_of_one_grain(
             "g_m_s2": 9.81,
         },
         **{"alpha_deg": 12.0, "beta_deg": 60.0, "reynolds": 9.0},
-        **{"force_law": "bridged", "criterion": "goes on"},
+        **{"force_law": "bridged", "criterion": "sustained"},
     }
     alone = beside.tested({name: [value] for name, value in grain.items()})[:, 0]
     assert alone[2] == 11

@@ -155,7 +155,7 @@ def _follows_dem(pile: Pile) -> bool:
     two flows, and at that flow no load step was run. Such grains are shown where they
     were packed.
     """
-    return pile.scene.method.facts.is_resolved_in_time and not pile.goes_on
+    return pile.scene.method.facts.is_resolved_in_time and not pile.is_sustained
 
 
 def _grains_shown(pile: Pile) -> IntArray:

@@ -25,11 +25,11 @@ from orchestrator.report.style import (
     Look,
 )
 from orchestrator.report.subjects import Quantity, is_gas
-from orchestrator.study.criterion import GOES_ON
+from orchestrator.study.criterion import SUSTAINED
 from orchestrator.tables.quoted import of_rows
 
 FEW = 13
-"""Sizes of the curve of a grain that goes on where no table holds it."""
+"""Sizes of the curve of a grain in sustained motion where no table holds it."""
 CAPTION = (
     "By law: orange, the answer; blue discs, other laws that hold; grey rings, laws "
     "outside their range. By size: the same law, each size on its like. Dashed: "
@@ -76,7 +76,7 @@ def of_grain(row: pd.Series) -> Canvas:
     told = single.quantity(row)
     here = _other_sizes(row, 61)
     is_tabulated = saltation.is_tabulated(Grain.of_table(here))
-    if row["criterion"] == GOES_ON and not is_tabulated.all():
+    if row["criterion"] == SUSTAINED and not is_tabulated.all():
         # each size takes a tenth of a second
         here = _other_sizes(row, FEW)
     d = here["d_m"].to_numpy()

@@ -16,7 +16,7 @@ from orchestrator.report.results import Results, case_names, drawable, split
 from orchestrator.report.shields import DEM, LABEL, PILE, RESULT, SHAPE, Points, Sheet
 from orchestrator.report.style import Figure
 from orchestrator.report.theory import Going, Line
-from orchestrator.study.criterion import GOES_ON
+from orchestrator.study.criterion import SUSTAINED
 from orchestrator.tables.facts import needs_run
 
 NAME = "shields"
@@ -148,8 +148,8 @@ def _curves(lines: Sequence[Line], answers: pd.DataFrame) -> list[shields.Curve]
     """The curves of what is answered, each law with its look."""
     criteria = set(answers.get("criterion", []))
     going: list[Going] = []
-    if GOES_ON in criteria:
-        going = theory.going_on(answers.assign(alpha_deg=0.0))
+    if SUSTAINED in criteria:
+        going = theory.sustained_curves(answers.assign(alpha_deg=0.0))
     # a law on another bed has a thinner line
     so_far: list[str] = []
 
