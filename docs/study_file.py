@@ -45,7 +45,7 @@ its `axes` are added to those at the top. The [glossary](glossary.md) explains t
 | `time_limit` | {TIME_LIMIT_S:g} | wall time after which a run of a solver counts as hung, s |
 | `units_confirmed` | false | true: unusual numbers are meant as they stand. Nothing is asked about them, and a profile or surface that is longer than 10 km or higher than 500 m is accepted |
 | `seeds` | none | number of beds that differ in their seed alone; a group may have its own |
-| `tolerance` | none | accepted relative error of τ_c: [ladder.md](ladder.md) |
+| `tolerance` | none | accepted relative error of θ_c: [ladder.md](ladder.md) |
 | `cluster` | none | settings of a queue: [cluster.md](cluster.md) |
 | `group` | one group | the experiments |
 

@@ -108,7 +108,7 @@ def flow(wall: pd.DataFrame) -> Canvas:
     first, last = back["x_m"].min() / HEIGHT, back["x_m"].max() / HEIGHT
     axes.plot([first, last], [-0.12, -0.12], color=FLOW, lw=3, solid_capstyle="butt")
     arrow(axes, (8.2, 0.22), (7.2, 0.22), FLOW)
-    axes.text(8.5, 0.6, "behind the top\nthe flow runs back", color=FLOW)
+    axes.text(8.5, 0.6, "behind the crest\nthe flow runs back", color=FLOW)
     return canvas
 
 

@@ -1,6 +1,6 @@
 """The bed line: the bottom of the flow as a polyline, made of forms and obstacles.
 
-Lengths are in any one unit: metres for the flow, diameters for a packing. The foot of
+Lengths are in any one unit: metres for the flow, diameters for a packing. The toe of
 the first form is at x = 0, where the arc length s is zero.
 """
 
@@ -43,7 +43,7 @@ class BedLine:
     Attributes
     ----------
     x
-        Places of the corners downstream of the foot of the first form.
+        Places of the corners downstream of the toe of the first form.
     z
         Their heights above the flat bed before it.
     h
@@ -167,7 +167,7 @@ class BedLine:
 
     @cached_property
     def arc_lengths(self) -> FloatArray:
-        """Arc length of each corner from the foot of the first form, shape (n,)."""
+        """Arc length of each corner from the toe of the first form, shape (n,)."""
         along = np.concatenate([[0.0], np.cumsum(self.lengths)])
         return np.asarray(along - np.interp(0, self.x, along))
 
@@ -408,7 +408,7 @@ def between_flats(corners: FloatArray, height: float) -> BedLine:
 
 
 def _train(form: FloatArray, count: int, spacing: float | None) -> FloatArray:
-    """Several forms in a row, the foot of each a spacing behind that of the last."""
+    """Several forms in a row, the toe of each a spacing behind that of the last."""
     length = float(form[-1, 0])
     spacing = spacing or length
     if count > 1 and spacing < length * (1 - 1e-9):

@@ -2,7 +2,7 @@
 
 A lattice of equal spheres has rows in which the centres are ``2 d cos(beta)`` apart,
 each row resting in the pockets of the one below, ``d sin(beta)`` lower. Lengths here
-are in diameters d of the scene, with the foot of the first form at the origin; each
+are in diameters d of the scene, with the toe of the first form at the origin; each
 grain has a size of its own.
 """
 

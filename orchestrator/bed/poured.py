@@ -1,6 +1,6 @@
 """Beds that LIGGGHTS pours: a mould of the bed line, the run, and its packing.
 
-Lengths are in diameters d of the scene, with the foot of the first form at the origin.
+Lengths are in diameters d of the scene, with the toe of the first form at the origin.
 """
 
 from dataclasses import dataclass

@@ -61,7 +61,7 @@ QUANTITIES = (
     " page."
 )
 THRESHOLDS = (
-    "Threshold Shields numbers. One with a * is outside the interval of the"
+    "Critical Shields numbers. One with a * is outside the interval of the"
     " expected\nanswer, one with ** also beyond its tolerance: it fails."
 )
 SHOWN = {
@@ -207,7 +207,7 @@ def _looks(table: pd.DataFrame) -> dict[str, Look]:
 
 
 def pile_thresholds(numbers: pd.DataFrame) -> pd.DataFrame:
-    """List the threshold Shields numbers of piles.
+    """List the critical Shields numbers of piles.
 
     Parameters
     ----------

@@ -329,7 +329,7 @@ def near_one(ratio: float, error: float) -> Diagnostic:
 
 
 def reattachment(stress: WallStress, slope_deg: float, height: float) -> Diagnostic:
-    """Find where the flow reattaches behind the top, and how soon it may.
+    """Find where the flow reattaches behind the crest, and how soon it may.
 
     Parameters
     ----------
@@ -343,7 +343,7 @@ def reattachment(stress: WallStress, slope_deg: float, height: float) -> Diagnos
     Returns
     -------
     Diagnostic
-        The place, h downstream of the top; 0 where no flow is reversed.
+        The place, h downstream of the crest; 0 where no flow is reversed.
     """
     reversed_flow = bubble(stress, height)
     reattaches = 0.0 if reversed_flow is None else reversed_flow[1]
@@ -352,7 +352,7 @@ def reattachment(stress: WallStress, slope_deg: float, height: float) -> Diagnos
 
 
 def bubble(stress: WallStress, height: float) -> tuple[float, float] | None:
-    """Where the reversed flow behind the top begins and ends.
+    """Where the reversed flow behind the crest begins and ends.
 
     A stretch of less than h that runs forward within it is the eddy of a corner.
 
@@ -366,7 +366,7 @@ def bubble(stress: WallStress, height: float) -> tuple[float, float] | None:
     Returns
     -------
     tuple of float, or None
-        Start and end, h downstream of the top; None where no flow is reversed.
+        Start and end, h downstream of the crest; None where no flow is reversed.
     """
     top = stress.x_m[int(np.argmax(stress.z_m))]
     is_reversed = (stress.x_m > top) & (stress.tau_wall < 0)

@@ -634,7 +634,7 @@ class Geometry:
         by_pivots = self.scene.by(methods.PIVOT)
         return type(self)(by_pivots, self.cases, (start, end))
 
-    def row_hold(self, cases: Path) -> float:
+    def interlocking(self, cases: Path) -> float:
         """Find by how much the grains of a lattice's rows hold one another.
 
         It is 1 on a poured bed and on a pile of two faces, whose rows end at the crest.
@@ -661,13 +661,13 @@ class Geometry:
             return 1.0
         loads = self.loads(cases)
         if is_packed:
-            return loads.row_hold()
+            return loads.interlocking()
         alone = loads.alone()
         place = int(np.argmin(np.where(alone > 0, alone, np.inf)))
         x = float(self.packing.centres[self.packing.windward, 0][place])
         try:
             part = self.around(x * self.scene.grain.diameter)
-            return part.loads(cases).row_hold()
+            return part.loads(cases).interlocking()
         except (InputError, UnfitError):
             return math.nan
 
@@ -930,7 +930,7 @@ class Loads:
         first = np.minimum(digits.all_rounded(flows), rolling)
         return np.where(np.isfinite(flows), first, np.inf)
 
-    def row_hold(self) -> float:
+    def interlocking(self) -> float:
         """Find by how much the grains of a lattice's rows hold one another.
 
         Grains that lie loose say nothing of it.

@@ -596,11 +596,11 @@ def _card(name: str, fraction: float, theta: _Interval, ustar0: _Interval) -> Ca
     of_what = "all choices that the models share, together"
     numbers = []
     for of, unit, meaning in (
-        (ustar0, "m/s", "friction velocity: the pull of the flow, written as a speed"),
+        (ustar0, "m/s", "friction velocity u*, √(τ_b/ρ)"),
         (
             theta,
             "",
-            "Shields number: the stress over the weight of one layer of grains",
+            "critical Shields number θ_c, τ_b/((ρ_s − ρ) g d)",
         ),
     ):
         numbers.append(

@@ -124,7 +124,7 @@ BANDS = (
 MARKS: Mapping[str, Look] = {
     "threshold too high": {"marker": "^", "mfc": "0.2"},
     "threshold too low": {"marker": "v", "mfc": "0.2"},
-    "hollow: another model": {"marker": "^", "mfc": "white"},
+    "open: another model": {"marker": "^", "mfc": "white"},
 }
 METHODS = {"quick": "#009e73", "static": "#d55e00", "DEM": "#0072b2"}
 FRONT: Look = {"color": "0.25", "lw": 0.9, "zorder": 1.5}
@@ -688,10 +688,10 @@ def _row_of_panels(
     is_single = len(columns) == 1
     title = f"{rows['packing'].iloc[0]} packing"
     aligned: Literal["left", "center"] = "center"
-    axes[0].set_ylabel(f"{title}\nerror of $τ_c$, %")
+    axes[0].set_ylabel(f"{title}\nerror of $θ_c$, %")
     if is_single:
         aligned = "left"
-        axes[0].set_ylabel("largest error of $τ_c$, %")
+        axes[0].set_ylabel("largest error of $θ_c$, %")
     ends = [rows["reference_error"].max(), rows["model_floor"].min()]
     tags = []
     for ax, (column, head) in zip(axes, columns.items(), strict=True):

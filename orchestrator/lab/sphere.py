@@ -51,7 +51,7 @@ def sphere(fields: Fields, galileo: float, *, clear: bool) -> float:
     Returns
     -------
     float
-        Threshold Shields number.
+        Critical Shields number.
     """
     packing = _layer(clear)
     gaps = ROUGHNESS + packing.centres[:, 1]

@@ -200,7 +200,7 @@ def claims_card(judged: Sequence[Judged], tables: Tables) -> Card:
         f" method: {of} claims, {_tested(tables)}.",
         tuple(figures),
         "The claims are compared with this study’s own numbers; claim 4 is about the "
-        "published curves for water. “What qualifies this answer” has what was"
+        "published curves for water. “Caveats” has what was"
         " measured in air.",
         _worth(tables, lacking),
     )

@@ -79,7 +79,7 @@ def soulsby_whitehouse(dstar: FloatArray) -> FloatArray:
     Returns
     -------
     FloatArray
-        Threshold Shields number, of the same shape.
+        Critical Shields number, of the same shape.
 
     Examples
     --------
@@ -100,7 +100,7 @@ def paphitis(reynolds: FloatArray) -> FloatArray:
     Returns
     -------
     FloatArray
-        Threshold Shields number, of the same shape.
+        Critical Shields number, of the same shape.
 
     Examples
     --------
@@ -121,7 +121,7 @@ def brownlie(dstar: FloatArray) -> FloatArray:
     Returns
     -------
     FloatArray
-        Threshold Shields number, of the same shape.
+        Critical Shields number, of the same shape.
 
     Examples
     --------
@@ -143,7 +143,7 @@ def mantz(reynolds: FloatArray) -> FloatArray:
     Returns
     -------
     FloatArray
-        Threshold Shields number, of the same shape.
+        Critical Shields number, of the same shape.
 
     Examples
     --------
@@ -164,7 +164,7 @@ def yalin_karahan(reynolds: FloatArray) -> FloatArray:
     Returns
     -------
     FloatArray
-        Threshold Shields number, of the same shape.
+        Critical Shields number, of the same shape.
 
     Examples
     --------
@@ -187,7 +187,7 @@ def van_rijn(dstar: FloatArray) -> FloatArray:
     Returns
     -------
     FloatArray
-        Threshold Shields number, of the same shape.
+        Critical Shields number, of the same shape.
 
     Examples
     --------

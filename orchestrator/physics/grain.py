@@ -33,7 +33,7 @@ class Grain:
     density
         Density of the grain, kg/m3; NaN where its weight does not matter.
     roughness
-        Roughness length z0 of the bed, m; by default d/30, that of a bed of its like.
+        Roughness length z0 of the bed, m; by default d/30, that of identical grains.
     slope_deg
         Slope of the bed, degrees, positive where the flow goes up it.
     entrainment_angle_deg

@@ -14,7 +14,7 @@ from orchestrator.types import FloatArray
 
 @dataclass(frozen=True)
 class Bin:
-    """Measured threshold Shields numbers in a range of Re*.
+    """Measured critical Shields numbers in a range of Re*.
 
     Attributes
     ----------
@@ -137,7 +137,7 @@ def wilcock_crowe_hiding(relative_diameter: ArrayLike) -> FloatArray:
 
 
 def egiazaroff_hiding(relative_diameter: ArrayLike) -> FloatArray:
-    """Compute the threshold Shields number of a size over that of the mean size.
+    """Compute the critical Shields number of a size over that of the mean size.
 
     I. V. Egiazaroff, J. Hydraul. Div. 91 (HY4), 1965: (log 19/log(19 D_i/D_m))^2, as in
     public codes. It rises without bound towards D_i/D_m = 1/19 (codes replace it below
@@ -151,7 +151,7 @@ def egiazaroff_hiding(relative_diameter: ArrayLike) -> FloatArray:
     Returns
     -------
     FloatArray
-        Threshold Shields number over that of the mean size, of the same shape. It is
+        Critical Shields number over that of the mean size, of the same shape. It is
         NaN up to D_i/D_m = 1/19, where the formula means nothing.
 
     Examples
@@ -185,7 +185,7 @@ class MeasuredHill:
     aspect
         Half length over height.
     reattachment
-        Distance from the top to the end of the reversed flow, in heights; 0 if the
+        Distance from the crest to the end of the reversed flow, in heights; 0 if the
         mean flow was not reversed.
     source
         Where the number is from.
@@ -227,7 +227,7 @@ def rushil_form(aspect: float) -> tuple[FloatArray, FloatArray]:
     Returns
     -------
     x, z
-        Distance from the top and height over the foot, both over the height of the
+        Distance from the crest and height over the toe, both over the height of the
         hill, arrays of shape (81,).
 
     Examples

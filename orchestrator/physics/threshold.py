@@ -439,7 +439,7 @@ def shields_at(
     Returns
     -------
     FloatArray
-        Threshold Shields number, of the broadcast shape.
+        Critical Shields number, of the broadcast shape.
 
     Examples
     --------

@@ -146,7 +146,7 @@ def _worth(row: pd.Series, few: bool = False) -> Worth:
     if worth.mark == "bad" or row["seeds"] == row["of_seeds"]:
         return worth
     word = f"usable, with gaps: {row['seeds']} of {row['of_seeds']} beds"
-    advice = "They differ in chance alone; the table says what is against the others."
+    advice = "They are replicates; the table says what is against the others."
     return Worth("care", word, advice)
 
 
@@ -233,19 +233,19 @@ def _place(row: pd.Series, pile: Pile, results: Results) -> Number:
             x,
             "m",
             "x where motion starts",
-            f"the top of {profile.name} is at x = {top} m",
+            f"the crest of {profile.name} is at x = {top} m",
             low=low,
             high=high,
             interval_of=of_what,
             decimals=digits_of_place(profile),
         )
     unit, scale = ("m", 1.0) if abs(line.x[-2]) >= 1 else ("mm", 1e3)
-    top = f"the top is at {scale * crest:.3g} {unit}"
+    top = f"the crest is at {scale * crest:.3g} {unit}"
     return Number(
         scale * x,
         unit,
         "along the bed: here motion starts",
-        f"from the foot; {top}",
+        f"from the toe; {top}",
         low=scale * low,
         high=scale * high,
         interval_of=of_what,
@@ -299,7 +299,7 @@ def ustar_number(row: pd.Series) -> Number:
     Number
         With its interval.
     """
-    note = "the pull of the flow on the ground, written as a speed"
+    note = "√(τ_b/ρ), the bed shear stress as a speed"
     return single.reported(row, USTAR, USTAR.name, note)
 
 
@@ -595,7 +595,7 @@ def _of_laws(results: Results, best: Sequence[theory.Line]) -> Card:
         f"Nearest of {len(best)} laws: {law}. {_span_of(results.scenes)}",
         (*numbers, _usable_number(count, of)),
         f"{MEASURED_SOURCE[:1].upper()}{MEASURED_SOURCE[1:]}. {said}".strip(),
-        Worth(mark, word, f"In water take {law}; in air see what qualifies it."),
+        Worth(mark, word, f"In water take {law}; in air see the caveats."),
     )
 
 
@@ -626,7 +626,7 @@ def _behind(aspect: float, rows: pd.DataFrame) -> Number:
     return Number(
         single.known(row["reattachment_over_h"]) if ends.iloc[0] else 0.0,
         "heights",
-        f"behind the top the flow runs back, of a hill of half length {aspect:g} h",
+        f"behind the crest the flow runs back, of a hill of half length {aspect:g} h",
         f"by {model}; 0: it runs back nowhere",
         low=float(ends.min()),
         high=float(ends.max()),

@@ -316,7 +316,7 @@ def _wrapped(text: str, first: str = "", later: str = "") -> list[str]:
 
 @dataclass(frozen=True)
 class Remark:
-    """What qualifies an answer.
+    """Caveats of an answer.
 
     Attributes
     ----------
@@ -331,7 +331,7 @@ class Remark:
 
 
 def remark_lines(remarks: Iterable[Remark]) -> Iterator[str]:
-    """Write what qualifies an answer for a terminal.
+    """Write the caveats of an answer for a terminal.
 
     Parameters
     ----------

@@ -83,17 +83,17 @@ def spot(x: float, bed: PileBed) -> str:
     Returns
     -------
     str
-        On a profile its x in the file, else its distance from the foot.
+        On a profile its x in the file, else its distance from the toe.
     """
     if bed.profile:
         return f"at x = {place(x, bed)} m"
-    return f"{length(x)} from the foot"
+    return f"{length(x)} from the toe"
 
 
 def way_up(profile: Profile) -> tuple[str, str] | None:
-    """Find the range of x from the foot of the form of a profile to its top.
+    """Find the range of x from the toe of the form of a profile to its crest.
 
-    The foot is where the line lies lowest under the straight one from its first point
+    The toe is where the line lies lowest under the straight one from its first point
     to its top.
 
     Parameters

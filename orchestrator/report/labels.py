@@ -13,7 +13,7 @@ from orchestrator.study import fields
 from orchestrator.study.declare import Info
 
 RE_AXIS = "Re* = u* d/ν"
-TAU_AXIS = r"threshold Shields number $τ_c$"
+TAU_AXIS = r"critical Shields number $θ_c$"
 WIDTH = 52
 """Letters of a line over a panel."""
 OTHERS = {

@@ -1,4 +1,4 @@
-"""What qualifies the answer of a study: four to six remarks with their numbers."""
+"""Caveats of the answer of a study: four to six remarks with their numbers."""
 
 from collections.abc import Iterator
 from functools import lru_cache
@@ -19,7 +19,7 @@ from orchestrator.report.subjects import WIND, is_gas, length, place_of_file
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.tables.facts import packs_grains
-from orchestrator.tables.kinds import ROW_HOLD
+from orchestrator.tables.kinds import INTERLOCKED
 
 MOST = 6
 """Remarks up to which those are added that are true of every study of a kind."""
@@ -50,7 +50,7 @@ FIRST_MOTION = Remark(
 
 @lru_cache(maxsize=1)
 def remarks(results: Results) -> list[Remark]:
-    """List what qualifies the answer of a study.
+    """List the caveats of the answer of a study.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def _usable(table: pd.DataFrame, reasons: pd.DataFrame) -> Iterator[Remark]:
 
 
 def _of_piles(results: Results, piles: pd.DataFrame) -> Iterator[Remark]:
-    """What qualifies the thresholds of beds."""
+    """Caveats of the thresholds of beds."""
     for _, row in results.exemplars.head(1).iterrows():
         pile = results.plan.piles[str(row["scene_id"])]
         yield from _smoothing(row, pile.bed)
@@ -286,10 +286,10 @@ def _closed_form(row: pd.Series, bed: PileBed) -> Iterator[Remark]:
             f" The grains around the answer, turned one by one, start at {place} and a "
             f"friction velocity of {row['pivot_first_m_s']:#.3g} m/s."
         )
-    if row["row_hold"] > ROW_HOLD:
+    if row["interlocking"] > INTERLOCKED:
         text += (
             " Touching grains of a row would hold the first up to "
-            f"{row['row_hold']:.2g} times that."
+            f"{row['interlocking']:.2g} times that."
         )
     yield Remark("Closed form, checked at one place.", text)
 

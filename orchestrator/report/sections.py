@@ -128,12 +128,12 @@ def _thresholds(results: Results) -> Iterator[Section]:
 
 
 def _limits(results: Results) -> Section:
-    """What qualifies the answer."""
+    """The caveats of the answer."""
     content: list[Element] = [
         Text(said("remarks", remarks=remarks.remarks(results))),
         Text(said("counted", counts=counts(results), scenes=len(results.scenes))),
     ]
-    return Section("What qualifies this answer", content, "limits", "Qualifies")
+    return Section("Caveats", content, "limits", "Caveats")
 
 
 def _figures(

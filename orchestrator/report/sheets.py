@@ -129,7 +129,7 @@ def _first_grains(
 ) -> pd.DataFrame:
     """The table of several beds, with a row for the first grain above those of each.
 
-    The row says where it lies. Beds that differ in chance alone have none.
+    The row says where it lies. Replicates have none.
     """
     # as the rows of the table are
     every = every.sort_values(["alpha_deg", "d_m"], kind="stable")
@@ -275,8 +275,8 @@ def _heads(told: Quantity) -> tuple[str, str, str]:
 
 
 USTAR_HEAD = "friction velocity u*₀, m/s"
-TAU_HEAD = "Shields number τ_c"
-TAU_INTERVAL = "interval of τ_c"
+TAU_HEAD = "critical Shields number θ_c"
+TAU_INTERVAL = "interval of θ_c"
 SPANS_OF_SIZES = {
     "stress on the bed, Pa": ["pa"],
     "interval, Pa": ["pa_low", "pa_high"],
@@ -387,7 +387,7 @@ def hills(results: Results) -> Sheet:
                 "measured to, h": _or_nowhere(measured),
             }
             table.append(cells)
-    shared = ("distances from the top, in heights of the hill",)
+    shared = ("distances from the crest, in heights of the hill",)
     title = "Where the flow runs back behind each hill"
     return Sheet(title, pd.DataFrame(table), shared, (), "tables/flow.csv")
 
@@ -611,4 +611,4 @@ def fidelities(results: Results) -> pd.DataFrame | None:
     if not rows:
         return None
     head = ("fidelity", "description", "reason", "beds")
-    return pd.DataFrame(rows, columns=[*head, "known error of τ_c, at most, %"])
+    return pd.DataFrame(rows, columns=[*head, "known error of θ_c, at most, %"])

@@ -213,7 +213,7 @@ def about(rows: pd.DataFrame) -> dict[str, Any]:
     of_the_points = {
         "laws": "; ".join(labels.value("force_law", name) for name in drawn),
         "pair": theory.PAIR[0] in drawn,
-        "hollow": not valid(rows).all(),
+        "is_open": not valid(rows).all(),
         "viscosities": rows["nu_m2_s"].nunique(),
         "methods": labels.methods(rows),
         "others": labels.methods(rows[~is_run]),
@@ -368,7 +368,7 @@ class Points(NamedTuple):
     are_joined: bool = False
 
     def draw(self, ax: Axes) -> list[tuple[Line2D, BoolArray]]:
-        """Draw them, hollow where a threshold is not usable, with their intervals.
+        """Draw them, open where a threshold is not usable, with their intervals.
 
         Parameters
         ----------
@@ -495,12 +495,12 @@ def _draw_points(
             x[solid], y[solid], zorder=3, gid=RESULT[1], label=label, **look
         )
         drawn.append((line, solid))
-        hollow = (shape == marker) & ~usable
-        if hollow.any():
+        is_open = (shape == marker) & ~usable
+        if is_open.any():
             look |= {"gid": RESULT[2], "mfc": "white"}
-            look |= {"label": "hollow: not usable, see why_not"}
-            (line,) = ax.plot(x[hollow], y[hollow], zorder=3, **look)
-            drawn.append((line, hollow))
+            look |= {"label": "open: not usable"}
+            (line,) = ax.plot(x[is_open], y[is_open], zorder=3, **look)
+            drawn.append((line, is_open))
     return drawn
 
 

@@ -149,9 +149,9 @@ def place_of(quantity_: Quantity, row: Row) -> str:
 def _scene_of_grain(row: Row) -> str:
     """One line on a grain and its bed."""
     alpha = float(row["alpha_deg"])
-    bed = "a level bed of its like"
+    bed = "a level bed of identical grains"
     if alpha > 0:
-        bed = f"a bed of its like that rises by {alpha:g}°"
+        bed = f"a bed of identical grains that rises by {alpha:g}°"
     within = fluid(float(row["rho_f_kg_m3"]), float(row["nu_m2_s"]))
     grain = solid(float(row["rho_sol_kg_m3"]))
     if is_gas(float(row["rho_f_kg_m3"])):
@@ -179,16 +179,16 @@ def numbers_of_grain(row: Row, told: Quantity) -> tuple[Number, ...]:
         WIND: "10 m above bare, level ground",
         MEAN: place_of(MEAN, row) if told is MEAN else "",
         DEPTH: "of the uniform flow whose weight along the slope is that stress",
-        USTAR: "the pull of the flow on the ground, written as a speed",
-        STRESS: f"that pull on each square metre; Shields number, the stress over the "
-        f"weight of one layer of grains: {theta:.3g}",
+        USTAR: "√(τ_b/ρ), the bed shear stress as a speed",
+        STRESS: f"τ_b, of the undisturbed flow; critical Shields number "
+        f"θ_c = τ_b/((ρ_s − ρ) g d): {theta:.3g}",
     }
     second = DEPTH if known(row.get("bed_slope")) > 0 else USTAR
     shown = [each for each in (told, second, STRESS) if each is not STRESS]
     of_what = interval_of(row, LOAD_STEP)
     numbers = []
     for each in (*dict.fromkeys(shown), STRESS):
-        name = each.name if each is not STRESS else "stress of the flow on the bed"
+        name = each.name if each is not STRESS else "bed shear stress"
         is_first = each is (*shown, STRESS)[0]
         number = reported(row, each, name, notes[each], of_what if is_first else "")
         numbers.append(number)
@@ -257,7 +257,7 @@ def interval_of(row: Row, numerical: str) -> str:
         return f"the {row[COUNT]:.0f} force laws that hold here"
     beds = ""
     if row.get("of_seeds", 1) > 1:
-        beds = f"{row['of_seeds']} beds that differ in chance alone"
+        beds = f"{row['of_seeds']} replicates"
     if of_what == SEEDS:
         return f"the range of {beds}; no error of the method is known"
     said = tested_on(row) if of_what == MEASURED else numerical

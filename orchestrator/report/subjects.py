@@ -21,12 +21,11 @@ AIR = ((0.9, 1.5), (1.1e-5, 2.0e-5))
 WATER = ((985.0, 1035.0), (5e-7, 2e-6))
 """The same of water in rivers and the sea."""
 TERMS = {
-    "u*": "friction velocity: the pull of the flow on the ground, written as a speed, "
-    "√(stress ÷ density of the fluid)",
-    "shields": "Shields number: the stress on the bed over the weight of one layer of "
+    "u*": "friction velocity u*: √(τ_b/ρ), with the bed shear stress τ_b and the "
+    "density ρ of the fluid",
+    "shields": "Shields number θ: τ_b/((ρ_s − ρ) g d), with the density ρ_s of the "
     "grains",
-    "re": "Re*: the size of a grain over the thickness of the film at the ground in "
-    "which viscosity rules",
+    "re": "grain Reynolds number Re*: u*d/ν",
 }
 """Terms in plain words."""
 

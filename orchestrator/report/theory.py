@@ -237,7 +237,7 @@ class Line:
         return ", ".join(self.words)
 
     def tau(self, reynolds: FloatArray) -> FloatArray:
-        """Find the threshold Shields number at some Re*, also where no law holds.
+        """Find the critical Shields number at some Re*, also where no law holds.
 
         Parameters
         ----------
@@ -480,7 +480,8 @@ def air_lines(
     Returns
     -------
     dict of str to tuple
-        Re* and tau_c of each curve, by its name; empty without a gas.
+        Re* and critical Shields number of each curve, by its name; empty without a
+        gas.
     """
     scenes = scenes[in_gas(scenes)]
     if scenes.empty:

@@ -18,7 +18,7 @@ MOST_LETTERS = 46
 
 
 def text(results: Results, guests: Sequence[Guest] = ()) -> str:
-    """Write the answer card, its table and what qualifies it, for a terminal.
+    """Write the answer card, its table and its caveats, for a terminal.
 
     Parameters
     ----------
@@ -46,12 +46,12 @@ def text(results: Results, guests: Sequence[Guest] = ()) -> str:
         raise OrchestratorError(what, where, remedy)
     answered = card(results, guests)
     table = sheet(results, guests)
-    qualified = remarks.remarks(results)
+    caveats = remarks.remarks(results)
     said = [*card_lines(answered)]
     if table is not None:
         said += ["", *sheet_lines(table)]
-    if qualified:
-        said += ["", *remark_lines(qualified)]
+    if caveats:
+        said += ["", *remark_lines(caveats)]
     return "\n".join(said)
 
 

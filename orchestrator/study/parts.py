@@ -288,7 +288,7 @@ class Obstacle(Part):
     kind: Literal["fence", "block", "half-cylinder"]
     """what it is; all have steep sides, none is upright"""
     x: float
-    """place of its middle, downstream of the foot of the first form; with a profile its
+    """place of its middle, downstream of the toe of the first form; with a profile its
     x"""
     height: Height
     """height over the bed"""

@@ -241,7 +241,7 @@ def in_axes(place: float, cell_m: float) -> str:
 
 
 def sentences(answer: Answer, source: str) -> Iterator[str]:
-    """Say what qualifies an answer.
+    """Say the caveats of an answer.
 
     Parameters
     ----------

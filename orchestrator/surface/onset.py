@@ -164,7 +164,7 @@ def sustained(
     """
     ends = saltation.SLOPE_NODES_DEG
     along = np.clip(slope_along_deg(slope_deg, heading_deg), ends[0], ends[-1])
-    # it hops over a bed of its like
+    # it hops over a bed of identical grains
     hopping = grain.changed(slope_deg=along, roughness=grain.diameter / SAND_GRAIN)
     both = Criteria(hopping.shields(leaving), hopping)
     return hopping.ustar_at(both.shields)

@@ -9,7 +9,7 @@ from orchestrator.physics.beside import GRAIN, STRIP, SUSTAINED
 from orchestrator.study.methods import METHODS
 from orchestrator.study.shapes import SHAPES
 
-ROW_HOLD = 1.05
+INTERLOCKED = 1.05
 """u*_0 of the first grain in its row, over that of the grain alone, from which the row
 holds it."""
 LEAST_LENGTH = 20.0
@@ -31,7 +31,7 @@ OF_KIND = (
     "d_m",
     "criterion",
     "decides",
-    "row_hold",
+    "interlocking",
 )
 """Columns that tell whether a bed is a strip, or one of grains that move alone."""
 
@@ -84,8 +84,8 @@ def _is_alone(row: Mapping[str, Any]) -> bool:
         return True
     if row["sizes"] or row["width"] or row["sheltering"] != "none":
         return False
-    held = row.get("row_hold")
-    is_free = held is not None and held < ROW_HOLD
+    held = row.get("interlocking")
+    is_free = held is not None and held < INTERLOCKED
     return is_free or row.get("decides") == SUSTAINED
 
 

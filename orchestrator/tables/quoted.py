@@ -48,7 +48,7 @@ def quoted(rows: pd.DataFrame, twins: "pd.Series[int] | None" = None) -> dict[st
     """Compute the columns that reports quote.
 
     The interval of a threshold is the tested one, where thresholds of such beds were
-    measured, else the numerical one; of beds that differ in chance alone it holds the
+    measured, else the numerical one; of replicates it holds the
     intervals and the thresholds of all, and is open above if one does not reach the
     fraction. The ends of an interval of the Shields number are those of a stress: u*_0
     goes with its root. Measured values are u*_0 times the ratio of the measured
@@ -61,7 +61,7 @@ def quoted(rows: pd.DataFrame, twins: "pd.Series[int] | None" = None) -> dict[st
         Thresholds of piles or of single grains, with the columns of their scenes and
         those of `beside`.
     twins
-        A number that thresholds share whose beds differ in chance alone; by default
+        A number that thresholds share whose beds are replicates; by default
         there are none.
 
     Returns

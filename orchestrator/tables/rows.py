@@ -57,13 +57,13 @@ SPEEDS = ("wind_1m_m_s", "wind_10m_m_s", "current_1m_m_s", "mean_velocity_m_s")
 FEW_GRAINS = 10
 """Grains of a size class below which the interval of its threshold is wide."""
 WAY_UP = (
-    "ustar_foot",
+    "ustar_toe",
     "ustar_quarter",
     "ustar_half",
     "ustar_three_quarters",
-    "ustar_top",
+    "ustar_crest",
 )
-"""Columns of u*/u*_0 at equal parts of the way along the bed from the foot to the
+"""Columns of u*/u*_0 at equal parts of the way along the bed from the toe to the
 top."""
 
 
@@ -394,7 +394,7 @@ class Answer:
         self.cases = cases
         self.motion = pile.motion(cases)
         self.speed = pile.speed(cases)
-        self.row_hold = pile.row_hold(cases)
+        self.interlocking = pile.interlocking(cases)
         self.first = pile.first(self.motion)
         self.checked = (np.nan, np.nan)
         if decision.is_along:
@@ -576,7 +576,7 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
             "highest_fraction": answer.motion.fraction[-1],
             "share_carried_off": found.carried_off,
             "share_against_flow": found.against_the_flow,
-            "row_hold": answer.row_hold,
+            "interlocking": answer.interlocking,
             **_decided(answer),
             **_smoothing(answer),
             "case": pile.last_run,

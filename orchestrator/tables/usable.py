@@ -19,7 +19,7 @@ from orchestrator.study import fields
 from orchestrator.study.methods import METHODS
 from orchestrator.tables.check import Contradictions
 from orchestrator.tables.facts import needs_run, packs_grains
-from orchestrator.tables.kinds import ROW_HOLD, tested_as
+from orchestrator.tables.kinds import INTERLOCKED, tested_as
 from orchestrator.tables.quoted import OF_PILE, of_rows, quoted, with_laws
 from orchestrator.types import Row
 
@@ -288,9 +288,9 @@ def _held_row(row: Mapping[Any, Any]) -> Iterator[Reason]:
 
     The closed form along the bed line packs no rows: it is of single exposed grains.
     """
-    if not packs_grains(row) or not row.get("row_hold", 0.0) > ROW_HOLD:
+    if not packs_grains(row) or not row.get("interlocking", 0.0) > INTERLOCKED:
         return
-    times = f"{row['row_hold']:.2g} times the u* of a single one"
+    times = f"{row['interlocking']:.2g} times the u* of a single one"
     said = f"the row has no end: its neighbours hold the first grain up to {times}"
     remedy = ""
     if row.get("packing") in ("aligned", "disordered"):

@@ -108,7 +108,7 @@ def test_the_theory_against_the_solved_flow(solve: Solve, slope: float) -> None:
     )
     stress = theory.waves(triangle(slope, pile.height_m), pile.roughness_m)
     ustar = np.sqrt(stress.mean_over(places, 0.2 * face))
-    # the stress at the foot of steep faces comes out too high
+    # the stress at the toe of steep faces comes out too high
     within = 0.12 if slope == 15.0 else 0.2
     np.testing.assert_allclose(ustar, np.sqrt(solved), rtol=within)
     lee = (stress.s_m > face + 0.06 * pile.height_m) & (stress.s_m < 2 * face)

@@ -153,7 +153,7 @@ def test_the_grains_of_a_row_without_a_free_end_hold_one_another(
         + f'[method]\nkind = "{method}"\n'
     )
     (scene,) = study.parse(text, name="row", where="test").scenes
-    assert least <= Pile(scene).row_hold(tmp_path) <= most
+    assert least <= Pile(scene).interlocking(tmp_path) <= most
 
 
 def test_load_steps_begin_below_the_first_grain_that_is_held(tmp_path: Path) -> None:
@@ -180,7 +180,7 @@ def test_no_law_makes_a_hold_of_a_row(tmp_path: Path, law: str) -> None:
     text = text.replace("cells_per_face = 20", 'model = "waves"')
     text += f'[method]\nkind = "pivot"\n[forces]\nlaw = "{law}"\n'
     (scene,) = study.parse(text, name="row", where="test").scenes
-    assert Pile(scene).row_hold(tmp_path) == pytest.approx(1, abs=0.01)
+    assert Pile(scene).interlocking(tmp_path) == pytest.approx(1, abs=0.01)
 
 
 @pytest.mark.parametrize(
@@ -203,7 +203,7 @@ def test_rows_of_a_bed_without_grains_are_judged_around_the_first_motion(
         )
         text = text.replace("cells_per_face = 20", 'model = "waves"')
         (scene,) = study.parse(text, name="long", where="test").scenes
-        each[method] = Pile(scene).row_hold(tmp_path)
+        each[method] = Pile(scene).interlocking(tmp_path)
     assert (each["pivot"] > 1.5) == (each["local"] > 1.5) == holds
     assert each["local"] == pytest.approx(each["pivot"], rel=0.1)
 

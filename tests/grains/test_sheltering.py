@@ -171,7 +171,7 @@ def test_each_grain_of_a_lattice_bears_the_stress_of_its_own_bed() -> None:
     exact = math.sqrt(tau / scene.fluid.density)
     assert np.median(answers["pivot"]) == pytest.approx(exact, rel=1e-6)
     # by peeling a grain waits for those before it, and needs no more flow once they have gone; the
-    # grain of the crest and that of the foot have another share of the bed
+    # grain of the crest and that of the toe have another share of the bed
     assert answers["peeling"].max() == pytest.approx(exact, rel=0.05)
     text = PILE % "pivot" + "flow.gusts = { intensity = 0.4, events = 100 }\n"
     (gusty,) = parse(text, name="a", where="a").scenes

@@ -29,7 +29,7 @@ from orchestrator.report.style import Figure
 from orchestrator.study import study
 from tests.report.conftest import axes_of, changed, copies, only
 
-LINE, SOLID, HOLLOW = shields.RESULT
+LINE, SOLID, OPEN = shields.RESULT
 Points = set[tuple[float, float]]
 
 
@@ -94,11 +94,11 @@ def test_points_of_single_grains_are_those_of_the_table(
     for ratio, ax in panels.items():
         own = flat[flat["z0_over_d"] == ratio]
         assert len(own) > 10
-        found = points(marked(ax, SOLID, HOLLOW))
+        found = points(marked(ax, SOLID, OPEN))
         assert found == rows(own, "reynolds", "shields_dem")
 
 
-def test_markers_are_hollow_exactly_where_a_threshold_is_not_usable(
+def test_markers_are_open_exactly_where_a_threshold_is_not_usable(
     results: Results, grains: dict[str, list[Axes]]
 ) -> None:
     table = results.tables["single_grain"]
@@ -110,10 +110,10 @@ def test_markers_are_hollow_exactly_where_a_threshold_is_not_usable(
     assert not transition["usable"].any()
     assert transition["usable"].count() < (~table["usable"]).sum()
     unusable = table[~table["usable"]]
-    assert points(marked(ax, HOLLOW)) == rows(unusable, "reynolds", "shields_dem")
-    for line in marked(ax, SOLID, HOLLOW):
+    assert points(marked(ax, OPEN)) == rows(unusable, "reynolds", "shields_dem")
+    for line in marked(ax, SOLID, OPEN):
         is_white = to_hex(line.get_markerfacecolor()) == "#ffffff"
-        assert is_white == (line.get_gid() == HOLLOW)
+        assert is_white == (line.get_gid() == OPEN)
 
 
 def test_closed_form_lines_stop_where_they_do_not_hold(

@@ -278,7 +278,7 @@ def test_the_map_shows_every_grain_at_its_place(train: Results) -> None:
 
 
 def test_a_steep_hill_separates_where_it_was_measured_to(hills: Results) -> None:
-    """On a coarse mesh too, the flow leaves behind the top and is back within 4 to 9 heights."""
+    """On a coarse mesh too, the flow leaves behind the crest and is back within 4 to 9 heights."""
     table = hills.tables["flow"]
     assert (table["measured_reattachment_over_h"] == 6.5).all()
     assert table["measured_source"].str.contains("unverified").all()

@@ -1,4 +1,4 @@
-"""What qualifies an answer: of which bed it is told, and where intervals change."""
+"""Caveats of an answer: of which bed it is told, and where intervals change."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ EXAMPLE = "This is told of one of them as an example: "
 
 
 def test_a_remark_that_is_told_of_one_of_several_names_it(results: Results) -> None:
-    """It qualified a thousand scenes by one of them."""
+    """It had the caveats of one scene for a thousand."""
     heap = only(results, "pile")
     sizes = [{"d_m": d, "usable": True} for d in (1e-3, 2e-3)]
     of_one = [each.text for each in remarks.remarks(heap)]

@@ -162,7 +162,7 @@ def test_seeds_are_one_row_with_their_range(results: Results) -> None:
     assert set(sheet.frame["usable"]) == {"3 of 3 seeds"}
     assert set(sheet.frame[sheets.TAU_HEAD]) == {"0.0400 … 0.0900"}
     share = answers.card(study).numbers[-1]
-    assert share.interval_of.endswith("it holds 3 beds that differ in chance alone")
+    assert share.interval_of.endswith("it holds 3 replicates")
     # a wind goes nearly with the root of the Shields number
     shown = (share.low / share.value, share.high / share.value)
     assert shown == pytest.approx(np.sqrt([0.04 / 0.06, 0.09 / 0.06]), rel=0.02)
@@ -285,7 +285,7 @@ def test_every_point_says_its_scene_interval_and_case(results: Results) -> None:
     for gid, group in figure.data.items():
         assert len(np.asarray(drawn[gid].get_xdata())) == len(group)
     for row in piles.to_dict("records"):
-        value = f"τ_c = {row['shields']:.4g} ({row['shields_low']:.4g} … {row['shields_high']:.4g})"
+        value = f"θ_c = {row['shields']:.4g} ({row['shields_low']:.4g} … {row['shields_high']:.4g})"
         (text,) = [one for one in said if one[1].startswith(value)]
         assert text[0].startswith("α = 15°, d = 1 mm, z₀ = d/30")
         assert text[2:] == [row["why_not"], row["case"]]

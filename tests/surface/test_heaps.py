@@ -113,7 +113,7 @@ def test_areas_and_shares_are_of_the_heaps_alone(tmp_path: Path, fall: float) ->
     plan = sum(pi * (h / tan(radians(SLOPE)) - foot) ** 2 for *_, h in TWO)
     upright = on_heaps["area_m2"] * np.cos(np.radians(on_heaps["slope_deg"]))
     assert upright.sum() == pytest.approx(plan, rel=0.03)
-    # smoothing makes the foot and the top less steep
+    # smoothing makes the toe and the crest less steep
     assert 0.9 < on_heaps["area_m2"].sum() / lateral(TWO) < 1.0
     first = on_heaps[on_heaps["heap"] == 1]
     assert 0.9 < first["area_m2"].sum() / lateral(ONE) < 1.0

@@ -64,7 +64,7 @@ def test_the_stress_of_a_cone_is_that_of_flow_around_a_hill(
     area = faces["area_m2"].sum()
     radius = 10.0 / np.tan(np.radians(26.0))
     slant = np.hypot(radius, 10.0)
-    # smoothing widens the foot, and the lowest hundredth is the ground's
+    # smoothing widens the toe, and the lowest hundredth is the ground's
     assert area == pytest.approx(np.pi * radius * slant, rel=0.05)
     top = faces.nlargest(20, "z_m")
     lee = faces[(faces["along_m"] > 0.3 * radius) & (faces["across_m"].abs() < 3)]

@@ -206,7 +206,7 @@ def test_the_card_of_seeds_holds_every_seed(tmp_path: Path) -> None:
     assert number.value == pytest.approx(
         1000 * rows["ustar0_m_s"].mean() ** 2, rel=1e-3
     )
-    assert "it holds 3 beds that differ in chance alone" in number.interval_of
+    assert "it holds 3 replicates" in number.interval_of
     low, high = number.interval.split(" … ")
     assert low != high
 
@@ -252,9 +252,9 @@ def test_two_beds_of_which_one_does_not_reach_the_fraction_stay_two(
     # the one that reached it is named by what tells it from the other, and once
     told = subjects.length([1e-3, 7e-4][lost])
     assert said.count(f"d = {told}") == 1
-    assert "differ in chance" not in said
+    assert "replicates" not in said
     assert re.search(r"4 of 8 +- +- +thresholds are usable", said)
-    # nor is the lost bed drawn as one that differs in chance alone
+    # nor is the lost bed drawn as a replicate
     row = results.exemplars.iloc[0]
     assert seeds_of(row, results.at_fraction) == []
 

@@ -69,8 +69,8 @@ UNREACHED = {"reynolds": NAN, "shields": NAN, "share_carried_off": NAN}
         (None, {"sheltering": "balanced"}, ["kept balance: beyond n/N = 0.1"]),
         (None, {"reynolds": 1.0}, []),  # a hydraulically smooth bed
         (None, {"count": 3}, ["0.3 of 3 grains is less than one"]),
-        (None, {"row_hold": 2.3}, ["hold the first grain up to 2.3 times"]),
-        (None, {"row_hold": 2.3, "method": "local"}, []),
+        (None, {"interlocking": 2.3}, ["hold the first grain up to 2.3 times"]),
+        (None, {"interlocking": 2.3, "method": "local"}, []),
         (
             None,
             {"share_carried_off": 0.76},
@@ -377,7 +377,7 @@ def test_grains_of_a_pile_that_go_on_have_the_interval_of_one_grain(
         for phi in (32.0, 50.0)
     )
     width = most / least
-    assert (rows["row_hold"] < 1.05).all()
+    assert (rows["interlocking"] < 1.05).all()
     low = (rows["tested_low"] / rows["shields"]).to_numpy()
     high = (rows["tested_high"] / rows["shields"]).to_numpy()
     assert low == pytest.approx(alone[0] / width)

@@ -16,11 +16,11 @@ from orchestrator.report.shields import SHOWN, Points, Sheet
 from orchestrator.report.style import Figure
 
 CAPTION = """\
-{% from "captions.j2" import laws, protocol, hollow %} Friction velocity at the
+{% from "captions.j2" import laws, protocol, is_open %} Friction velocity at the
 threshold by DEM over that of the closed form with the same forces: {{ laws(about) }}. A
 bar runs from the load step without motion to the one with motion: it holds 1 where the
 two methods agree. Panels may differ in scale. Largest deviation: {{ deviations }}. {{
-protocol(about) }} {{ hollow(about) }}"""
+protocol(about) }} {{ is_open(about) }}"""
 OVER = ("reynolds", "value", "low", "high")
 """Columns of x, y and the ends of its interval."""
 

@@ -10,7 +10,7 @@ from orchestrator.report.results import Results, case_names, drawable, split
 from orchestrator.report.style import Figure
 
 CAPTION = """\
-{% from "captions.j2" import laws, protocol, hollow, low_regime, references %} After
+{% from "captions.j2" import laws, protocol, is_open, low_regime, references %} After
 Figs. 15 and 16 of the paper. A marker shows the mean wall stress over the grains that
 had moved when they first were the fraction n/N of the counted ones; Re* is that of this
 stress. A fraction that was not reached has no marker. Thin lines join beds that differ
@@ -20,7 +20,7 @@ Black: the closed form of one grain at the same slope, entrainment angle and zâ‚
 line ends where its force law does. It is dotted where this study has grains beyond the
 law {%- if about.pair %}; the Re* of such a grain can lie outside the shaded range by
 one of the two laws{% endif %}. Force laws: {{ laws(about) }}. {{ protocol(answers) }}
-{{ hollow(answers) }} {{ low_regime(about) }} {{ references(about) }}"""
+{{ is_open(answers) }} {{ low_regime(about) }} {{ references(about) }}"""
 FOLLOWED = {"d/10": "Fig. 15", "d/30": "Fig. 16"}
 """Figures of the paper, by the roughness."""
 

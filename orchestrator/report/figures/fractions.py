@@ -47,16 +47,16 @@ BESIDE: Look = {
 SLOPE_OF_PAPER = 15.0
 """Slope of the pile of Fig. 14, degrees."""
 OF_THE_CARD = """\
-How the part that has moved grows with the {{ told }}. {% if seeds %}Thin: other beds
-that differ in chance alone; disc: their mean.{% endif %} {% if measured %}Dashed: with
+How the part that has moved grows with the {{ told }}. {% if seeds %}Thin: replicates
+(random seeds); disc: their mean.{% endif %} {% if measured %}Dashed: with
 the measured threshold of one grain.{% endif %}"""
 CAPTION = """\
-{% from "captions.j2" import laws, protocol, hollow, low_regime %} After Fig. 14 of the
+{% from "captions.j2" import laws, protocol, is_open, low_regime %} After Fig. 14 of the
 paper. Each marker is a flow: the fraction of the N(d) exposed grains that had moved,
 against {{ {"shields": "τ", "reynolds": "Re*"}[along] }} of the mean wall stress over
 these grains, as in the paper. The mean falls where the next grains to move feel less
 stress. Above n/N = 90 % a curve may leave the frame. Forces: {{ laws(about, "Between
-the two") }}. {{ protocol(about) }} {{ hollow(about) }} {{ low_regime(about) }}"""
+the two") }}. {{ protocol(about) }} {{ is_open(about) }} {{ low_regime(about) }}"""
 
 
 def draw(results: Results) -> Iterator[Figure]:
@@ -98,12 +98,12 @@ def _of_the_card(results: Results) -> Iterator[Figure]:
 
 
 def _draw_card(row: pd.Series, others: Sequence[str], table: pd.DataFrame) -> Canvas:
-    """The curves of a bed and of those that differ in chance alone, and its answer."""
+    """The curves of a bed and of its replicates, and its answer."""
     told = single.quantity(row)
     canvas = style.canvas(2.0, style.NARROW)
     ax = canvas.subplots()
     table = table[np.isfinite(table["ustar0_m_s"]) & (table["ustar0_m_s"] > 0)]
-    alike: Look = {"label": "beds that differ in chance", "color": ANSWER, "lw": 0.6}
+    alike: Look = {"label": "replicates (random seeds)", "color": ANSWER, "lw": 0.6}
     for scene in others:
         points = table[table["scene_id"] == scene]
         flow = units.told_by(row, points["ustar0_m_s"], told)
@@ -199,7 +199,7 @@ def _draw_panels(
 ) -> Canvas:
     """Draw the curves of a sheet along a column, in colours by another.
 
-    A curve is hollow where its force law does not hold.
+    A curve is open where its force law does not hold.
     """
     _, axes = sheet.panels()
     for ax, rows in zip(axes, sheet.parts, strict=True):
@@ -209,7 +209,7 @@ def _draw_panels(
             look |= {"marker": str(pile[shields.SHAPE]), "label": pile[shields.LABEL]}
             look["gid"] = str(pile["scene_id"])
             if not pile["law_holds"]:
-                look |= {"mfc": "white", "label": "hollow: the force law does not hold"}
+                look |= {"mfc": "white", "label": "open: the force law does not hold"}
             _draw_curve(ax, points[along], points["fraction_moved"], look)
     # the last grains of a pile may wait for a hundred times the stress of the others
     points = pd.concat([curves[scene_id] for scene_id in sheet.rows["scene_id"]])

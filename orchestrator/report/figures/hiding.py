@@ -14,7 +14,7 @@ from orchestrator.report.results import Results, case_names, split
 from orchestrator.report.style import Figure
 from orchestrator.types import FloatArray
 
-HIDING_AXES = ("dᵢ/d₅₀", "$τ_c$ of the size over that of d₅₀")
+HIDING_AXES = ("dᵢ/d₅₀", "$θ_c$ of the size over that of d₅₀")
 
 
 def _wilcock_crowe(size: FloatArray) -> Any:
@@ -38,7 +38,7 @@ CAPTION = (
     "its exposed grains has moved, over that at d₅₀, which lies between two classes. "
     "Markers: geometric mean over the beds of the study. Bars: the range of these "
     "beds, and the part that the number of grains in the class leaves to chance (80 "
-    "%); a bar leaves the frame where too few grains give no bound. Hollow: fewer "
+    "%); a bar leaves the frame where too few grains give no bound. Open: fewer "
     "than ten grains. Lines: published hiding functions, which are for flow over beds "
     "in space and for transport rates, not for first motion."
 )
@@ -88,7 +88,7 @@ def draw(results: Results) -> Iterator[Figure]:
 
 
 def _draw_classes(ax: Axes, rows: pd.DataFrame, colour: str) -> None:
-    """Draw the means of size classes with intervals, hollow where grains are few."""
+    """Draw the means of size classes with intervals, open where grains are few."""
     number = np.rint(np.log(rows["size_over_d"]) / np.log(np.sqrt(2)))
     logs = rows[["size_over_d", "hiding"]].map(np.log)
     mean = np.exp(logs.groupby(number).mean())

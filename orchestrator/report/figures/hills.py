@@ -47,7 +47,7 @@ def draw(results: Results) -> Iterator[Figure]:
         titles.append(
             f"half length {half_length:g} h, {rows['alpha_deg'].iloc[0]:.3g}°"
         )
-    figure, axes = style.grid(titles, 2.1, "x/h from the top", USTAR, 1)
+    figure, axes = style.grid(titles, 2.1, "x/h from the crest", USTAR, 1)
     label = "measured end of the reversed flow"
     if not flows["measured_verified"].all():
         label += " (unverified)"

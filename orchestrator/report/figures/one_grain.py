@@ -12,7 +12,7 @@ from orchestrator.report.results import Results, case_names, split
 from orchestrator.report.style import Figure
 
 CAPTION = """\
-{% from "captions.j2" import laws, protocol, hollow, references %} {% if by !=
+{% from "captions.j2" import laws, protocol, is_open, references %} {% if by !=
 "force_law" %}After Fig. {{ 5 if by == "beta_deg" else 7 }} of the paper. {% endif %}
 Threshold stress of one grain against the friction Reynolds number, by {{ {"beta_deg":
 "entrainment angle β", "alpha_deg": "slope α (the flow goes up it)", "force_law": "force
@@ -23,8 +23,8 @@ shaded range by one of the two laws{% endif %}. Force laws: {{ laws(about) }}. {
 answers %} {% if by != "force_law" %}After Fig. {{ 6 if by == "beta_deg" else 8 }} of
 the paper. {% endif %} Markers: thresholds of one mobile sphere on two fixed neighbours,
 by LIGGGHTS. A bar runs from the last load step without motion to the first with motion;
-most bars are smaller than the markers. {{ protocol(answers) }} {{ hollow(answers) }} {%
-endif %} {{ references(about) }}"""
+most bars are smaller than the markers. {{ protocol(answers) }} {{ is_open(answers) }}
+{% endif %} {{ references(about) }}"""
 FOLLOWED = {
     ("beta_deg", False): "Fig. 5",
     ("beta_deg", True): "Figs. 5 and 6",

@@ -27,14 +27,14 @@ FEW = 8
 LINES = 3
 """Number of laws beyond which only those near the measurements are drawn."""
 CAPTION = """\
-{% from "captions.j2" import hollow, low_regime, references %} {% if piles %} Squares:
+{% from "captions.j2" import is_open, low_regime, references %} {% if piles %} Squares:
 beds. The stress is the mean wall stress over the grains that had moved when their
 fraction was first {{ fractions }}; {{ piles.methods }}. {{ low_regime(piles) }} {%
 endif %} {% if grains %} Dots: single grains; {{ grains.methods }}. {% endif %} Bars are
-intervals. A bar that leaves the frame has no upper end. {{ hollow({"hollow": (piles and
-piles.hollow) or (grains and grains.hollow)}) }} Lines: one grain on a flat bed ({{
-names }}). A line is dotted where the force law does not hold but the study has grains.
-{{ references(about) }}"""
+intervals. A bar that leaves the frame has no upper end. {{ is_open({"is_open": (piles
+and piles.is_open) or (grains and grains.is_open)}) }} Lines: one grain on a flat bed
+({{ names }}). A line is dotted where the force law does not hold but the study has
+grains. {{ references(about) }}"""
 
 
 def draw(results: Results) -> Iterator[Figure]:
@@ -239,7 +239,7 @@ def _lines(results: Results) -> list[Line]:
 def _texts(row: pd.Series, columns: Sequence[str], telling: Sequence[str]) -> list[str]:
     """What the page says of a point: scene, threshold, why it is not usable, case."""
     value, low, high = (row[name] for name in columns[1:])
-    threshold = f"τ_c = {value:.4g}"
+    threshold = f"θ_c = {value:.4g}"
     if pd.notna(low) or pd.notna(high):
         threshold += f" ({labels.interval(low, high, 4, 'g')})"
     if "fraction" in row:

@@ -120,7 +120,7 @@ def _draw_series(
     number: int,
     name: str,
 ) -> None:
-    """A curve of a sweep: computed, with intervals and hollow points, and measured."""
+    """A curve of a sweep: computed, with intervals and open points, and measured."""
     part = part.sort_values(column)
     x = scale * part[column].to_numpy(float)
     y = part[told.column()].to_numpy(float)

@@ -245,7 +245,7 @@ def _line(
     height = bed.level(pile.model.line.height(bed.along(places)))
     moved = np.where(has_moved, height, np.nan)
     ax.plot(places, moved, color=ANSWER, lw=3, gid="moved")
-    where = "x, m, from the foot of the first form"
+    where = "x, m, from the toe of the first form"
     if bed.profile:
         where = f"x of {bed.profile.name}, m"
     part = percent(row["fraction"])
