@@ -71,8 +71,8 @@ class Motion:
     ----------
     flow
         The flow of each load step, in the deck's unit, which never falls; first that of
-        the settling; shape (levels + 1,).
-    level
+        the settling; shape (load steps + 1,).
+    load_step
         Load step (index into `flow`) in which a grain moved by the counting rule; 0 for
         never; shape (N,).
     fallen
@@ -84,12 +84,12 @@ class Motion:
     mode
         How it moved: index into `MODES`; shape (N,).
     exact
-        Whether a grain moves at its level's very flow, as by a formula; else between
+        Whether a grain moves at the very flow of its load step, as by a formula; else
         the load step before and that one.
     """
 
     flow: FloatArray
-    level: IntArray
+    load_step: IntArray
     fallen: IntArray
     carried: BoolArray
     mode: IntArray
@@ -115,21 +115,21 @@ class Motion:
         moves = np.isfinite(flows)
         # to be lifted straight over a neighbour is to be lifted
         carried = np.isfinite(lifting) & (lifting <= rolling)
-        levels = np.unique(flows[moves])
+        load_steps = np.unique(flows[moves])
         flow = np.zeros(1)
-        if len(levels):
-            # before the first level nothing moves
-            flow = np.concatenate([levels[:1] * SETTLE_FLOW, levels])
-        level = np.where(moves, np.searchsorted(levels, flows) + 1, 0)
+        if len(load_steps):
+            # before the first load step nothing moves
+            flow = np.concatenate([load_steps[:1] * SETTLE_FLOW, load_steps])
+        load_step = np.where(moves, np.searchsorted(load_steps, flows) + 1, 0)
         modes = [MODES.index("lifted"), MODES.index("rolled")]
         mode = np.select([carried, moves], modes, 0)
-        return cls(flow, level, np.zeros_like(level), carried, mode, exact=True)
+        return cls(flow, load_step, np.zeros_like(load_step), carried, mode, exact=True)
 
     @property
     def flows(self) -> FloatArray:
         """Flow at which each grain moved, shape (N,); infinite for never."""
         middle = np.sqrt(self.low * self.flow)
-        return np.where(self.level > 0, middle[self.level], np.inf)
+        return np.where(self.load_step > 0, middle[self.load_step], np.inf)
 
     def until(self, further: FloatArray, over: FloatArray) -> "Motion":
         """Make the motion of grains that must go on, too, from that of their leaving.
@@ -165,14 +165,14 @@ class Motion:
             The motion of all grains.
         """
         everyone, first_run = runs[0]
-        level = np.zeros(len(everyone), np.int64)
+        load_step = np.zeros(len(everyone), np.int64)
         fallen = np.zeros(len(everyone), np.int64)
         carried = np.zeros(len(everyone), bool)
         mode = np.zeros(len(everyone), np.int64)
         flow = [first_run.flow[:1]]
         before = 0
         for counted, run in runs:
-            level[counted] = np.where(run.level > 0, run.level + before, 0)
+            load_step[counted] = np.where(run.load_step > 0, run.load_step + before, 0)
             falls_first = (fallen[counted] == 0) & (run.fallen > 0)
             fallen[counted] = np.where(
                 falls_first, run.fallen + before, fallen[counted]
@@ -181,7 +181,7 @@ class Motion:
             mode[counted] = run.mode
             flow.append(run.flow[1:])
             before += len(run.flow) - 1
-        return cls(np.concatenate(flow), level, fallen, carried, mode)
+        return cls(np.concatenate(flow), load_step, fallen, carried, mode)
 
     def of(self, chosen: BoolArray) -> "Motion":
         """Take the motion of some of the counted grains under the same flows.
@@ -198,7 +198,7 @@ class Motion:
         """
         return replace(
             self,
-            level=self.level[chosen],
+            load_step=self.load_step[chosen],
             fallen=self.fallen[chosen],
             carried=self.carried[chosen],
             mode=self.mode[chosen],
@@ -206,19 +206,19 @@ class Motion:
 
     @cached_property
     def low(self) -> FloatArray:
-        """For each level the highest flow known to be below it, shape (levels + 1,)."""
+        """The highest flow known below each load step, shape (load steps + 1,)."""
         if self.exact:
             return self.flow
         # two load steps of one flow are before and after the bed has changed
         lower = np.searchsorted(self.flow, self.flow) - 1
         return np.asarray(self.flow[np.maximum(lower, 0)])
 
-    def moved_by(self, level: int) -> BoolArray:
+    def moved_by(self, load_step: int) -> BoolArray:
         """Find the grains that have moved by the end of a load step.
 
         Parameters
         ----------
-        level
+        load_step
             The load step.
 
         Returns
@@ -226,36 +226,36 @@ class Motion:
         BoolArray
             Which grains, shape (N,).
         """
-        return (self.level > 0) & (self.level <= level)
+        return (self.load_step > 0) & (self.load_step <= load_step)
 
     @property
     def count(self) -> int:
         """N, how many grains are counted."""
-        return len(self.level)
+        return len(self.load_step)
 
     @cached_property
     def fraction(self) -> FloatArray:
-        """n/N at the end of each load step, shape (levels + 1,)."""
+        """n/N at the end of each load step, shape (load steps + 1,)."""
         return np.asarray(self.moved / self.count)
 
     @cached_property
     def moved(self) -> IntArray:
-        """How many grains had moved by the end of each load step; (levels + 1,)."""
-        return self._by_load_step(self.level)
+        """How many grains had moved by the end of each load step; (load steps + 1,)."""
+        return self._by_load_step(self.load_step)
 
     @property
     def fallen_upstream(self) -> IntArray:
-        """How many had been the criterion upstream by then, shape (levels + 1,)."""
+        """How many had been the criterion upstream by then, shape (load steps + 1,)."""
         return self._by_load_step(self.fallen)
 
     @cached_property
     def carried_off(self) -> IntArray:
-        """How many of those that had moved were carried off, shape (levels + 1,)."""
-        return self._by_load_step(np.where(self.carried, self.level, 0))
+        """How many of those had been carried off, shape (load steps + 1,)."""
+        return self._by_load_step(np.where(self.carried, self.load_step, 0))
 
-    def _by_load_step(self, level: IntArray) -> IntArray:
-        """How many grains had reached their level by the end of each load step."""
-        counts = np.bincount(level, minlength=len(self.flow))
+    def _by_load_step(self, load_step: IntArray) -> IntArray:
+        """How many grains had reached their load step by the end of each load step."""
+        counts = np.bincount(load_step, minlength=len(self.flow))
         counts[0] = 0
         return np.cumsum(counts)
 
@@ -281,7 +281,7 @@ class Motion:
         table.to_csv(directory / LOAD_STEPS, index=False, float_format=FORMAT)
         moved = {
             "id": grains.counted_ids,
-            "moved_in": self.level,
+            "moved_in": self.load_step,
             "fallen_in": self.fallen,
             "carried_off": self.carried.astype(int),
             "mode": [MODES[mode] for mode in self.mode],
@@ -305,7 +305,7 @@ class Motion:
         grains = read_texts(directory / MOTION)
         return cls(
             flow=read_texts(directory / LOAD_STEPS)["flow"].astype(float),
-            level=grains["moved_in"].astype(np.int64),
+            load_step=grains["moved_in"].astype(np.int64),
             fallen=grains["fallen_in"].astype(np.int64),
             carried=grains["carried_off"] == "1",
             mode=np.array([MODES.index(mode) for mode in grains["mode"]], np.int64),
@@ -429,7 +429,7 @@ def read(
     flow = samples.groupby("load_step")["flow"].first().to_numpy(float)
     return Motion(
         flow=np.concatenate([[SETTLE_FLOW * flow[0]], flow]),
-        level=_first_step(counts.moved, load_step),
+        load_step=_first_step(counts.moved, load_step),
         fallen=_first_step(counts.fallen, load_step),
         carried=counts.carried[-1],
         mode=_mode(track, counts),

@@ -222,7 +222,7 @@ class PileCase(GrainCase):
         # the grains when the run has ended; those that have moved are taken off the bed
         left = worn.left.copy()
         left[grains.counted_ids - 1] = np.where(
-            moved.level > 0, moved.flow[moved.level], np.inf
+            moved.load_step > 0, moved.flow[moved.load_step], np.inf
         )
         steps, rows = ENGINE.read_frames(directory / motion.BED, motion.BED_COLUMNS)
         last = rows[rows["step"] == steps[-1]]

@@ -60,9 +60,9 @@ def of_grains(motion: Motion) -> Thresholds:
     Thresholds
         In the deck's unit of flow.
     """
-    moved = motion.level > 0
-    low = np.where(moved, motion.low[motion.level], np.nan)
-    high = np.where(moved, motion.flow[motion.level], np.nan)
+    moved = motion.load_step > 0
+    low = np.where(moved, motion.low[motion.load_step], np.nan)
+    high = np.where(moved, motion.flow[motion.load_step], np.nan)
     return Thresholds(np.sqrt(low * high), low, high)
 
 
@@ -82,10 +82,10 @@ def mean_tau(motion: Motion, speed: FloatArray, fluid_density: float) -> FloatAr
     Returns
     -------
     FloatArray
-        The stress, Pa, NaN before any had; shape (levels + 1,).
+        The stress, Pa, NaN before any had; shape (load steps + 1,).
     """
     moved = motion.moved
-    squares = np.bincount(motion.level, speed**2, len(motion.flow))
+    squares = np.bincount(motion.load_step, speed**2, len(motion.flow))
     squares[0] = 0.0  # those that never move
     mean = np.where(moved > 0, np.cumsum(squares) / np.maximum(moved, 1), np.nan)
     return np.asarray(fluid_density * motion.flow**2 * mean)
@@ -242,19 +242,19 @@ def of_pile(
     half = 0.5 / motion.count
     least, most = ends or (max(fraction - half, half), fraction + half)
     tau_low, tau_high = _interval(motion, speed, fluid_density, (least, fraction, most))
-    level = first_level(motion, fraction)
-    if level is None:
+    load_step = first_load_step(motion, fraction)
+    if load_step is None:
         nan = math.nan
         return PileThreshold(fraction, nan, nan, tau_low, tau_high, nan, nan)
-    ustar0 = math.sqrt(motion.low[level] * motion.flow[level])
+    ustar0 = math.sqrt(motion.low[load_step] * motion.flow[load_step])
     return PileThreshold(
         fraction=fraction,
         ustar0=ustar0,
-        tau=_stress(motion, speed, fluid_density, level, ustar0),
+        tau=_stress(motion, speed, fluid_density, load_step, ustar0),
         tau_low=tau_low,
         tau_high=tau_high,
-        carried_off=float(motion.carried_off[level] / motion.moved[level]),
-        against_the_flow=_mean(motion, speed < 0, level),
+        carried_off=float(motion.carried_off[load_step] / motion.moved[load_step]),
+        against_the_flow=_mean(motion, speed < 0, load_step),
     )
 
 
@@ -267,9 +267,9 @@ def _interval(
     """Ends of the interval of tau_c, Pa, from a lower fraction to a higher one."""
     least, fraction, most = fractions
     last = len(motion.flow) - 1
-    below = first_level(motion, least)
-    level = first_level(motion, fraction)
-    above = first_level(motion, most)
+    below = first_load_step(motion, least)
+    load_step = first_load_step(motion, fraction)
+    above = first_load_step(motion, most)
     upper = last
     if above is not None:
         upper = above
@@ -277,9 +277,9 @@ def _interval(
     held = [_stress(motion, speed, fluid_density, upper, motion.flow[upper])]
     if below is not None:
         held.append(_stress(motion, speed, fluid_density, below, motion.low[below]))
-    if level is not None:
-        ustar0 = math.sqrt(motion.low[level] * motion.flow[level])
-        held.append(_stress(motion, speed, fluid_density, level, ustar0))
+    if load_step is not None:
+        ustar0 = math.sqrt(motion.low[load_step] * motion.flow[load_step])
+        held.append(_stress(motion, speed, fluid_density, load_step, ustar0))
     high = math.nan
     if above is not None:
         high = max(held)
@@ -290,17 +290,21 @@ def _interval(
 
 
 def _stress(
-    motion: Motion, speed: FloatArray, fluid_density: float, level: int, ustar0: float
+    motion: Motion,
+    speed: FloatArray,
+    fluid_density: float,
+    load_step: int,
+    ustar0: float,
 ) -> float:
     """Mean stress at a flow on the grains that have moved by a load step, Pa."""
     squares = speed**2
-    mean = _mean(motion, squares, level)
+    mean = _mean(motion, squares, load_step)
     if math.isnan(mean):  # before any has moved it is that on all
         mean = float(squares.mean())
     return fluid_density * float(ustar0) ** 2 * mean
 
 
-def first_level(motion: Motion, fraction: float) -> int | None:
+def first_load_step(motion: Motion, fraction: float) -> int | None:
     """Find the first load step by whose end a fraction of the grains had moved.
 
     Parameters
@@ -322,9 +326,9 @@ def first_level(motion: Motion, fraction: float) -> int | None:
     return int(reached[0])
 
 
-def _mean(motion: Motion, values: NDArray[Any], level: int) -> float:
+def _mean(motion: Motion, values: NDArray[Any], load_step: int) -> float:
     """Mean over the grains that have moved; NaN before any has."""
-    moved = values[motion.moved_by(level)]
+    moved = values[motion.moved_by(load_step)]
     if not len(moved):
         return math.nan
     return float(moved.mean())

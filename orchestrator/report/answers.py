@@ -573,7 +573,7 @@ def _of_laws(results: Results, best: Sequence[theory.Line]) -> Card:
         Number(
             factor,
             "times",
-            "off the measured medians, in the median",
+            "median misfit, a factor of the measured medians",
             f"from Re* = {theory.FACTORS_FROM:g} on; "
             f"at worst {first.worst[0]:.2f} times",
             decimals=2,

@@ -147,9 +147,9 @@ def _correction(results: Results, table: pd.DataFrame) -> Iterator[Remark]:
         who = "wind tunnels"
     size = length(float(row["d_m"]))
     law = labels.value("force_law", row["force_law"])
-    head = f"The computed {flow} is too weak: {ratio:.2g} of the measured one."
-    if ratio > 1:
-        head = f"The computed {flow} is too strong by {ratio:.2g} times."
+    head = (
+        f"The computed {flow} differs from the measured one by a factor of {ratio:.2g}."
+    )
     text = (
         f"On a level bed of grains of {size} the force law {law} asks for a friction "
         f"velocity of {computed:#.3g} m/s; {who} found {measured:#.3g} m/s. The table "
@@ -206,7 +206,7 @@ def _of_piles(results: Results, piles: pd.DataFrame) -> Iterator[Remark]:
     beyond = piles[piles["frozen_bed"] > FROZEN_BED]
     if len(beyond):
         text = caption("frozen", beyond=beyond, count=len(piles), limit=FROZEN_BED)
-        yield Remark("The flow does not follow the bed.", text)
+        yield Remark("The flow is not recomputed as grains leave.", text)
     yield from _fidelity(results)
     if "check" in results.tables:
         text = caption("checked", checks=results.tables["check"])
@@ -310,7 +310,7 @@ def _model(row: pd.Series, results: Results) -> Iterator[Remark]:
         f"of {labels.interval(low, high)} for the {part}. {of_intervals}"
         f"{_of_one(row, results.exemplars)}"
     )
-    yield Remark(f"{str(choice).capitalize()} matters more than all else.", text)
+    yield Remark(f"{str(choice).capitalize()} dominates the uncertainty.", text)
 
 
 def _fidelity(results: Results) -> Iterator[Remark]:

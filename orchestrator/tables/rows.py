@@ -475,7 +475,7 @@ def pile_grain(answer: Answer) -> Row:
         "s_m": packing.arc_length[counted] * d,
         "x_m": pile.bed.place(packing.centres[counted, 0] * d),
         "ustar_over_ustar0": answer.speed,
-        "moved_in_load_step": motion.level,
+        "moved_in_load_step": motion.load_step,
         "fallen_in_load_step": motion.fallen,
         "carried_off": motion.carried.astype(int),
         "mode": np.array(MODES)[motion.mode],
@@ -605,8 +605,8 @@ def _starts(answer: Answer) -> Row:
 def _first_interval(answer: Answer, error: float | None) -> tuple[float, float]:
     """Ends of the friction velocity at which motion starts, m/s.
 
-    They hold the load step in which it starts and what is within the known error of the
-    level; they are not known without a known error.
+    They hold the load step in which it starts, and what is within the known error of
+    that load step; they are not known without a known error.
     """
     _, ustar0 = answer.first
     if error is None or np.isnan(ustar0):
@@ -638,9 +638,9 @@ def _interval(
 ) -> tuple[float, float]:
     """Ends of the interval of a Shields number; an end that is not known is NaN.
 
-    It holds load steps and count, at least what is within the known error of the level,
-    and how far the z0 of the flow is from that of a bed that is not rough (`smooth`).
-    It is not known without a known error.
+    It holds load steps and count, at least what is within the known error of the
+    threshold, and how far the z0 of the flow is from that of a bed that is not rough
+    (`smooth`). It is not known without a known error.
     """
     if error is None:
         return np.nan, np.nan
@@ -699,8 +699,8 @@ def size_class(answer: Answer) -> Iterator[Row]:
     classes = _free_classes(pile)
     sizes = np.array([each.size for each in classes])
     for fraction in pile.scene.threshold.fractions:
-        level = threshold.first_level(answer.motion, fraction)
-        has_moved = None if level is None else answer.motion.moved_by(level)
+        load_step = threshold.first_load_step(answer.motion, fraction)
+        has_moved = None if load_step is None else answer.motion.moved_by(load_step)
         found = [answer.at(fraction, each.chosen) for each in classes]
         median = threshold.at_size(1.0, sizes, np.array([at.tau for at in found]))
         hidden = _equal_mobility(answer, classes, fraction)

@@ -360,7 +360,7 @@ def test_our_own_reading_of_the_run_agrees(tmp_path: Path) -> None:
     along = np.array([grain.along for grain in bed.grains.values()])
     table = GrainTable(places, kind, along, np.ones(len(kind)), D, 2500.0)
     read = motion.read(tmp_path / "case", table, 0.3, falls_out=False)
-    moved_in = dict(zip(bed.counted, read.level.tolist(), strict=True))
+    moved_in = dict(zip(bed.counted, read.load_step.tolist(), strict=True))
     assert {one: step for one, step in moved_in.items() if step} == count.moved_in
     carried = {one for one, gone in zip(bed.counted, read.carried, strict=True) if gone}
     assert carried == count.carried

@@ -148,7 +148,7 @@ def test_rest_and_lines_left_out_change_no_grain(
     )
     assert rest.moved[-1] > 0
     for other in others:
-        np.testing.assert_array_equal(rest.level, other.level)
+        np.testing.assert_array_equal(rest.load_step, other.load_step)
     # the waiting time is only the bound for what never rests
     samples = {
         name: read_table(folder / motion.SAMPLES) for name, folder in runs.items()

@@ -280,6 +280,6 @@ def test_a_gust_moves_a_grain_by_its_impulse(tmp_path: Path, duration: float) ->
     gusts = {"asked": gust, "gusts": np.array([0.0, 1.0, 1.0, 0.0])}
     level = _moved_by_dem(
         tmp_path / "b", grains, force, 10.0, 0.5, rising=np.ones(2), **gusts
-    ).level
+    ).load_step
     exact = push[_leaves(push, duration)].min()
     assert push[level > 0].min() == pytest.approx(exact, rel=0.015)

@@ -84,7 +84,7 @@ def test_a_bed_has_no_scale(tmp_path: Path) -> None:
     grain = { diameter = 1e-4 }
     fluid = { viscosity = 3.1622776601683795e-7 }
     """
-    first, second = _run(_cells(text), tmp_path).level
+    first, second = _run(_cells(text), tmp_path).load_step
     assert first == second > 0
 
 
@@ -176,6 +176,6 @@ def test_how_grains_move(tmp_path: Path) -> None:
     back = [scene.forces.law for scene in cells.scenes].index("low")
     assert MODES[motion.mode[lifts.index(0.0)]] == "rolled"
     assert MODES[motion.mode[lifts.index(100.0)]] == "lifted"
-    assert (motion.level[back], motion.mode[back]) == (0, 0)
+    assert (motion.load_step[back], motion.mode[back]) == (0, 0)
     assert motion.fallen[back] > 0
     assert np.isnan(threshold.of_grains(motion).value[back])

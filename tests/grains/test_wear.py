@@ -105,7 +105,7 @@ def test_a_bed_changes_after_each_part_of_its_grains(
         assert np.any(later.height(x) < before.height(x) - 0.5)
     motion = pile.motion(cases)
     # the bed changed at one flow: what goes then was last seen at rest at the flow below it
-    moved = motion.level[motion.level > 0]
+    moved = motion.load_step[motion.load_step > 0]
     assert np.all(motion.low[moved] < motion.flow[moved]) or method == "peeling"
     assert motion.fraction[-1] >= 0.75
     assert np.all(np.diff(motion.flow) >= 0)

@@ -137,7 +137,7 @@ def read(pile: Pile, cases: Path) -> Steps:
         stop = int(np.searchsorted(moved.moved[stops], gone_before, side="right"))
         lines.append((stop, wear.line(pile, worn, cases)))
     left_at = np.zeros(len(packing.centres), np.int64)
-    left_at[packing.windward] = moved.level
+    left_at[packing.windward] = moved.load_step
     level = np.where(left_at > 0, np.searchsorted(stops, left_at), 0)[grains]
     is_worn = len(lines) > 1
     if is_worn:
