@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from orchestrator.fidelity import known
+from orchestrator.fidelity import measured
 from orchestrator.lab import map_file, told
 
 PAGE = Path(__file__).parents[1] / "docs" / "stability.md"
@@ -28,7 +28,7 @@ def table() -> str:
     """
     paths = sorted(map_file.FOLDER.glob("*.toml"))
     maps = [map_file.read_map(path) for path in paths]
-    stored = pd.read_csv(known.FOLDER / "maps.csv")
+    stored = pd.read_csv(measured.FOLDER / "maps.csv")
     verdicts = stored["verdict"].value_counts()
     noticed = int(stored["caught"].sum())
     counts = told.counted(maps, stored)

@@ -6,6 +6,7 @@ above the flow.
 """
 
 import math
+from functools import cache
 
 from orchestrator.bed.line import of_bed
 from orchestrator.fidelity.fidelities import packing
@@ -32,6 +33,7 @@ MOST_DISORDER = 0.2
 NEAR_ROWS = ("aligned", f"disordered up to {LEAST_DISORDER:g} d")
 
 
+@cache
 def scene_class(part: str, scene: Scene) -> str:
     """The class of a pile for the flow or for the grains.
 

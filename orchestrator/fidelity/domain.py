@@ -17,6 +17,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from orchestrator.fidelity import measured
 from orchestrator.fidelity.classes import (
     FLOW,
     GRAINS,
@@ -24,6 +25,7 @@ from orchestrator.fidelity.classes import (
     scene_class,
 )
 from orchestrator.fidelity.fidelities import FIDELITIES
+from orchestrator.fidelity.measured import Spanned
 from orchestrator.study.closed_form import outer_roughness, single_grain
 from orchestrator.study.criterion import ENTRAINED, SUSTAINED
 from orchestrator.study.fields import FIELDS, SEED
@@ -32,16 +34,17 @@ from orchestrator.study.parts import LogNormal, PileBed
 from orchestrator.study.scene import Scene, default_first_cell_height
 from orchestrator.study.scopes import APPLIES
 
-FILE = Path(__file__).with_name("calibration") / "domain.csv"
+FILE = measured.FOLDER / "domain.csv"
 NEAR = 0.02
 """Relative distance from a measured number up to which one counts as measured."""
+CRITERION = "threshold.criterion"
+"""A quantity that every scene has."""
 FRACTIONS = "threshold.fractions"
 """The quantity of which one value that was measured is enough: each has its error."""
 NONE, GIVEN = "none", "given"
 """Words of a field without a value, and of one whose value is a table or a file."""
 Value = float | str
 Read = Callable[[Scene], Iterable[Value]]
-Measured = Mapping[tuple[str, str, str], pd.DataFrame]
 SOLVED = (
     "method.flow.speed",
     "method.flow.viscosity",
@@ -236,7 +239,7 @@ SIMILAR: tuple[Quantity, ...] = (
     Quantity("grain.sizes.sigma_g", SIZES, _sigma),
     Quantity("grain.sizes.smallest", SIZES, _smallest),
     Quantity("grain.sizes.largest", SIZES, _largest),
-    Quantity("threshold.criterion", ("threshold.criterion", "fluid.kind"), _criterion),
+    Quantity(CRITERION, (CRITERION, "fluid.kind"), _criterion),
     Quantity(FRACTIONS, (FRACTIONS,), lambda scene: scene.threshold.fractions),
 )
 """Quantities of several fields, without a unit, or of a field that is a table."""
@@ -294,12 +297,12 @@ QUANTITIES = _quantities()
 """All quantities, in the order in which reasons name the first that is outside."""
 
 
-def of(measured: Mapping[str, Sequence[Scene]]) -> pd.DataFrame:
+def of(scenes: Mapping[str, Sequence[Scene]]) -> pd.DataFrame:
     """Find the domain of the errors that were measured on some scenes.
 
     Parameters
     ----------
-    measured
+    scenes
         The scenes on which the errors of each part were measured.
 
     Returns
@@ -309,9 +312,9 @@ def of(measured: Mapping[str, Sequence[Scene]]) -> pd.DataFrame:
         numbers, and a row for each of its words.
     """
     rows: list[dict[str, Value]] = []
-    for part, scenes in measured.items():
+    for part, alike in scenes.items():
         found: dict[tuple[str, str], list[Value]] = {}
-        for scene in scenes:
+        for scene in alike:
             name = scene_class(part, scene)
             for quantity in QUANTITIES:
                 if quantity.is_of(part):
@@ -337,18 +340,6 @@ def _rows(quantity: str, values: Iterable[Value]) -> Iterator[dict[str, Value]]:
         yield {"word": word}
 
 
-@cache
-def _measured() -> Measured:
-    """The rows of the file, by part, class and quantity."""
-    table = pd.read_csv(FILE, keep_default_na=False, na_values=[""])
-    keys = ["part", "scene_class", "quantity"]
-    return {
-        (str(part), str(name), str(quantity)): rows
-        for (part, name, quantity), rows in table.groupby(keys)
-    }
-
-
-@cache  # a study asks it of each fidelity
 def outside(part: str, scene: Scene) -> str:
     """Name the first quantity of a pile that is outside of what was measured.
 
@@ -365,20 +356,25 @@ def outside(part: str, scene: Scene) -> str:
         The quantity, with the values that were measured, in words; empty where there
         is none. Of a class that was not measured it is the bed.
     """
+    return _outside(part, scene, measured.folder())
+
+
+@cache  # a study asks it of each fidelity
+def _outside(part: str, scene: Scene, _: Path) -> str:
     name = scene_class(part, scene)
-    measured = _measured()
-    if not any(key[:2] == (part, name) for key in measured):
+    domain = measured.domain()
+    if (part, name, CRITERION) not in domain:
         return "such a bed"
     for quantity in QUANTITIES:
         if not quantity.is_of(part):
             continue
-        rows = measured.get((part, name, quantity.name))
+        spanned = domain.get((part, name, quantity.name))
         values = [*quantity.read(scene)]
-        beyond = [value for value in values if not _is_within(value, rows)]
+        beyond = [value for value in values if not _is_within(value, spanned)]
         if quantity.name == FRACTIONS and len(beyond) < len(values):
             continue
         if beyond:
-            return _in_words(quantity.name, rows)
+            return _in_words(quantity.name, spanned)
     return ""
 
 
@@ -403,10 +399,9 @@ def has_measured(scene: Scene, fraction: float) -> bool:
     )
 
 
-@cache
 def _has_measured(part: str, name: str, fraction: float) -> bool:
     """Whether errors of a class were measured at a fraction, or on both sides of it."""
-    return _is_within(fraction, _measured().get((part, name, FRACTIONS)))
+    return _is_within(fraction, measured.domain().get((part, name, FRACTIONS)))
 
 
 def unmeasured(scene: Scene) -> str:
@@ -461,32 +456,27 @@ def _unmeasured_solve(scene: Scene) -> str:
     return f"method.flow.roughness = {roughness:.3g} m"
 
 
-def _is_within(value: Value, rows: pd.DataFrame | None) -> bool:
+def _is_within(value: Value, spanned: Spanned | None) -> bool:
     """Whether a value is one of those measured, or between them."""
-    if rows is None:
+    if spanned is None:
         return False
     if isinstance(value, str):
-        return bool((rows["word"] == value).any())
-    numbers = rows.dropna(subset=["least"])
-    if numbers.empty:
-        return False
-    (row,) = numbers.to_dict("records")
+        return value in spanned.words
     margin = NEAR * abs(value)
-    is_below = value < row["least"] - margin
-    return not (is_below or value > row["most"] + margin)
+    return spanned.least - margin <= value <= spanned.most + margin
 
 
-def _in_words(name: str, rows: pd.DataFrame | None) -> str:
+def _in_words(name: str, spanned: Spanned | None) -> str:
     """A quantity with what was measured of it."""
-    if rows is None:
+    if spanned is None:
         return name
-    words = [str(word) for word in rows["word"].dropna()]
-    numbers = rows.dropna(subset=["least"])
-    if words == [NONE] and numbers.empty:
+    least, most = spanned.least, spanned.most
+    words = [*spanned.words]
+    has_numbers = least <= most
+    if words == [NONE] and not has_numbers:
         return name
-    for row in numbers.to_dict("records"):
-        least, most = row["least"], row["most"]
-        if math.isnan(most):
+    if has_numbers:
+        if math.isinf(most):
             return f"{name} below {least:.3g}"
         if most - least > NEAR * abs(most):
             return f"{name} outside {least:.3g} … {most:.3g}"

@@ -1,20 +1,13 @@
-"""Known errors of the fidelities: what `orchestrator ladder` measured, by class.
+"""Numerical errors of the fidelities: what is known of a pile.
 
-``calibration/errors.csv`` has the largest error over the scenes of each class. A class
-has a known error where at least `LEAST_SCENES` scenes were measured, and a scene of it
-where it is within what they were (`orchestrator.fidelity.domain`).
+A class has a known error where at least `LEAST_SCENES` scenes were measured, and a
+scene of it where it is within what they were (`orchestrator.fidelity.domain`).
 """
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
-from typing import NamedTuple
 
-import numpy as np
-import pandas as pd
-
+from orchestrator.fidelity import measured
 from orchestrator.fidelity.classes import (
     FLOW,
     GRAINS,
@@ -32,66 +25,10 @@ from orchestrator.fidelity.fidelities import (
     Fidelity,
     Rung,
 )
+from orchestrator.fidelity.measured import NOTHING, Error, Measured, together
 from orchestrator.study.scene import Scene
 
-FOLDER = Path(__file__).with_name("calibration")
-LEAST_SCENES = 10  # of a class, for an error to be known
 UNBOUND = 10.0  # a rung that was off by so many times a threshold says nothing of it
-
-
-class Error(NamedTuple):
-    """Relative error of tau_c against the reference, at one fraction.
-
-    Attributes
-    ----------
-    error
-        Largest relative difference from the reference.
-    uncertainty
-        Change of the reference itself when its own numbers were changed; None where
-        that was not tried.
-    """
-
-    error: float
-    uncertainty: float | None
-
-    @property
-    def total(self) -> float:
-        """Error and known uncertainty: the root of the sum of their squares."""
-        return math.hypot(self.error, self.uncertainty or 0.0)
-
-
-class Measured(NamedTuple):
-    """The measured errors of a rung on a class of scenes.
-
-    Attributes
-    ----------
-    fractions
-        Fractions n/N at which they were measured, from the least.
-    errors, uncertainties
-        What `Error` has, at each of them.
-    """
-
-    fractions: tuple[float, ...]
-    errors: tuple[float, ...]
-    uncertainties: tuple[float | None, ...]
-
-    def at(self, fraction: float) -> Error:
-        """Find the error at a fraction; between two that were measured, the larger.
-
-        Parameters
-        ----------
-        fraction
-            Fraction n/N, of those measured or between them.
-
-        Returns
-        -------
-        Error
-            Error and uncertainty.
-        """
-        index = float(np.interp(fraction, self.fractions, range(len(self.fractions))))
-        beside = {math.floor(index), math.ceil(index)}
-        found = [Error(self.errors[i], self.uncertainties[i]) for i in beside]
-        return max(found, key=lambda one: one.total)
 
 
 @dataclass(frozen=True)
@@ -127,20 +64,15 @@ class Known:
             Error and uncertainty; infinite where they are not known.
         """
         if self.parts is None:
-            return Error(math.inf, math.inf)
-        parts = [part.at(fraction) for part in self.parts]
-        found = Error(
-            math.hypot(*(part.error for part in parts)),
-            math.hypot(*(part.uncertainty or 0.0 for part in parts)),
-        )
-        return found if found.total < UNBOUND else Error(math.inf, math.inf)
+            return NOTHING
+        found = together(tuple(part.at(fraction) for part in self.parts))
+        return found if found.total < UNBOUND else NOTHING
 
     @property
     def worst(self) -> Error:
         """The error at the asked fraction at which it is largest."""
         found = map(self.at, self.fractions)
-        nothing = Error(math.inf, math.inf)
-        return max(found, key=lambda one: one.total, default=nothing)
+        return max(found, key=lambda one: one.total, default=NOTHING)
 
     @property
     def total(self) -> float:
@@ -201,7 +133,7 @@ def _of_flow(scene: Scene) -> Known:
 
 def _of(keys: Iterable[tuple[str, str, str]], scene: Scene) -> Known:
     """Known error of the rungs of a pile on their classes."""
-    table = measured()
+    table = measured.errors()
     parts = []
     for key in keys:
         if key not in table:
@@ -219,34 +151,8 @@ def _no_finer(part: str, scene: Scene) -> Rung:
     name = scene_class(part, scene)
     for one in FIDELITIES[::-1]:
         rung = one.flow if part == FLOW else one.grains
-        if (part, rung.name, name) in measured() and rung.describes(
+        if (part, rung.name, name) in measured.errors() and rung.describes(
             scene, or_finer=True
         ):
             return rung
     return OWN
-
-
-@cache
-def measured() -> dict[tuple[str, str, str], Measured]:
-    """The measured errors, by part, name of the rung and class of scene.
-
-    What fewer than `LEAST_SCENES` scenes say is left out: a class, or an uncertainty,
-    which is None then. Without it nobody knows what the reference is worth: of grains
-    nothing is known of the class, of the flow nothing of the reference.
-    """
-    table = pd.read_csv(FOLDER / "errors.csv").sort_values("fraction")
-    is_tried = table["uncertainty_scenes"] >= LEAST_SCENES
-    table["uncertainty"] = table["uncertainty"].where(is_tried)
-    found: dict[tuple[str, str, str], Measured] = {}
-    for (part, rung, name), rows in table.groupby(["part", "rung", "scene_class"]):
-        is_bare = rows["uncertainty"].isna().any()
-        if is_bare and (part == GRAINS or rung == REFERENCE.name):
-            continue
-        if rows["scenes"].min() >= LEAST_SCENES:
-            uncertainties = rows["uncertainty"].astype(object)
-            found[str(part), str(rung), str(name)] = Measured(
-                tuple(rows["fraction"]),
-                tuple(rows["error"]),
-                tuple(uncertainties.where(rows["uncertainty"].notna(), None)),
-            )
-    return found

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.digits import number
-from orchestrator.fidelity.known import FOLDER
+from orchestrator.fidelity.measured import FOLDER
 from orchestrator.study.closed_form import closed_form
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene

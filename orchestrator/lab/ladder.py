@@ -47,14 +47,16 @@ from orchestrator.fidelity.fidelities import (
 from orchestrator.grains.loads import forget
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import of_pile
+from orchestrator.lab import calibration
 from orchestrator.report import style
 from orchestrator.report.card import Card, Number, Worth
 from orchestrator.report.page import Limits, Paragraphs, Section, Table
 from orchestrator.report.style import Figure, Look
 from orchestrator.runs.case import Case
+from orchestrator.study.criterion import ENTRAINED
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
-from orchestrator.study.study import Study
+from orchestrator.study.study import Study, changed
 from orchestrator.tables.rows import point
 from orchestrator.types import FloatArray, Row
 
@@ -262,6 +264,8 @@ def _about(scene: Scene, pair: Fidelity, count: int) -> Row:
         "scene": label(scene),
         **point(scene),
         "packing": packed,
+        "geometry": geometry(scene, scene.bed),
+        "pile": changed(scene, {"threshold.criterion": ENTRAINED}).id,
         "in_time": scene.method.is_resolved_in_time,
         **{f"class_{part}": scene_class(part, scene) for part in RUNGS},
         "count": count,
@@ -422,7 +426,7 @@ def _is_beaten(row: FloatArray, others: FloatArray) -> bool:
 
 
 def known_errors(points: pd.DataFrame) -> pd.DataFrame:
-    """Find the known error of each rung, by class and fraction.
+    """Find the numerical error of each rung, by class and fraction.
 
     Parameters
     ----------
@@ -432,21 +436,40 @@ def known_errors(points: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        A row for each part, rung, class and fraction; `known.measured` reads it. The
-        error is the largest over the scenes, infinite where only one of rung and
-        reference reached the fraction, zero where neither did. The uncertainty is how
-        far the reference itself moved on `uncertainty_scenes`; empty where the
-        reference was not run with other numbers.
+        A row for each part, rung, class and fraction, as `fidelity.measured` reads it.
+        The uncertainty is how far the reference itself moved; empty where the reference
+        was not run with other numbers.
+    """
+    again = {GRAINS: AGAIN, FLOW: FINER}
+    return calibration.table(scene_errors(points), again)
+
+
+def scene_errors(points: pd.DataFrame) -> pd.DataFrame:
+    """Find the error of each rung on each pile.
+
+    Parameters
+    ----------
+    points
+        The points, by `points`.
+
+    Returns
+    -------
+    DataFrame
+        A row for each part, rung, pile and fraction: the relative difference from the
+        reference, infinite where only one of rung and reference reached the fraction,
+        zero where neither did. Scenes that share their runs, since they differ in the
+        criterion of motion alone, are one pile; the larger of their errors counts.
     """
     beside = np.where(points["class_flow"] == LEVEL_BED, FLAT.name, REFERENCE.name)
     grains = points[(points["flow_rung"] == beside) & points["in_time"]]
     flow = points[(points["grain_rung"] == PEELING.name) & points["same_model"]]
+    # over a level bed no flow is solved, and no rung of it has an error
+    flow = flow[flow["class_flow"] != LEVEL_BED]
     tables = [
-        _known(grains, GRAINS, "grain_rung", AGAIN),
-        _known(flow, FLOW, "flow_rung", FINER),
+        _scene_errors(grains, GRAINS, "grain_rung"),
+        _scene_errors(flow, FLOW, "flow_rung"),
     ]
-    columns = ["error", "uncertainty", "uncertainty_scenes", "cost_core_s", "scenes"]
-    return pd.concat(tables)[[*KNOWN_BY, *columns]].sort_values(KNOWN_BY)
+    return pd.concat(tables, ignore_index=True)
 
 
 def measured_domain(pairs: Iterable[Decision]) -> pd.DataFrame:
@@ -478,35 +501,46 @@ def measured_domain(pairs: Iterable[Decision]) -> pd.DataFrame:
     return domain.of(scenes)
 
 
-def _known(table: pd.DataFrame, part: str, rung: str, again: str) -> pd.DataFrame:
-    """Known error of each rung of a part of piles; `rung` is its column.
-
-    `again` is the rung that is as good as the reference.
-    """
+def _scene_errors(table: pd.DataFrame, part: str, rung: str) -> pd.DataFrame:
+    """The errors of each rung of a part of piles; `rung` is its column."""
     names = {rung: "rung", f"class_{part}": "scene_class", f"{part}_s": "cost_core_s"}
     rows = table.rename(columns=names).assign(part=part)
     taus = [name for name in table if str(name).startswith("tau_")]
-    kept = ["scene_id", "part", "rung", "scene_class", "cost_core_s"]
-    rows = rows.melt(kept, taus, "fraction", "tau")
+    about = ["scene_class", "pile", "geometry", "cost_core_s"]
+    rows = rows.melt(["scene_id", "part", "rung", *about], taus, "fraction", "tau")
     is_best = rows["rung"] == REFERENCE.name
     base = rows.loc[is_best, ["scene_id", "fraction", "tau"]]
     rows = rows.merge(base, on=["scene_id", "fraction"], suffixes=("", "_best"))
-    error = (rows["tau"] / rows["tau_best"] - 1).abs().fillna(math.inf)
+    error = (rows["tau"] / rows["tau_best"] - 1).fillna(math.inf)
     neither = rows["tau"].isna() & rows["tau_best"].isna()
     rows["error"] = error.mask(neither, 0.0)
     rows["fraction"] = rows["fraction"].str.removeprefix("tau_").astype(float)
-    groups = rows.groupby(KNOWN_BY)
-    known = groups.agg(
-        error=("error", "max"),
-        cost_core_s=("cost_core_s", "mean"),
-        scenes=("scene_id", "size"),
-    ).reset_index()
-    place = ["scene_class", "fraction"]
-    shift = known.loc[known["rung"] == again, [*place, "error", "scenes"]]
-    names = {"error": "uncertainty", "scenes": "uncertainty_scenes"}
-    known = known.merge(shift.rename(columns=names), "left", place)
-    count = known["uncertainty_scenes"].fillna(0).astype(int)
-    return known.assign(uncertainty_scenes=count)
+    columns = ["part", "rung", "fraction", *about, "error"]
+    largest = rows["error"].abs().sort_values(kind="stable").index
+    one = ["part", "rung", "fraction", "scene_class", "pile"]
+    return rows.loc[largest, columns].drop_duplicates(one, keep="last").sort_index()
+
+
+def geometry(scene: Scene, bed: PileBed) -> str:
+    """Name the geometry of a pile: what beds of other fluids and grains share.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    bed
+        Its bed.
+
+    Returns
+    -------
+    str
+        Its form, its slope and its height in grains; of a poured bed the draw, too.
+    """
+    height = (bed.relief or bed.level_length) / scene.grain.diameter
+    words = [bed.shape_name, f"{bed.slope_deg:g}°", f"{height:.3g} d"]
+    if scene.is_poured:
+        words.append(f"seed {bed.seed}")
+    return ", ".join(words)
 
 
 def _sections(pairs: pd.DataFrame, known: pd.DataFrame) -> list[Section]:

@@ -1,12 +1,14 @@
 """Known errors: to which class a scene belongs, and what holds for it."""
 
 import math
+import shutil
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.fidelity import known as errors
+from orchestrator.fidelity import measured
 from orchestrator.fidelity.classes import FLOW, GRAINS, LEVEL_BED, scene_class
 from orchestrator.fidelity.decision import written
 from orchestrator.fidelity.fidelities import (
@@ -16,7 +18,8 @@ from orchestrator.fidelity.fidelities import (
     fidelity_of,
     named,
 )
-from orchestrator.fidelity.known import FOLDER, LEAST_SCENES, UNKNOWN, known, measured
+from orchestrator.fidelity.known import UNKNOWN, known
+from orchestrator.fidelity.measured import FOLDER, LEAST_SCENES, Error, errors, together
 from orchestrator.study.study import changed
 from tests.fidelity.conftest import MakePile
 
@@ -77,7 +80,7 @@ KEYS = ((FLOW, "static", "wall"), (GRAINS, "static", "aligned"))
 def _totals(*keys: tuple[str, str, str]) -> list[list[float]]:
     """Errors with their uncertainties, a row for each part."""
     fractions = (0.1, 0.3, 0.5, 0.7)
-    return [[measured()[key].at(one).total for one in fractions] for key in keys]
+    return [[errors()[key].at(one).total for one in fractions] for key in keys]
 
 
 def test_errors_of_flow_and_grains_add_up_by_their_squares(pile: MakePile) -> None:
@@ -99,22 +102,65 @@ def test_between_two_fractions_the_larger_error_holds(pile: MakePile) -> None:
     lower, upper = found.at(0.1).total, found.at(0.3).total
     assert lower != upper
     for key in KEYS:
-        part = measured()[key]
+        part = errors()[key]
         assert part.at(0.2).total == max(part.at(0.1).total, part.at(0.3).total)
     assert found.at(0.2).total >= max(lower, upper)
 
 
 def test_a_class_of_fewer_than_ten_scenes_has_no_known_error(
-    monkeypatch: pytest.MonkeyPatch, pile: MakePile
+    monkeypatch: pytest.MonkeyPatch, pile: MakePile, tmp_path: Path
 ) -> None:
     table = pd.read_csv(FOLDER / "errors.csv")
     of_class = (table["part"] == GRAINS) & (table["scene_class"] == "aligned")
     assert (table[of_class]["scenes"] >= LEAST_SCENES).all()
     fewer = table.assign(scenes=table["scenes"].where(~of_class, LEAST_SCENES - 1))
-    monkeypatch.setattr(pd, "read_csv", lambda path: fewer)
-    monkeypatch.setattr(errors, "measured", errors.measured.__wrapped__)
+    fewer.to_csv(tmp_path / "errors.csv", index=False)
+    shutil.copy(FOLDER / "domain.csv", tmp_path)
+    monkeypatch.setattr(measured, "_used", [tmp_path])
     assert known(STATIC, pile()) == UNKNOWN
     assert math.isfinite(known(STATIC, pile(packing="horizontal")).total)
+
+
+def test_errors_that_were_measured_elsewhere_are_taken(
+    monkeypatch: pytest.MonkeyPatch, pile: MakePile, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(measured, "_used", [FOLDER])
+    before = known(STATIC, pile())
+    table = pd.read_csv(FOLDER / "errors.csv")
+    table.assign(error=2 * table["error"]).to_csv(tmp_path / "errors.csv", index=False)
+    domain = (FOLDER / "domain.csv").read_text(encoding="utf-8")
+    (tmp_path / "domain.csv").write_text(domain, encoding="utf-8")
+    measured.use(tmp_path)
+    assert known(STATIC, pile()).at(0.3).error == pytest.approx(
+        2 * before.at(0.3).error
+    )
+    # no pile of 20 mm was measured there
+    of_height = "bed.height/grain.diameter"
+    lines = [line for line in domain.splitlines() if of_height not in line]
+    (tmp_path / "none").mkdir()
+    (tmp_path / "none" / "domain.csv").write_text("\n".join(lines), encoding="utf-8")
+    shutil.copy(FOLDER / "errors.csv", tmp_path / "none")
+    measured.use(tmp_path / "none")
+    assert known(STATIC, pile()) == UNKNOWN
+
+
+def test_what_was_not_run_is_empty_and_counts_as_nothing() -> None:
+    """An uncertainty that nobody has measured is not zero."""
+    for key, found in errors().items():
+        for one in found.errors:
+            assert one.uncertainty is None or one.uncertainty >= 0, key
+    table = pd.read_csv(FOLDER / "errors.csv")
+    untried = table["uncertainty_scenes"] == 0
+    assert untried.any()
+    assert table.loc[untried, "uncertainty"].isna().all()
+    both = together((Error(0.03, None), Error(0.04, None)))
+    assert (both.error, both.uncertainty) == (pytest.approx(0.05), None)
+
+
+def test_an_error_is_printed_with_the_share_that_it_held_and_of_how_many() -> None:
+    assert str(Error(0.03, 0.04, 0.95, 0.97, 552)) == "within 5.0%: 97% of 552"
+    few = str(Error(0.03, None, 0.9, 0.91, 11))
+    assert few == "within 3.0%: 91% of 11, for 90% since these are few"
 
 
 def test_every_measured_class_has_its_reference_and_every_fidelity() -> None:
@@ -187,5 +233,5 @@ def test_own_numbers_have_the_error_of_a_coarser_fidelity(pile: MakePile) -> Non
     parts = ((FLOW, "standard", "wall"), (GRAINS, "quick", "aligned"))
     found = known(OWN_NUMBERS, pivot)
     for fraction in pivot.threshold.fractions:
-        totals = [measured()[part].at(fraction).total for part in parts]
+        totals = [errors()[part].at(fraction).total for part in parts]
         assert found.at(fraction).total == pytest.approx(math.hypot(*totals))

@@ -6,8 +6,9 @@ import pandas as pd
 import pytest
 
 from orchestrator import cli, pipeline
-from orchestrator.fidelity import known
+from orchestrator.fidelity import measured
 from orchestrator.fidelity.fidelities import FIDELITIES, QUICK
+from orchestrator.fidelity.measured import Error, Measured
 from orchestrator.study import study
 
 PILES = """
@@ -61,11 +62,11 @@ def test_an_answer_that_its_check_contradicts_is_not_usable(
     # quick by pivots, and data that call them good for level rows, which they are not
     monkeypatch.setitem(QUICK.grains.on, "horizontal", {})
     wrong = {
-        (part, one.name, like): known.Measured((0.1, 0.7), (0.01, 0.01), (0.0, 0.0))
+        (part, one.name, like): Measured((0.1, 0.7), 2 * (Error(0.01, 0.0),))
         for part, like in (("flow", "wall"), ("grains", "horizontal"))
         for one in FIDELITIES
     }
-    monkeypatch.setattr(known, "measured", lambda: wrong)
+    monkeypatch.setattr(measured, "errors", lambda: wrong)
     tables = _run("horizontal", tmp_path, BY_HAND)
     groups = tables["scenes"][["scene_id", "group"]]
     answers = tables["pile_threshold"].merge(groups)

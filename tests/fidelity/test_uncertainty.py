@@ -2,10 +2,11 @@
 
 import pytest
 
-from orchestrator.fidelity import known
+from orchestrator.fidelity import measured
 from orchestrator.fidelity.classes import FLOW, GRAINS
 from orchestrator.fidelity.decision import decide
 from orchestrator.fidelity.fidelities import FIDELITIES
+from orchestrator.fidelity.measured import Error, Measured
 from orchestrator.study.study import changed
 from tests.fidelity.conftest import MakePile
 
@@ -20,11 +21,11 @@ def test_the_uncertainty_of_the_reference_counts(
     fractions = (0.1, 0.3, 0.5, 0.7)
     table = {}
     for one in FIDELITIES:
-        exact = known.Measured(fractions, 4 * (0.0,), 4 * (0.0,))
-        off = known.Measured(fractions, 4 * (ERROR,), 4 * (UNCERTAINTY,))
+        exact = Measured(fractions, 4 * (Error(0.0, None),))
+        off = Measured(fractions, 4 * (Error(ERROR, UNCERTAINTY),))
         table[FLOW, one.name, "wall"] = exact
         table[GRAINS, one.name, "aligned"] = off
-    monkeypatch.setattr(known, "measured", lambda: table)
+    monkeypatch.setattr(measured, "errors", lambda: table)
     scene = changed(pile(), {"method.kind": "auto"})
     answer = decide(scene, tolerance)
     assert answer.is_chosen

@@ -14,7 +14,7 @@ from orchestrator.bed import packing
 from orchestrator.experiment import Runs, piles
 from orchestrator.fidelity.classes import LEVEL_BED, scene_class
 from orchestrator.fidelity.fidelities import FIDELITIES, FLAT
-from orchestrator.fidelity.known import LEAST_SCENES
+from orchestrator.fidelity.measured import LEAST_SCENES
 from orchestrator.lab import ladder
 from orchestrator.lab.ladder import REFERENCES, RUNGS
 from orchestrator.physics import threshold
@@ -111,12 +111,13 @@ def test_the_cost_of_a_pile_does_not_depend_on_what_was_asked_before(
 
 
 def _point(pair: tuple[str, str], factor: float = 1.0, **other: Any) -> dict[str, Any]:
-    names = {"scene_id": "a", "packing": "aligned", "in_time": True, "same_model": True}
+    names = {"scene_id": "a", "pile": "a", "geometry": "20°", "packing": "aligned"}
+    facts = {"in_time": True, "same_model": True}
     classes = {"class_flow": "wall", "class_grains": "aligned"}
     times = {"flow_s": 1.0, "grains_s": 1.0, "model_floor": 0.2}
     taus = {name: factor * value for name, value in TAU.items()}
     rungs = dict(zip(("flow_rung", "grain_rung"), pair, strict=True))
-    return {**names, **classes, **rungs, **times, **taus, **other}
+    return {**names, **facts, **classes, **rungs, **times, **taus, **other}
 
 
 def _table(*more: dict[str, Any]) -> pd.DataFrame:
@@ -149,6 +150,7 @@ def test_errors_are_relative_to_the_reference_and_the_front_is_not_beaten() -> N
 def test_known_errors_stand_beside_the_uncertainty_of_the_reference() -> None:
     over: dict[str, Any] = {
         "scene_id": "b",
+        "pile": "b",
         "class_flow": LEVEL_BED,
         "class_grains": "poured",
     }

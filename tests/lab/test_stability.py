@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from matplotlib.patches import Rectangle
 
-from orchestrator.fidelity import known, limits
+from orchestrator.fidelity import limits, measured
 from orchestrator.lab import stability, told
 from orchestrator.lab.map_file import FOLDER, StabilityMap, read_map
 from orchestrator.lab.stability import NOTICED
@@ -70,7 +70,7 @@ def test_verdicts_are_those_of_real_runs(
 
 
 def test_the_limits_were_read_off_the_maps() -> None:
-    table = pd.read_csv(known.FOLDER / "maps.csv")
+    table = pd.read_csv(measured.FOLDER / "maps.csv")
     noticed = table[table["verdict"].isin(NOTICED)]
     assert noticed["caught"].all()
 
@@ -116,7 +116,7 @@ def test_each_cell_shows_its_worst_run() -> None:
 def test_a_study_tells_every_stored_answer_that_is_wrong_unless_its_map_says_why_not() -> (
     None
 ):
-    table = pd.read_csv(known.FOLDER / "maps.csv")
+    table = pd.read_csv(measured.FOLDER / "maps.csv")
     maps = [read_map(path) for path in sorted(FOLDER.glob("*.toml"))]
     found = told.told(maps, table)
     silent = (table["verdict"] == "wrong") & ~table["caught"]
