@@ -6,8 +6,8 @@ confidence. A further scene of the same kind is within it with that probability,
 whatever the distribution.
 
 Classes of one family are pooled where they do not differ: where the half width of the
-others holds as many of the scenes of each as chance allows. The coverage is that of
-scenes of which no scene of the same geometry was used.
+narrower ones leaves out no more of the scenes of the next one than chance does. The
+coverage is that of scenes of which no scene of the same geometry was used.
 """
 
 import math
@@ -25,7 +25,7 @@ USUAL, FEW = 0.95, 0.9
 LEAST_USUAL = 19
 """Scenes from which on a share of 95 % is found."""
 CHANCE = 0.05
-"""Classes differ if chance alone leaves out so many scenes less often."""
+"""Classes differ if chance alone leaves out so many scenes more seldom."""
 FAMILIES = {
     "rows and slight gaps": ("aligned", "disordered up to 0.02 d"),
 }
@@ -64,6 +64,24 @@ def confidence(scenes: int) -> float:
     return USUAL if scenes >= LEAST_USUAL else FEW
 
 
+def rank(scenes: int, share: float) -> int:
+    """Find the rank of the error that holds a share of further scenes.
+
+    Parameters
+    ----------
+    scenes
+        Number of measured scenes.
+    share
+        The share.
+
+    Returns
+    -------
+    int
+        The rank, from 1; the last one where too few scenes were measured.
+    """
+    return min(math.ceil((scenes + 1) * share - 1e-9), scenes)
+
+
 def half_width(sizes: FloatArray, share: float) -> float:
     """Find the conformal quantile of the sizes of errors.
 
@@ -83,8 +101,7 @@ def half_width(sizes: FloatArray, share: float) -> float:
     count = len(sizes)
     if not count:
         return math.nan
-    rank = math.ceil((count + 1) * share - 1e-9)
-    return float(np.sort(sizes)[min(rank, count) - 1])
+    return float(np.sort(sizes)[rank(count, share) - 1])
 
 
 def coverage(sizes: FloatArray, geometries: FloatArray) -> float:
@@ -116,6 +133,10 @@ def coverage(sizes: FloatArray, geometries: FloatArray) -> float:
 def pools(sizes: dict[str, FloatArray]) -> list[tuple[str, ...]]:
     """Put classes together that do not differ.
 
+    The class with the least errors begins a pool. Each further one, by its own half
+    width, joins it unless the half width of the pool leaves out more of its scenes than
+    chance does; then it begins the next pool.
+
     Parameters
     ----------
     sizes
@@ -124,29 +145,30 @@ def pools(sizes: dict[str, FloatArray]) -> list[tuple[str, ...]]:
     Returns
     -------
     list of tuple of str
-        The pools. A class whose scenes the half width of the others does not hold, as
-        often as chance allows, has none with them.
+        The pools, from those of the least errors.
     """
-    left = dict(sizes)
-    apart = {}
-    while len(left) > 1:
-        odds = {name: _odds(name, left) for name in left}
-        least = min(odds, key=lambda name: odds[name])
-        if odds[least] >= CHANCE:
-            break
-        apart[least] = left.pop(least)
-    found = [tuple(sorted(left))]
-    if apart:
-        found += pools(apart)
-    return found
+    widths = {name: half_width(of_class, FEW) for name, of_class in sizes.items()}
+    found: list[list[str]] = []
+    for name in sorted(sizes, key=lambda one: (widths[one], one)):
+        if found:
+            pool = np.concatenate([sizes[one] for one in found[-1]])
+            if _left_out(sizes[name], pool) >= CHANCE:
+                found[-1].append(name)
+                continue
+        found.append([name])
+    return [tuple(sorted(pool)) for pool in found]
 
 
-def _odds(name: str, sizes: dict[str, FloatArray]) -> float:
-    """How often chance leaves out so many scenes of a class, or more."""
-    others = np.concatenate([sizes[other] for other in sizes if other != name])
-    share = confidence(len(others))
-    within = int((sizes[name] <= half_width(others, share)).sum())
-    return float(stats.binom.cdf(within, len(sizes[name]), share))
+def _left_out(sizes: FloatArray, others: FloatArray) -> float:
+    """How often chance leaves so many, or more, outside the half width of others.
+
+    The share of a distribution below an order statistic of n of its values has a beta
+    distribution, whatever the distribution.
+    """
+    count = len(others)
+    found = rank(count, confidence(count))
+    within = int((sizes <= half_width(others, confidence(count))).sum())
+    return float(stats.betabinom.cdf(within, len(sizes), found, count + 1 - found))
 
 
 def family(part: str, scene_class: str) -> str:
