@@ -13,6 +13,7 @@ import pytest
 from orchestrator import cli, pipeline
 from orchestrator.benchmark import commands as benchmark
 from orchestrator.errors import LONGEST, Fault, InputError, of_exception
+from orchestrator.runs import workspace
 from orchestrator.runs.workspace import EXPERIMENT, Workspace
 from tests.conftest import Command
 
@@ -167,6 +168,25 @@ def test_a_failed_case_is_named_and_the_others_are_finished(
     assert "ERROR" in (tmp_path / "out" / "report.html").read_text()
     again = orchestrator("study", grains, "--out", "out")
     assert again.returncode == 0, again.stderr
+
+
+def test_a_finished_experiment_has_a_page_and_is_not_to_be_continued(
+    tmp_path: Path,
+) -> None:
+    space = Workspace(tmp_path)
+    space.describe(EXPERIMENT, "erosion", ["pile-1"], {})
+    text, _ = workspace.status(space.root)
+    assert text.startswith("experiment erosion: 0 done, 0 unfinished, 1 not begun")
+    assert "the same command continues it" in text
+    space.page.touch()
+    assert "the same command continues it" in workspace.status(space.root)[0]
+    case = space.cases / "pile-1"
+    case.mkdir(parents=True)
+    (case / "done.json").write_text('{"id": "1"}')
+    text, has_failed = workspace.status(space.root)
+    assert f"page: {space.page}" in text
+    assert "continues" not in text
+    assert not has_failed
 
 
 def test_report_on_an_experiment_says_the_command_that_draws_it(tmp_path: Path) -> None:

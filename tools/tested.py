@@ -233,6 +233,7 @@ def of_strips(rows: pd.DataFrame, strip: Scene) -> pd.DataFrame:
         beds = flumes[flumes["model"] == model.name]
         beds = beds.assign(density_ratio=beds["rho_sol_kg_m3"] / beds["rho_f_kg_m3"])
         used: dict[str, Any] = {**columns.used(scene), "fraction": MOVED}
+        used["gust"] = scene.gust
         used["d_over_z0"] = scene.grain.diameter / scene.bed.roughness
         kind: Row = {"criterion": ENTRAINED, "force_law": law}
         kind |= {name: used[name] or "" for name in OF_STRIPS}

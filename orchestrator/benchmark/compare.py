@@ -21,6 +21,7 @@ from orchestrator.benchmark.export import Ours
 from orchestrator.benchmark.judge import (
     ANSWER,
     ANSWER_BYTES,
+    EXIT_CODE,
     MIB,
     OURS,
     USED,
@@ -351,7 +352,8 @@ def _solve(
     """Run a solver on a copy of a scene, in a directory that is removed afterwards.
 
     Its answer, its output, its times (s) and memory (MiB) are put into a directory of
-    the results; with the times is ``error``, the reason why the answer does not count.
+    the results; with the times are ``error``, the reason why the answer does not count,
+    and the exit code.
     """
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as private:
         work = Path(private, "work")
@@ -386,6 +388,7 @@ def _solve(
             folder.note(f"{name}/{ANSWER}", stream.read(ANSWER_BYTES + 1))
         used = read_json(report) or {"seconds": ended.seconds}
         used["error"] = error
+        used[EXIT_CODE] = ended.returncode
         folder.note(f"{name}/{USED}", text_of(used))
         with log.open("rb") as stream:
             folder.note(f"{name}/{LOG}", stream.read(LOG_BYTES))

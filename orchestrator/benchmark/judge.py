@@ -40,9 +40,10 @@ ALIKE_FROM = 3
 """Different expected values from which answers may be off alike."""
 OTHER = 1e-2
 """Relative difference up to which an answer is the value of another quantity."""
-DECLINED = "it ended with 2(:|$)"
-"""Message of a solver that does not know a kind of scene."""
-
+DECLINED = 2
+"""Exit code of a solver that does not know a kind of scene."""
+EXIT_CODE = "exit_code"
+"""Key of the exit code of a solver in `USED`."""
 NOT_RUN = "it was not run"
 """Message of a solver that has no directory for a scene."""
 
@@ -105,8 +106,9 @@ class Answers:
         Each answer by scene, quantity and `seven_digits`.
     used
         A row for each scene, by its name: ``message``, the reason why its answer does
-        not count, or empty; `TIMES` in s, s and MiB, and `STEPS`, NaN where one is not
-        known.
+        not count, or empty; ``declined`` and ``not_run``, whether the solver does not
+        know such scenes, and has no directory for it; `TIMES` in s, s and MiB, and
+        `STEPS`, NaN where one is not known.
     """
 
     numbers: Mapping[Key, float]
@@ -133,20 +135,21 @@ class Answers:
         for name in names:
             about = read_json(place / name / USED)
             message = str(about.get("error") or "")
+            is_declined = bool(message) and about.get(EXIT_CODE) == DECLINED
+            is_left = not message and not (place / name).is_dir()
             given: dict[tuple[str, str], float] = {}
             if not message:
                 try:
                     given = _answer(place / name / ANSWER)
                 except FileNotFoundError:
-                    message = f"it wrote no {ANSWER}"
-                    if not (place / name).is_dir():
-                        message = NOT_RUN
+                    message = NOT_RUN if is_left else f"it wrote no {ANSWER}"
                 except (OSError, ValueError) as fault:
                     message = f"{ANSWER}: {fault}"
             for (quantity, at), number in given.items():
                 numbers[name, quantity, at] = number
             # the message repeats the output of a program
             row: dict[str, Any] = {"message": one_line(message)}
+            row |= {"declined": is_declined, "not_run": is_left}
             for column in TIMES:
                 row[column] = _measured(about.get(column))
             row[STEPS] = _measured(given.get((STEPS, "")))
@@ -241,7 +244,7 @@ def judge_solvers(
     again = Answers.read(results[0] / OURS, names)
     table = _compared(expected, OURS, None, again)
     numbers.append(table)
-    of_ours = Answers({}, again.used.assign(message=""))
+    of_ours = Answers({}, again.used.assign(message="", declined=False, not_run=False))
     verdicts.append(_verdicts(chosen, names, table, of_ours, again.used))
     return pd.concat(numbers, ignore_index=True), pd.concat(verdicts, ignore_index=True)
 
@@ -301,10 +304,10 @@ def _verdicts(
     for key in ("level", "kind"):
         verdict[key] = [chosen.scenes[name][key] for name in names]
     verdict["message"] = messages
-    verdict = verdict.join(theirs.used.drop(columns="message"))
+    verdict = verdict.join(theirs.used[[*TIMES, STEPS]])
     verdict = verdict.join(ours[["seconds", "cpu_s", STEPS]].add_prefix("ours_"))
     verdict["answered"] = answered
-    verdict = verdict.join(_outcomes(verdict["message"], any(answered)))
+    verdict = verdict.join(_outcomes(verdict["message"], theirs.used, any(answered)))
 
     is_answered = judged["scene"].map(verdict["answered"])
     is_count = judged["quantity"].isin(COUNTS)
@@ -320,10 +323,12 @@ def _verdicts(
     return verdict
 
 
-def _outcomes(messages: "pd.Series[str]", has_answered: bool) -> pd.DataFrame:
+def _outcomes(
+    messages: "pd.Series[str]", used: pd.DataFrame, has_answered: bool
+) -> pd.DataFrame:
     """Whether each scene passed, was declined or not run, or else failed."""
-    is_known = messages.str.match(DECLINED) & has_answered
-    is_left = messages == NOT_RUN
+    is_known = used["declined"] & has_answered
+    is_left = used["not_run"]
     if is_left.all():  # a solver that has no scene at all has failed
         is_left = is_left & False
     verdict = pd.DataFrame(

@@ -54,10 +54,17 @@ LIQUID, GAS = "liquid", "gas"
 GRAINS = Path(__file__).with_name("tested.csv")
 STRIPS = Path(__file__).with_name("tested_strips.csv")
 """The tested intervals of single grains, and of poured strips."""
-OF_STRIPS = ("sizes", "exposure", "sheltering", "gusts")
+OF_STRIPS = ("sizes", "exposure", "sheltering")
 """Words that tell tested strips apart, beside those of all tested intervals."""
-NUMBERS_OF_STRIPS = ("phi_deg", "poured_depth", "width", "mobile_layers", "fraction")
-"""The same, of numbers."""
+NUMBERS_OF_STRIPS = (
+    "gust",
+    "phi_deg",
+    "poured_depth",
+    "width",
+    "mobile_layers",
+    "fraction",
+)
+"""The same, of numbers; the gust of a steady flow is 1."""
 TESTED_AS, GRAIN, STRIP = "tested_as", "grain", "strip"
 """Column that says of thresholds on beds what the tested ones were of that are like
 them, and its words; that of any other bed is empty."""
@@ -338,6 +345,8 @@ def _columns(table: Any) -> dict[str, NDArray[Any]]:
     for name in NUMBERS_OF_STRIPS:
         if name in table:
             columns[name] = np.asarray(table[name], float)
+    if "gust" in columns:
+        columns["gust"] = np.nan_to_num(columns["gust"], nan=1.0)
     return columns
 
 

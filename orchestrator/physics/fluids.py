@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from orchestrator.errors import InputError, suggestion
+from orchestrator.physics.constants import GAS_BELOW
 
 PAPER = "paper"
 """The paper's gas, by its name: in it a grain has moved when it has left its pocket.
@@ -33,6 +34,22 @@ GAS_CONSTANT_OF_AIR = 287.053
 """Gas constant of dry air, J/(kg K)."""
 TEMPERATURE = "temperature_deg_c"
 """The field of a temperature in a table ``[fluid]``."""
+
+
+def is_gas(density: float) -> bool:
+    """Say whether a fluid is a gas.
+
+    Parameters
+    ----------
+    density
+        Its density, kg/m3.
+
+    Returns
+    -------
+    bool
+        Whether it is lighter than any liquid.
+    """
+    return bool(density < GAS_BELOW)
 
 
 def water(t: float) -> tuple[float, float]:

@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 
 from orchestrator.physics import saltation
 from orchestrator.physics.beside import LIKE, MOST_COHESION, SUSTAINED
-from orchestrator.physics.constants import GAS_BELOW
+from orchestrator.physics.fluids import is_gas
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.velocity import LAMINAR_BELOW, laminar
 
@@ -136,7 +136,7 @@ def of_measurements(row: Mapping[Any, Any], is_closed: bool) -> Iterator[Reason]
 
 def _held_by_cohesion(row: Mapping[Any, Any]) -> Iterator[Reason]:
     """Why a grain in a gas is held by a cohesion that its scene leaves out."""
-    if not is_gas(row):
+    if not is_gas(row["rho_f_kg_m3"]):
         return
     left_out = 1 - row["cohesion_n_m"] / MOST_COHESION
     pull = COHESION * left_out / row["d_m"]
@@ -145,22 +145,6 @@ def _held_by_cohesion(row: Mapping[Any, Any]) -> Iterator[Reason]:
         times = f"{pull / weight:.2g} times its weight"
         what = f"cohesion holds such a grain by {times} (Shao and Lu 2000)"
         yield Reason("cohesion", what, f"give a cohesion of {MOST_COHESION:g} N/m")
-
-
-def is_gas(row: Mapping[Any, Any]) -> bool:
-    """Say whether the fluid of a threshold is a gas.
-
-    Parameters
-    ----------
-    row
-        The threshold.
-
-    Returns
-    -------
-    bool
-        Whether it is lighter than any liquid.
-    """
-    return bool(row["rho_f_kg_m3"] < GAS_BELOW)
 
 
 def correction(row: Mapping[Any, Any]) -> float:
@@ -203,7 +187,7 @@ def is_measured(row: Mapping[Any, Any]) -> bool:
         return False
     computed = float(row["level_ustar_m_s"])
     has_rows = row["measured_rows"] > 0
-    if has_interval and (is_gas(row) or not has_rows):
+    if has_interval and (is_gas(row["rho_f_kg_m3"]) or not has_rows):
         over = float(row["measured_level_ustar_m_s"]) / computed
         return bool(row["tested_low"] <= theta * over**2 <= row["tested_high"])
     if not has_rows:

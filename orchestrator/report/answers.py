@@ -11,6 +11,7 @@ import pandas as pd
 from orchestrator.digits import percent
 from orchestrator.grains.pile import Pile
 from orchestrator.physics.constants import GRAIN_COLUMNS
+from orchestrator.physics.fluids import is_gas
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import MEASURED_SOURCE, wilcock_crowe_hiding
 from orchestrator.physics.verdict import USABLE
@@ -28,7 +29,6 @@ from orchestrator.report.subjects import (
     Quantity,
     digits_of_place,
     fluid,
-    is_gas,
     kind_of_grain,
     length,
     place_of_file,
@@ -180,7 +180,10 @@ def _scene(row: pd.Series, pile: Pile, results: Results) -> str:
         shape = f"{length(bed.height)} high, {slope}"
     count = f"{row['count']:.0f} counted grains"
     if not packs_grains(row):
-        count = "too many grains to follow each"
+        asked = results.plan.decisions[str(row["scene_id"])].asked
+        count = "no grains are packed, as the study asks"
+        if asked.method.is_open:
+            count = "too many grains to follow each"
     if bed.profile or bed.counted:
         grains_ = results.tables["pile_grain"]
         of_bed = grains_["scene_id"] == row["scene_id"]

@@ -9,13 +9,14 @@ import pandas as pd
 from orchestrator.digits import percent
 from orchestrator.fidelity.decision import floor_of
 from orchestrator.fidelity.limits import FROZEN_BED
+from orchestrator.physics.fluids import is_gas
 from orchestrator.physics.velocity import log_law_speed
 from orchestrator.physics.verdict import USABLE
 from orchestrator.report import counted, labels, sheets, theory
 from orchestrator.report.card import Remark
 from orchestrator.report.page import caption
 from orchestrator.report.results import Results
-from orchestrator.report.subjects import WIND, is_gas, length, place_of_file
+from orchestrator.report.subjects import WIND, length, place_of_file
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.tables.facts import packs_grains
@@ -170,10 +171,8 @@ def _of_one(row: pd.Series, rows: pd.DataFrame) -> str:
 
 def _questions(results: Results) -> Iterator[Remark]:
     """What is asked about numbers of the study file that seem to be wrong."""
-    for question in results.study.questions:
-        if not question.endswith("?"):
-            question += "."
-        yield Remark("Is the study file right?", question)
+    for asked in results.study.asked:
+        yield Remark("Is the study file right?", asked.sentence)
 
 
 def _usable(table: pd.DataFrame, reasons: pd.DataFrame) -> Iterator[Remark]:
@@ -198,7 +197,8 @@ def _of_piles(results: Results, piles: pd.DataFrame) -> Iterator[Remark]:
         grains = results.tables["pile_grain"]
         x = grains.loc[grains["scene_id"] == row["scene_id"], "x_m"]
         yield from _counted(pile.scene, pile.bed, x)
-        yield from _closed_form(row, pile.bed)
+        asked = results.plan.decisions[str(row["scene_id"])].asked
+        yield from _closed_form(row, pile.bed, is_asked=not asked.method.is_open)
         yield from _model(row, results)
     fences = [scene for scene in results.study.scenes if _has_fence(scene)]
     if fences:
@@ -270,15 +270,20 @@ def _counted(scene: Scene, bed: PileBed, x: pd.Series) -> Iterator[Remark]:
     yield Remark(f"{where}.", f"{rest[0].upper()}{rest[1:]}.")
 
 
-def _closed_form(row: pd.Series, bed: PileBed) -> Iterator[Remark]:
-    """That a bed was answered along its line, and what checks that."""
+def _closed_form(row: pd.Series, bed: PileBed, *, is_asked: bool) -> Iterator[Remark]:
+    """That a bed was answered along its line, why, and what checks that."""
     if packs_grains(row):
         return
+    why = "The bed has too many grains to follow each"
+    if is_asked:
+        why = "The study asks for a method that packs no grains"
     text = (
-        "The bed has too many grains to follow each: the local stress is compared with "
-        "the threshold of a single exposed grain on the local slope."
+        f"{why}: the local stress is compared with the threshold of a single exposed "
+        "grain on the local slope."
     )
+    head = "Closed form along the bed line."
     if pd.notna(row["pivot_x_m"]):
+        head = "Closed form, checked at one place."
         place = length(float(row["pivot_x_m"]))
         if bed.profile:
             place = f"x = {place_of_file(float(row['pivot_x_m']), bed.profile)} m"
@@ -291,7 +296,7 @@ def _closed_form(row: pd.Series, bed: PileBed) -> Iterator[Remark]:
             " Touching grains of a row would hold the first up to "
             f"{row['interlocking']:.2g} times that."
         )
-    yield Remark("Closed form, checked at one place.", text)
+    yield Remark(head, text)
 
 
 def _model(row: pd.Series, results: Results) -> Iterator[Remark]:

@@ -10,6 +10,7 @@ from typing import Any
 from orchestrator.digits import percent
 from orchestrator.physics import verdict
 from orchestrator.physics.beside import FIELD, LEVEL_DEG, SUSTAINED
+from orchestrator.physics.fluids import is_gas
 from orchestrator.physics.reported import COUNT, MEASURED, OF_LAWS, SEEDS
 from orchestrator.report.card import Card, Number, Worth, decimals
 from orchestrator.report.subjects import (
@@ -21,7 +22,6 @@ from orchestrator.report.subjects import (
     Quantity,
     fluid,
     has_wind,
-    is_gas,
     length,
     solid,
 )

@@ -3,8 +3,7 @@
 import math
 from typing import NamedTuple
 
-from orchestrator.physics.constants import GAS_BELOW
-from orchestrator.physics.fluids import is_like_paper
+from orchestrator.physics.fluids import is_gas, is_like_paper
 from orchestrator.study.profile import Profile
 
 SIZES = (
@@ -77,22 +76,6 @@ MEAN = Quantity("mean_velocity", "m/s", "flow", "mean velocity", "over the depth
 STRESS = Quantity("stress", "Pa", "flow", "stress", "of the flow on the bed")
 DEPTH = Quantity("depth", "m", "flow", "depth", "of the flow")
 USTAR = Quantity("ustar0", "m/s", "flow", "friction velocity", "of the flow upstream")
-
-
-def is_gas(density: float) -> bool:
-    """Say whether a fluid is a gas.
-
-    Parameters
-    ----------
-    density
-        Its density, kg/m3.
-
-    Returns
-    -------
-    bool
-        Whether it is lighter than any liquid.
-    """
-    return density < GAS_BELOW
 
 
 def has_wind(density: float, depth: float) -> bool:

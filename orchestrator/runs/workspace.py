@@ -499,22 +499,25 @@ def status(directory: Path) -> tuple[str, bool]:
         if cause:
             causes[name] = cause
     unfinished = [name for name in undone if name not in causes]
+    left = len(about["cases"]) - len(begun)
     word = "running" if is_running else "unfinished"
     counts = [
         f"{len(begun) - len(undone)} done",
         f"{len(unfinished)} {word}",
-        f"{len(about['cases']) - len(begun)} not begun",
+        f"{left} not begun",
         f"{len(causes)} failed",
     ]
-    sizes, *left = _sizes(space)
-    lines = [f"study {about['name']}: {', '.join(counts)}"]
+    kind = STUDY if "study" in about else EXPERIMENT
+    lines = [f"{kind.word} {about['name']}: {', '.join(counts)}"]
     lines += [f"  {word}: {name}" for name in unfinished]
     lines += [f"  failed: {name}: {cause}" for name, cause in causes.items()]
-    lines += [f"size: {sizes}", *left]
-    if space.drawn.is_file() and space.page.is_file():
+    lines += _sizes(space, "size: ")
+    # a run of an experiment ends with its page, and notes nothing of it
+    is_drawn = space.drawn.is_file() if kind is STUDY else not (unfinished or left)
+    if is_drawn and space.page.is_file():
         lines.append(f"page: {space.page}")
     elif not is_running:
-        lines.append("the same study command continues it")
+        lines.append("the same command continues it")
     # a study's name may come from anywhere
     return "\n".join(map(printable, lines)), bool(causes)
 
@@ -538,22 +541,23 @@ def prune(space: Workspace, done: Mapping[str, str], shown: Container[str]) -> s
     str
         A summary for people.
     """
-    before, *_ = _sizes(space)
+    before, *_ = _sizes(space, "before: ")
     pruned = []
     for name, identity in done.items():
         if name not in shown and case_states.prune_of(space.cases / name, identity):
             pruned.append(name)
-    after, *left = _sizes(space)
+    after, *left = _sizes(space, "after:  ")
     whole = ", ".join(name for name in done if name in shown)
     ran = f"pruned: {len(pruned)} cases; ./Allrun in one of them makes its files anew"
     shows = f"whole, for the pictures of the page: {whole or 'none'}"
-    return "\n".join([f"before: {before}", f"after:  {after}", ran, shows, *left])
+    return "\n".join([before, after, ran, shows, *left])
 
 
-def _sizes(space: Workspace) -> list[str]:
+def _sizes(space: Workspace, head: str) -> list[str]:
     """Bytes on disk, for people: by kind of case and of the rest, the largest first.
 
-    A second line has the cases that an earlier study file asked for, if any.
+    The first line begins with a head. A second one has the cases that an earlier study
+    file asked for, if any.
     """
     from rich.filesize import decimal
 
@@ -567,7 +571,7 @@ def _sizes(space: Workspace) -> list[str]:
     for kind, count in kinds.most_common():
         if count:
             named.append(f"{decimal(count)} {kind}")
-    lines = [f"{decimal(kinds.total())} ({', '.join(named)})"]
+    lines = [f"{head}{decimal(kinds.total())} ({', '.join(named)})"]
     left = space.left(space.description()["cases"])
     if left:
         total = decimal(sum(cases[name] for name in left))

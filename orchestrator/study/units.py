@@ -68,15 +68,29 @@ class Remark(NamedTuple):
 
     Attributes
     ----------
-    text
-        In words.
+    said
+        What it is, in words; a question has its mark.
+    advice
+        What is said behind a question; maybe nothing.
     is_question
         Whether the number may be in another unit: one that is confirmed is not asked
         about.
     """
 
-    text: str
+    said: str
+    advice: str = ""
     is_question: bool = True
+
+    @property
+    def text(self) -> str:
+        """All of it."""
+        return f"{self.said} {self.advice}".rstrip()
+
+    @property
+    def sentence(self) -> str:
+        """The same with the stop that it needs."""
+        ends = self.is_question and not self.advice
+        return self.text if ends else f"{self.text}."
 
 
 DIAMETER, WIDE = "grain.diameter", 0.1
@@ -308,9 +322,9 @@ def _of_fluid(
         if density > 0 and viscosity > 0 and not is_usual:
             dynamic = f"{viscosity:g} m2/s, or {density * viscosity:.3g} Pa s"
             name = names.get("fluid.kind", "fluid.kind")
-            question = f"is it right? {name} names water, seawater, air"
             what = f"{dynamic}, is unusual for {density:g} kg/m3"
-            return [Remark(f"{what}: {question}")]
+            advice = f"{name} names water, seawater, air"
+            return [Remark(f"{what}: is it right?", advice)]
     return []
 
 
@@ -354,8 +368,8 @@ def of_sieve(diameters: Sequence[float]) -> list[Remark]:
     if not diameters or max(diameters) < WIDEST:
         return []
     sizes = f"{min(diameters):g} to {max(diameters):g}"
-    text = f"grain.sizes are {sizes} m: did you mean mm? Divide the diameters by 1000"
-    return [Remark(text)]
+    text = f"grain.sizes are {sizes} m: did you mean mm?"
+    return [Remark(text, "Divide the diameters by 1000")]
 
 
 def hinted(refusal: InputError, asked: Sequence[Remark]) -> InputError:

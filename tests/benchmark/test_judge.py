@@ -34,6 +34,23 @@ def _results(
     return place
 
 
+def test_a_scene_is_declined_by_an_exit_code_and_not_by_words(
+    all_levels: Path, tmp_path: Path
+) -> None:
+    """A solver may print what it likes; a message alone declines nothing."""
+    chosen = pack.read_pack(all_levels)
+    right, first, second = NAMES[:3]
+    place = _results(chosen, tmp_path, {right: _text(chosen, right, {})})
+    for name, code in ((first, 2), (second, 1)):
+        (place / name).mkdir()
+        used = {"error": "it ended with 2: unknown kind", "exit_code": code}
+        (place / name / "used.json").write_text(json.dumps(used))
+    _, verdicts = judge.judge_solvers(chosen, NAMES[:3], [place])
+    theirs = verdicts[verdicts["solver"] != judge.OURS].set_index("scene")
+    assert theirs["declined"].to_dict() == {right: False, first: True, second: False}
+    assert theirs["failed"].to_dict() == {right: False, first: False, second: True}
+
+
 def _text(chosen: Pack, name: str, changed: Mapping[int, str]) -> str:
     """The expected answer to a scene as a file, with other texts for some of its values."""
     expected = chosen.expected[chosen.expected["scene"] == name]

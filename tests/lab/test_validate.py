@@ -165,6 +165,7 @@ def test_an_interval_is_of_strips_that_differ_in_nothing_else_than_the_tested() 
     def rows(scene: Scene) -> float:
         row = fields.used(scene)
         row |= {"fraction": scene.threshold.fractions[0], "reynolds": 30.0}
+        row["gust"] = scene.gust if scene.flow.gusts else np.nan
         return found(row)[2]
 
     assert rows(strip) == 81
@@ -194,6 +195,14 @@ def test_an_interval_is_of_strips_that_differ_in_nothing_else_than_the_tested() 
     others.add("fluid.kind")
     assert rows(changed(strip, {"forces.exposure": "protrusion"})) == 97
     assert asked - others <= SPANNED.keys() | UNTESTED.keys()
+    shared = {"forces.exposure": "protrusion", "forces.sheltering": "balanced"}
+    gusts = {"intensity": 0.4, "events": 100}
+    gusty = rows(changed(strip, {**shared, "flow.gusts": gusts}))
+    assert gusty > 0
+    assert gusty == rows(
+        changed(strip, {**shared, "flow.gusts": {**gusts, "duration": 5}})
+    )
+    assert rows(changed(strip, {**shared, "flow.gusts": {**gusts, "events": 10}})) == 0
 
 
 def test_a_stress_that_is_the_measured_one_over_a_hump_is_met_at_every_row() -> None:

@@ -126,6 +126,20 @@ def test_the_page_of_a_fence_says_that_it_is_solid(
     assert remarks.SOLID_FENCE not in remarks.remarks(results)
 
 
+def test_a_bed_is_not_called_too_long_where_the_study_asks_for_places(
+    fenced: Results,
+) -> None:
+    table = fenced.tables["pile_threshold"]
+    one = changed(
+        fenced, pile_threshold=table[table["scene_id"] == table["scene_id"][0]]
+    )
+    assert "no grains are packed, as the study asks" in answers.card(one).scene
+    said = {remark.head: remark.text for remark in remarks.remarks(fenced)}
+    told = said["Closed form along the bed line."]
+    assert told.startswith("The study asks for a method that packs no grains: ")
+    assert not any("too many grains" in text for text in said.values())
+
+
 def test_a_comparison_says_where_each_bed_starts(fenced: Results) -> None:
     rows = fenced.joined("pile_threshold").drop_duplicates("scene_id")
     sheet = sheets.short(fenced)

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure as Canvas
 
 from orchestrator.physics import saltation
 from orchestrator.physics.curves import shao_lu, soulsby_whitehouse
+from orchestrator.physics.fluids import is_gas
 from orchestrator.physics.grain import Grain
 from orchestrator.report import answers, sheets, single, style, theory, units
 from orchestrator.report.figures import Kind
@@ -24,7 +25,7 @@ from orchestrator.report.style import (
     Figure,
     Look,
 )
-from orchestrator.report.subjects import Quantity, is_gas
+from orchestrator.report.subjects import Quantity
 from orchestrator.study.criterion import SUSTAINED
 from orchestrator.tables.quoted import of_rows
 
