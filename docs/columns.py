@@ -3,35 +3,8 @@
 python docs/columns.py > docs/columns.md
 """
 
-from pathlib import Path
+from orchestrator.tables import TABLES
 
-import pandas as pd
-
-from orchestrator import tables
-from orchestrator.study.fields import OF_METHOD, OF_QUESTION
-
-LISTED = Path(__file__).with_name("columns.csv")
-"""The columns of each table, in their order; `FIELDS` stands for those that are fields of
-a study file."""
-FIELDS = {"scenes": OF_QUESTION, "methods": OF_METHOD}
-"""The columns of fields, by the table that has them."""
-TABLES = {
-    "scenes": "a scene: the values of its fields, and the groups that ask for it",
-    "methods": "a scene: how it was answered, and why",
-    "single_grain": "a single grain: its threshold",
-    "pile_threshold": "a pile and a fraction n/N: its threshold",
-    "reason": "a reason against a threshold",
-    "pile_curve": "a pile and a load step: the part of the grains that has moved",
-    "pile_grain": "a grain of a pile: where it lies and when it moved",
-    "size_class": "a size class of a mixture and a fraction: its threshold, hiding",
-    "bed_change": "a pile on a bed that changes and a number of moved grains",
-    "form": "a form of a train and a fraction: its threshold",
-    "flow": "a solved flow",
-    "wall_stress": "a place on the bed of a solved flow",
-    "check": "a threshold that DEM answered too, as a check of a fast method",
-    "timings": "a case: the times of its run, in `timings/timings.csv`",
-}
-"""Tables of a study, with what a row is."""
 HEAD = """\
 # Columns of the tables
 
@@ -54,23 +27,12 @@ END = """
 """
 
 
-def listed() -> pd.DataFrame:
-    """The columns of each table, a row for each."""
-    rows = []
-    for table, column in pd.read_csv(LISTED).itertuples(index=False):
-        columns = FIELDS[table] if column == "FIELDS" else (column,)
-        rows += [{"table": table, "column": each} for each in columns]
-    return pd.DataFrame(rows)
-
-
 def text() -> str:
     """Write the page."""
-    every = listed()
-    lines = [f"| [{name}](#{name}) | {row} |" for name, row in TABLES.items()]
-    for name in TABLES:
+    lines = [f"| [{name}](#{name}) | {table.row} |" for name, table in TABLES.items()]
+    for name, table in TABLES.items():
         lines += ["", f"## {name}", "", "| column | meaning |", "|---|---|"]
-        for column in every.loc[every["table"] == name, "column"]:
-            meaning = tables.COLUMNS[column]
+        for column, meaning in table.columns.items():
             told = meaning.replace("*", r"\*").replace("|", r"\|").replace("<", r"\<")
             lines.append(f"| `{column}` | {told} |")
     return HEAD + "\n".join(lines) + "\n" + END

@@ -103,15 +103,6 @@ def test_the_page_of_maps_counts_the_stored_verdicts() -> None:
     assert f"with {len(stored)} cells in all" in text
 
 
-def test_the_page_of_columns_has_every_column_of_every_table(results: Results) -> None:
-    listed = runpy.run_path(str(ROOT / "docs" / "columns.py"))["listed"]()
-    assert not listed.duplicated().any()
-    assert set(listed["column"]) == set(tables.COLUMNS)
-    for name, table in results.tables.items():
-        columns = set(listed.loc[listed["table"] == name, "column"])
-        assert set(table) - columns == set(), name
-
-
 def test_the_gallery_shows_presets_with_small_pictures() -> None:
     text = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
     presets = {path.stem for path in (ROOT / "orchestrator").glob("*/presets/*.toml")}
@@ -219,7 +210,7 @@ def test_a_page_uses_the_words_of_the_glossary(page: Path) -> None:
 
 
 def test_columns_and_fields_use_the_words_of_the_glossary() -> None:
-    for column, meaning in tables.COLUMNS.items():
+    for column, meaning in tables.meanings().items():
         assert [word for word in INSTEAD if re.search(word, meaning)] == [], column
 
 

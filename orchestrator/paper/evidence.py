@@ -10,7 +10,7 @@ import pandas as pd
 
 from orchestrator.study import fields
 from orchestrator.study.method import HELD_FROM
-from orchestrator.tables import COLUMNS, Tables, with_methods, with_scenes
+from orchestrator.tables import Tables, meanings, with_methods, with_scenes
 from orchestrator.tables.facts import needs_run
 from orchestrator.types import BoolArray, FloatArray
 
@@ -188,7 +188,7 @@ class Evidence:
         """A table with the columns of its scenes, or an empty one with all columns."""
         table = self._tables.get(name, pd.DataFrame())
         if table.empty:
-            return pd.DataFrame(columns=list(COLUMNS), dtype=float)
+            return pd.DataFrame(columns=list(meanings()), dtype=float)
         table = with_scenes(table, self.scenes)
         if name in ANSWERS:
             return table

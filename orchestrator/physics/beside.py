@@ -37,16 +37,36 @@ rows of flumes."""
 MOST_COHESION = 5e-5
 """Largest cohesion of the grains whose thresholds were measured in air, N/m: the curve
 of the wind tunnel is answered with that of Shao and Lu's gamma of 1.65e-4 N/m."""
-MEASURED = (
-    "measured_curve",
-    "measured_median",
-    "measured_low",
-    "measured_high",
-    "measured_rows",
-)
-"""Columns of what was measured at the Re*; `tables/columns.csv` explains them."""
-TESTED = ("tested_low", "tested_high", "tested_rows", "tested_held")
-"""Columns of the interval; `tables/columns.csv` explains them."""
+MEASURED: Mapping[str, str] = {
+    "measured_curve": (
+        "Shields number of the same grain by a published curve for level beds: of "
+        "Soulsby and Whitehouse in a liquid, of Shao and Lu in a gas; empty for "
+        "densities over that of the fluid outside of 1.28 to 4.7 and 1085 to 4580, of "
+        "which nothing was measured"
+    ),
+    "measured_median": (
+        "median of the Shields numbers that were measured on level beds at this Re*, "
+        "by eye in flumes or in the field; empty where there are no rows near"
+    ),
+    "measured_low": "tenth percentile of these rows, in a gas the least",
+    "measured_high": "ninetieth percentile of these rows, in a gas the largest",
+    "measured_rows": "number of these rows",
+}
+"""Columns of what was measured at the Re*."""
+
+TESTED: Mapping[str, str] = {
+    "tested_low": (
+        "lower end of the interval that held measured thresholds of flumes on answers "
+        "of this kind (`orchestrator validate`); the widest over the ranges of "
+        "entrainment angle, d/z0, ratio of densities and Re* that the rows and answers "
+        "are of; empty outside of them"
+    ),
+    "tested_high": "upper end of this interval",
+    "tested_rows": "number of the measured rows",
+    "tested_held": "share of them that it held, the least over these ranges",
+}
+"""Columns of the interval."""
+
 ENTRAINED, SUSTAINED = "entrained", "sustained"
 """Criteria: a grain leaves its pocket, or its motion is also sustained after a gust."""
 LIQUID, GAS = "liquid", "gas"

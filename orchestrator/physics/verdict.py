@@ -34,8 +34,21 @@ NO_START = f"not reached: no flow up to a Shields number of {saltation.MOST:g} d
 NO_END = "not known: hops have no end"
 NOT_REACHED = "not reached: the grain has not moved"
 """Why a grain has no threshold."""
-COLUMNS = ("usable", "verdict", "reason", "why_not", "remedy")
-"""Columns of a verdict; `tables/columns.csv` explains them."""
+COLUMNS: Mapping[str, str] = {
+    "usable": "whether why_not is empty",
+    "verdict": (
+        "what the threshold is worth: usable, within what was measured; with a "
+        "correction, to the measured value; to compare, where nothing was measured "
+        "near; not usable"
+    ),
+    "reason": (
+        "a word for each thing that speaks against the use of the threshold, for "
+        "programs"
+    ),
+    "why_not": "what speaks against the use of the threshold; empty if nothing does",
+    "remedy": "what helps against that",
+}
+"""Columns of a verdict."""
 
 
 class Reason(NamedTuple):

@@ -21,14 +21,15 @@ import pandas as pd
 from orchestrator import digits
 from orchestrator.errors import OrchestratorError
 from orchestrator.grains.pile import Pile
-from orchestrator.physics import verdict
+from orchestrator.physics import beside, verdict
 from orchestrator.physics.reported import REPORTED
 from orchestrator.plan import Plan
 from orchestrator.runs.files import Folder
 from orchestrator.study import fields
 from orchestrator.study.study import Study
-from orchestrator.tables import rows
+from orchestrator.tables import check, quoted, rows, usable
 from orchestrator.tables.check import contradictions, with_agreement
+from orchestrator.tables.columns import Listed, several
 from orchestrator.tables.quoted import of_classes
 from orchestrator.tables.usable import with_scatter, with_usable
 from orchestrator.types import Row
@@ -37,18 +38,91 @@ Tables = dict[str, pd.DataFrame]
 """Tables by their names."""
 
 
-def _meanings() -> dict[str, str]:
-    """Every column of every table, with its meaning."""
-    file = Path(__file__).with_name("columns.csv")
-    of_others = pd.read_csv(file)
-    meanings = dict(zip(of_others["column"], of_others["meaning"], strict=True))
-    for column, field in fields.COLUMNS.items():
-        meanings[column] = field.phrase
-    return meanings
+TIMINGS: Mapping[str, str] = {
+    **several("case"),
+    "kind": "kind of the case",
+    "solver_s": "wall time of the solvers",
+    "cpu_s": "processor time of the solvers",
+    "outside_s": "wall time of the case outside the solvers",
+}
+"""Columns of `timings`."""
+TABLES: Mapping[str, Listed] = {
+    "scenes": Listed(
+        "a scene: the values of its fields, and the groups that ask for it",
+        (rows.SCENES,),
+    ),
+    "methods": Listed("a scene: how it was answered, and why", (rows.METHODS,)),
+    "single_grain": Listed(
+        "a single grain: its threshold",
+        (
+            rows.SINGLE_GRAIN,
+            rows.SPEEDS,
+            verdict.COLUMNS,
+            beside.MEASURED,
+            beside.TESTED,
+            quoted.QUOTED,
+            quoted.LAWS_OF_INTERVAL,
+        ),
+    ),
+    "pile_threshold": Listed(
+        "a pile and a fraction n/N: its threshold",
+        (
+            rows.PILE_THRESHOLD,
+            rows.SPEEDS,
+            rows.STARTS,
+            rows.DECIDED,
+            rows.SMOOTHING,
+            usable.SCATTER,
+            verdict.COLUMNS,
+            beside.MEASURED,
+            beside.TESTED,
+            quoted.QUOTED,
+            quoted.FIRST,
+        ),
+    ),
+    "reason": Listed("a reason against a threshold", (usable.REASON,)),
+    "pile_curve": Listed(
+        "a pile and a load step: the part of the grains that has moved",
+        (rows.PILE_CURVE,),
+    ),
+    "pile_grain": Listed(
+        "a grain of a pile: where it lies and when it moved", (rows.PILE_GRAIN,)
+    ),
+    "size_class": Listed(
+        "a size class of a mixture and a fraction: its threshold, hiding",
+        (rows.SIZE_CLASS,),
+    ),
+    "bed_change": Listed(
+        "a pile on a bed that changes and a number of moved grains",
+        (rows.BED_CHANGE,),
+    ),
+    "form": Listed("a form of a train and a fraction: its threshold", (rows.FORM,)),
+    "flow": Listed("a solved flow", (rows.FLOW,)),
+    "wall_stress": Listed("a place on the bed of a solved flow", (rows.WALL_STRESS,)),
+    "check": Listed(
+        "a threshold that DEM answered too, as a check of a fast method",
+        (rows.CHECK, check.AGREEMENT),
+    ),
+    "timings": Listed(
+        "a case: the times of its run, in `timings/timings.csv`", (TIMINGS,)
+    ),
+}
+"""The tables of a study, in the order in which the documents explain them."""
 
 
-COLUMNS: dict[str, str] = _meanings()
-"""Every column of every table, with its meaning; units are in the names."""
+def meanings() -> dict[str, str]:
+    """Look up what every column of every table is.
+
+    Returns
+    -------
+    dict of str to str
+        The meanings, by the names of the columns, which end with units.
+    """
+    return {
+        name: text for table in TABLES.values() for name, text in table.columns.items()
+    }
+
+
 FORMULA = r"(?='*(?:[=@\t\n]|[+-](?![\d.]+(?:e[+-]?\d+)?$|inf$)))"
 """What follows the beginning of a text that spreadsheets run as a formula; no number is
 one. Such a text is written behind one more apostrophe."""
@@ -251,8 +325,7 @@ def timings(plan: Plan, states: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame
             "outside_s": state["wall_s"] - solver_s,
         }
         times.append(row)
-    columns = ["case", "kind", "solver_s", "cpu_s", "outside_s"]
-    return pd.DataFrame(times, columns=columns)
+    return pd.DataFrame(times, columns=[*TIMINGS])
 
 
 def csv(table: pd.DataFrame, form: str = "") -> str:
@@ -339,8 +412,9 @@ def write(tables: Mapping[str, pd.DataFrame], folder: Folder, place: str) -> Non
         text = csv(table)
         folder.put(f"{place}/{name}.csv", text)
         used.update(map(str, table))
-    meanings = [(column, COLUMNS[column]) for column in sorted(used)]
-    table = pd.DataFrame(meanings, columns=["column", "meaning"])
+    known = meanings()
+    listed = [(column, known[column]) for column in sorted(used)]
+    table = pd.DataFrame(listed, columns=["column", "meaning"])
     folder.put(f"{place}/columns.csv", csv(table))
 
 

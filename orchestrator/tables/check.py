@@ -1,14 +1,26 @@
 """Answers without DEM beside those of DEM: where the two contradict each other."""
 
 import math
+from collections.abc import Mapping
 
 import pandas as pd
 
+from orchestrator.tables.columns import several
 from orchestrator.tables.quoted import OF_PILE
 
 KEYS = ["scene_id", "fraction"]
 Contradictions = dict[tuple[str, float], str]
 """By the scene and the fraction, what DEM says against an answer."""
+
+
+AGREEMENT: Mapping[str, str] = {
+    **several("shields_numerical_low", "shields_numerical_high"),
+    "agree": (
+        "whether the interval of shields, which holds the known error, and that of DEM "
+        "overlap"
+    ),
+}
+"""Columns that `with_agreement` adds."""
 
 
 def with_agreement(checks: pd.DataFrame, thresholds: pd.DataFrame) -> pd.DataFrame:

@@ -5,6 +5,7 @@ Beside each stands what a measured threshold gives: the same flow, with the meas
 threshold of one grain on a level bed in place of the computed one.
 """
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ from orchestrator.physics.reported import (
     measured,
 )
 from orchestrator.study.shapes import SHAPES
+from orchestrator.tables.columns import several
 from orchestrator.tables.facts import needs_run
 from orchestrator.types import BoolArray, FloatArray
 
@@ -42,6 +44,74 @@ class _Ends(NamedTuple):
 
     low: FloatArray
     high: FloatArray
+
+
+QUOTED: Mapping[str, str] = {
+    "stress_pa": (
+        "stress of the undisturbed flow on the bed at the threshold, rho_f u*0^2"
+    ),
+    **several("ustar0_m_s"),
+    "shields_low": (
+        "lower end of the interval of shields, the one that page, card and figures "
+        "have, see interval_of; of replicates it holds all of them"
+    ),
+    "shields_high": (
+        "upper end of this interval; empty where it is open: beside a lower end, as of "
+        "a fraction that a bed does not reach"
+    ),
+    "interval_of": (
+        "what the interval of the threshold in all its units is of: measured "
+        "thresholds (tested_low, tested_high), else numerical (shields_numerical_low, "
+        "shields_numerical_high; of a single grain its load step), else seeds: the "
+        "range of replicates, where no error is known; of a usable single grain "
+        "without these force laws: the range of those that hold"
+    ),
+    "ustar0_low_m_s": (
+        "lower end of the interval of ustar0_m_s: that of shields, whose root it goes "
+        "with; see interval_of"
+    ),
+    "stress_low_pa": "lower end of the interval of stress_pa",
+    "wind_10m_low_m_s": "lower end of the interval of wind_10m_m_s",
+    "mean_velocity_low_m_s": "lower end of the interval of mean_velocity_m_s",
+    "ustar0_high_m_s": "upper end of this interval",
+    "stress_high_pa": "upper end of the interval of stress_pa",
+    "wind_10m_high_m_s": "upper end of the interval of wind_10m_m_s",
+    "mean_velocity_high_m_s": "upper end of the interval of mean_velocity_m_s",
+    "level_ustar_m_s": (
+        "friction velocity at which one grain on a level bed starts to move by the "
+        "force law, closed form"
+    ),
+    "measured_level_ustar_m_s": (
+        "the same as measured: the median of the flumes at this Re*, else the "
+        "published curve of measured_curve"
+    ),
+    "measured_ustar0_m_s": (
+        "undisturbed friction velocity of the same flow at the threshold, with the "
+        "measured threshold of one grain in place of the computed one"
+    ),
+    "measured_stress_pa": "stress of that undisturbed flow on the bed",
+    "measured_wind_10m_m_s": "wind of that flow 10 m above the bed",
+    "measured_mean_velocity_m_s": "mean velocity of that flow over its depth",
+    "measured_ustar0_low_m_s": (
+        "the same as measured_ustar0_m_s with measured_low in place of the measured "
+        "threshold"
+    ),
+    "measured_stress_low_pa": "stress of the flow of measured_ustar0_low_m_s",
+    "measured_wind_10m_low_m_s": "wind of the flow of measured_ustar0_low_m_s",
+    "measured_mean_velocity_low_m_s": (
+        "mean velocity of the flow of measured_ustar0_low_m_s"
+    ),
+    "measured_ustar0_high_m_s": (
+        "the same as measured_ustar0_m_s with measured_high in place of the measured "
+        "threshold"
+    ),
+    "measured_stress_high_pa": "stress of the flow of measured_ustar0_high_m_s",
+    "measured_wind_10m_high_m_s": "wind of the flow of measured_ustar0_high_m_s",
+    "measured_mean_velocity_high_m_s": (
+        "mean velocity of the flow of measured_ustar0_high_m_s"
+    ),
+}
+"""Columns of `quoted`."""
 
 
 def quoted(rows: pd.DataFrame, twins: "pd.Series[int] | None" = None) -> dict[str, Any]:
@@ -97,6 +167,15 @@ def quoted(rows: pd.DataFrame, twins: "pd.Series[int] | None" = None) -> dict[st
         first = rows["first_ustar0_m_s"].to_numpy(float)
         columns |= measured(rows, first, level, "measured_first_")
     return columns
+
+
+LAWS_OF_INTERVAL: Mapping[str, str] = {
+    "interval_laws": (
+        "number of force laws that hold whose range the interval is; empty of another "
+        "interval"
+    ),
+}
+"""The column that `with_laws` adds."""
 
 
 def with_laws(
@@ -192,6 +271,67 @@ def of_classes(classes: pd.DataFrame, thresholds: pd.DataFrame) -> pd.DataFrame:
         # an end that either of the two leaves open is not known
         changed[f"shields_own_{end}"] = outer(own, value * over)
     return classes.assign(**changed)
+
+
+FIRST: Mapping[str, str] = {
+    "first_stress_pa": (
+        "stress of the undisturbed flow on the bed at which motion starts"
+    ),
+    "first_wind_10m_m_s": "wind 10 m above the bed at which motion starts",
+    "first_mean_velocity_m_s": (
+        "mean velocity of the undisturbed flow at which motion starts"
+    ),
+    "first_ustar0_low_m_s": (
+        "lower end of the interval of first_ustar0_m_s: the tested one, else the "
+        "numerical one; of replicates it holds all of them"
+    ),
+    "first_stress_low_pa": "lower end of the interval of first_stress_pa",
+    "first_wind_10m_low_m_s": "lower end of the interval of first_wind_10m_m_s",
+    "first_mean_velocity_low_m_s": (
+        "lower end of the interval of first_mean_velocity_m_s"
+    ),
+    "first_ustar0_high_m_s": "upper end of this interval; empty where it is open",
+    "first_stress_high_pa": "upper end of the interval of first_stress_pa",
+    "first_wind_10m_high_m_s": "upper end of the interval of first_wind_10m_m_s",
+    "first_mean_velocity_high_m_s": (
+        "upper end of the interval of first_mean_velocity_m_s"
+    ),
+    "measured_first_ustar0_m_s": "the same of first_ustar0_m_s",
+    "measured_first_ustar0_low_m_s": (
+        "the same as measured_first_ustar0_m_s with measured_low in place of the "
+        "measured threshold"
+    ),
+    "measured_first_ustar0_high_m_s": (
+        "the same as measured_first_ustar0_m_s with measured_high in place of the "
+        "measured threshold"
+    ),
+    "measured_first_stress_pa": "stress of the flow of measured_first_ustar0_m_s",
+    "measured_first_stress_low_pa": (
+        "stress of the flow of measured_first_ustar0_low_m_s"
+    ),
+    "measured_first_stress_high_pa": (
+        "stress of the flow of measured_first_ustar0_high_m_s"
+    ),
+    "measured_first_wind_10m_m_s": (
+        "wind 10 m above the bed of the flow of measured_first_ustar0_m_s"
+    ),
+    "measured_first_wind_10m_low_m_s": (
+        "wind 10 m above the bed of the flow of measured_first_ustar0_low_m_s"
+    ),
+    "measured_first_wind_10m_high_m_s": (
+        "wind 10 m above the bed of the flow of measured_first_ustar0_high_m_s"
+    ),
+    "measured_first_mean_velocity_m_s": (
+        "mean velocity of the flow of measured_first_ustar0_m_s"
+    ),
+    "measured_first_mean_velocity_low_m_s": (
+        "mean velocity of the flow of measured_first_ustar0_low_m_s"
+    ),
+    "measured_first_mean_velocity_high_m_s": (
+        "mean velocity of the flow of measured_first_ustar0_high_m_s"
+    ),
+}
+"""Columns of the flow that moves the first grain, beside those of its numbers."""
 
 
 def _first(rows: pd.DataFrame, twins: "pd.Series[int] | None") -> dict[str, FloatArray]:

@@ -27,6 +27,7 @@ from orchestrator.study.criterion import ENTRAINED, SUSTAINED, of_single_grain
 from orchestrator.study.declare import UnfitError
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study, changed
+from orchestrator.tables.columns import phrases, several
 from orchestrator.types import BoolArray, FloatArray, Row
 
 POINT = ("alpha_deg", "beta_deg", "d_m", "z0_over_d", "nu_m2_s", "force_law", "regime")
@@ -52,19 +53,26 @@ ALONE: Row = {
     "decides": ENTRAINED,
 }
 """Columns of the criterion of a single grain that only leaves its pocket."""
-SPEEDS = ("wind_1m_m_s", "wind_10m_m_s", "current_1m_m_s", "mean_velocity_m_s")
-"""Columns of the speeds of undisturbed flows."""
 FEW_GRAINS = 10
 """Grains of a size class below which the interval of its threshold is wide."""
-WAY_UP = (
-    "ustar_toe",
-    "ustar_quarter",
-    "ustar_half",
-    "ustar_three_quarters",
-    "ustar_crest",
-)
+WAY_UP: Mapping[str, str] = {
+    "ustar_toe": "u*/u*_0 of the wall stress at the toe of the first form",
+    "ustar_quarter": (
+        "u*/u*_0 of the wall stress at a quarter of the way along the bed from the toe "
+        "to the crest"
+    ),
+    "ustar_half": (
+        "u*/u*_0 of the wall stress at half of the way along the bed from the toe to "
+        "the crest"
+    ),
+    "ustar_three_quarters": (
+        "u*/u*_0 of the wall stress at three quarters of the way along the bed from "
+        "the toe to the crest"
+    ),
+    "ustar_crest": "u*/u*_0 of the wall stress at the crest of the first form",
+}
 """Columns of u*/u*_0 at equal parts of the way along the bed from the toe to the
-top."""
+crest."""
 
 
 def point(scene: Scene) -> Row:
@@ -81,6 +89,19 @@ def point(scene: Scene) -> Row:
         Its columns `POINT`.
     """
     return {column: fields.COLUMNS[column].used(scene) for column in POINT}
+
+
+SCENES: Mapping[str, str] = {
+    **several("scene_id"),
+    "group": "groups of the study file that ask for the scene",
+    **phrases(*fields.OF_QUESTION),
+    "gust": "largest over mean stress of the gusts of the flow; empty without gusts",
+    "law_holds": (
+        "whether the force law holds at the threshold of a single grain of the scene"
+    ),
+    **several("case", "flow_case"),
+}
+"""Columns of `scenes`."""
 
 
 def scenes(study: Study, plan: Plan) -> Iterator[Row]:
@@ -126,6 +147,23 @@ def scenes(study: Study, plan: Plan) -> Iterator[Row]:
         }
 
 
+METHODS: Mapping[str, str] = {
+    **several("scene_id"),
+    "asked": (
+        "fields of the method that the scene does not leave at their defaults, by "
+        "their names in the table [method]; auto: none"
+    ),
+    "fidelity": "fidelity of the answer; empty for a single grain",
+    "error_estimate": (
+        "known relative error of flow and grains together, at the asked fraction at "
+        "which it is largest; empty where it is not known"
+    ),
+    "why": "reason for the method and the flow by which the scene was answered",
+    **phrases(*fields.OF_METHOD),
+}
+"""Columns of `methods`."""
+
+
 def methods(plan: Plan) -> Iterator[Row]:
     """List how each scene is answered.
 
@@ -158,6 +196,44 @@ class _ByDem(NamedTuple):
     high: float = nan
     fell_upstream: bool = False
     case: str = ""
+
+
+SINGLE_GRAIN: Mapping[str, str] = {
+    **several("scene_id"),
+    **phrases(*POINT),
+    **several("reynolds"),
+    "reynolds_closed_form": (
+        "friction Reynolds number u* d/nu at the threshold, closed form"
+    ),
+    "shields_closed_form": "Shields number at the threshold, closed form",
+    **several("shields_dem", "shields_dem_low", "shields_dem_high"),
+    "ustar_closed_form_m_s": "friction velocity at the threshold, closed form",
+    "ustar_m_s": "friction velocity at the threshold by DEM",
+    "ustar_low_m_s": "highest friction velocity without motion, by DEM",
+    "ustar_high_m_s": "lowest friction velocity with motion, by DEM",
+    "drag_over_weight": "drag over the submerged weight at the threshold, closed form",
+    "fell_upstream": (
+        "whether the grain fell back before or instead of moving downstream"
+    ),
+    **phrases("criterion"),
+    "shields_entrained": (
+        "Shields number of the mean flow whose gust turns the grain over its "
+        "neighbour; of a grain that cannot hop that of the flow itself"
+    ),
+    "shields_sustained": (
+        "Shields number of the mean flow from which the grain hops on after the gust; "
+        "empty of a grain that cannot hop"
+    ),
+    "shields_sustained_high": (
+        "the threshold with the weakest rebounds of sand; empty of a grain that cannot "
+        "hop"
+    ),
+    "shields_cessation": (
+        "Shields number below which motion ceases once it is under way"
+    ),
+    **several("decides", "case"),
+}
+"""Columns of `single_grain`, beside those of speeds."""
 
 
 def single_grain(
@@ -239,6 +315,23 @@ def _single_grains_by_dem(
     return by_dem
 
 
+SPEEDS: Mapping[str, str] = {
+    "wind_1m_m_s": "undisturbed wind 1 m above the flat bed of a gas, by the log law",
+    "wind_10m_m_s": "undisturbed wind 10 m above the flat bed of a gas, by the log law",
+    "current_1m_m_s": (
+        "undisturbed current 1 m above the flat bed of a liquid, by the log law"
+    ),
+    "mean_velocity_m_s": (
+        "mean velocity of the undisturbed flow over the depth of a channel, by the log "
+        "law; empty where it may be laminar"
+    ),
+    "discharge_m2_s": (
+        "mean velocity times depth of a channel: discharge for each metre of width"
+    ),
+}
+"""Columns of the speeds of undisturbed flows."""
+
+
 def _speeds(scene: Scene, ustar: float) -> Row:
     """Columns of the speeds of an undisturbed flow of a friction velocity (m/s)."""
     flow = scene.flow
@@ -253,12 +346,30 @@ def _speeds(scene: Scene, ustar: float) -> Row:
     speeds = every_unit(ustar, undisturbed)
     row = {}
     for column in SPEEDS:
-        if np.isfinite(speeds[column]):
+        if np.isfinite(speeds.get(column, nan)):
             row[column] = float(speeds[column])
     mean = row.get("mean_velocity_m_s")
     if mean:
         row["discharge_m2_s"] = mean * (flow.depth or 0.0)
     return row
+
+
+WALL_STRESS: Mapping[str, str] = {
+    **several("flow_case"),
+    **phrases("alpha_deg", "h_m", "z0_m"),
+    **several("s_m"),
+    "s_over_h": "arc length along the bed line from the windward toe over h",
+    **several("x_m"),
+    "z_m": "height above the flat bed; of a profile z of its file",
+    "ustar_over_ustar0_wall": (
+        "signed friction velocity of the wall stress over the undisturbed one"
+    ),
+    "ustar_over_ustar0_eq10": (
+        "signed friction velocity by Eq. 10 with ln((z_e + z0)/z0) over the "
+        "undisturbed one"
+    ),
+}
+"""Columns of `wall_stress`."""
 
 
 def wall_stress(pile: Pile, cases: Path) -> Row:
@@ -289,6 +400,34 @@ def wall_stress(pile: Pile, cases: Path) -> Row:
         "ustar_over_ustar0_wall": stress.ustar_over_ustar0_wall,
         "ustar_over_ustar0_eq10": stress.ustar_over_ustar0_eq10,
     }
+
+
+FLOW: Mapping[str, str] = {
+    **several("flow_case"),
+    **phrases(
+        "bed_shape", "alpha_deg", "h_m", "z0_m", "turbulence_model", "first_cell_m"
+    ),
+    "lid_over_h": "height of the lid above the flat bed over h",
+    "upstream_over_h": "length of the flat bed before the forms over h",
+    "downstream_over_h": "length of the flat bed behind the forms over h",
+    "separation_over_h": (
+        "where reversed flow begins behind the crest, over h; empty: nowhere"
+    ),
+    "reattachment_over_h": (
+        "where reversed flow ends behind the crest, over h; empty: nowhere"
+    ),
+    **WAY_UP,
+    "ustar_mean": (
+        "mean u*/u*_0 of the wall stress from the toe to the crest of the first form"
+    ),
+    "ustar_largest": "largest u*/u*_0 of the wall stress on the bed",
+    "measured_reattachment_over_h": (
+        "where reversed flow ended in a wind tunnel, over h; empty: not measured"
+    ),
+    "measured_verified": "whether the measured number was read in its source",
+    "measured_source": "source of the measured number",
+}
+"""Columns of `flow`."""
 
 
 def flow(pile: Pile, cases: Path) -> Row:
@@ -451,6 +590,38 @@ def _reynolds(scene: Scene, tau: Any) -> Any:
     return ustar * scene.grain.diameter / scene.fluid.viscosity
 
 
+PILE_GRAIN: Mapping[str, str] = {
+    **several("scene_id"),
+    "grain_id": "id of the grain in the deck; by the method local number of the place",
+    **several("s_m", "x_m"),
+    "y_m": "place across the flow in a strip",
+    "ustar_over_ustar0": (
+        "signed friction velocity at the grain over the undisturbed one"
+    ),
+    "moved_in_load_step": (
+        "load step in which the grain moved: passed the displacement criterion "
+        "downstream, or was carried off; 0: never"
+    ),
+    "fallen_in_load_step": (
+        "load step in which the grain was first displaced upstream by the displacement "
+        "criterion; 0: never"
+    ),
+    **several("carried_off"),
+    "mode": (
+        "how the grain moved: rolled, slid, lifted (rose by more than 0.3 d) or none; "
+        "the number of lifted grains depends on the stiffness and on the mobile layers "
+        "of the model"
+    ),
+    **several("ustar0_m_s", "decides", "size_over_d"),
+    "pivot_deg": (
+        "angle of the grain's foremost contact from the normal of the bed; in a strip "
+        "that of the saddle through which the grain rolls; empty where no contact lets "
+        "it go"
+    ),
+}
+"""Columns of `pile_grain`."""
+
+
 def pile_grain(answer: Answer) -> Row:
     """List the counted grains of a pile: the stress on each, when and how it moved.
 
@@ -492,6 +663,23 @@ def pile_grain(answer: Answer) -> Row:
     return columns
 
 
+PILE_CURVE: Mapping[str, str] = {
+    **several("scene_id"),
+    "load_step": "number of the load step; 0 is the settling",
+    **several("u_e_m_s", "ustar0_m_s", "count", "moved"),
+    "not_moved": "N - n, counted grains that had not moved",
+    **several("carried_off"),
+    "fallen_upstream": (
+        "grains that had been displaced upstream by the displacement criterion, "
+        "carried off later or not"
+    ),
+    **several("fraction_moved"),
+    "mean_tau_pa": "mean size of the wall stress on the grains that had moved",
+    **several("shields", "reynolds"),
+}
+"""Columns of `pile_curve`."""
+
+
 def pile_curve(answer: Answer) -> Row:
     """List the fraction of a pile that had moved, and the stress, at each load step.
 
@@ -523,6 +711,60 @@ def pile_curve(answer: Answer) -> Row:
         "shields": shields(scene, tau),
         "reynolds": _reynolds(scene, tau),
     }
+
+
+PILE_THRESHOLD: Mapping[str, str] = {
+    **several("scene_id"),
+    **phrases(*POINT),
+    **phrases("packing", "stress"),
+    **several("fraction", "shields", "shields_numerical_low", "shields_numerical_high"),
+    "smooth_bed": (
+        "by how much shields may still move, relative, to the z0 that the flow has "
+        "over its bed at this threshold, z0 + nu/(9 u*) where it is not rough: 6 % at "
+        "most for each e-fold from the z0 of the solve; the interval holds it"
+    ),
+    "known_error": (
+        "known relative error of the threshold at this fraction, of two measured "
+        "fractions beside it the larger; empty where none was measured: of such beds, "
+        "or at such fractions"
+    ),
+    "shields_model_low": (
+        "lower end of the model's interval of shields: the choices that all methods "
+        "share, changed one at a time by `orchestrator budget`; empty where they were "
+        "not measured"
+    ),
+    "shields_model_high": (
+        "upper end of the model's interval of shields: the choices that all methods "
+        "share, changed one at a time by `orchestrator budget`; empty where they were "
+        "not measured"
+    ),
+    "model_share": "the shared choice that moves the threshold most",
+    "frozen_bed": (
+        "largest known change of shields, relative, where the bed line is drawn anew "
+        "as the grains leave (threshold.update), measured by `orchestrator budget` for "
+        "piles of this kind; empty where it is not known, or the bed changes"
+    ),
+    **several("reynolds", "ustar0_m_s", "u_e_m_s"),
+    "pivot_ustar0_m_s": (
+        "undisturbed friction velocity at the threshold by the closed form with each "
+        "grain's own stress"
+    ),
+    **several("count"),
+    "highest_fraction": "largest n/N that the load steps reached",
+    "share_carried_off": "carried_off over moved where the fraction is first reached",
+    "share_against_flow": (
+        "of the grains that had moved where the fraction is first reached, the share "
+        "that a reversed flow drove upstream"
+    ),
+    "interlocking": (
+        "undisturbed friction velocity at which the first grain leaves by peeling over "
+        "that at which the first grain moves by itself: above 1 the touching grains of "
+        "a row without a free end hold one another; of a bed without grains for those "
+        "around the first motion"
+    ),
+    **several("case"),
+}
+"""Columns of `pile_threshold`, beside those below and those of speeds."""
 
 
 def pile_threshold(answer: Answer) -> Iterator[Row]:
@@ -583,6 +825,31 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
         }
 
 
+STARTS: Mapping[str, str] = {
+    "first_x_m": (
+        "where motion starts: distance along the flow from the windward toe, of a "
+        "profile x of its file"
+    ),
+    "first_ustar0_m_s": "undisturbed friction velocity at which motion starts there",
+    "first_ustar0_numerical_low_m_s": (
+        "lower end of the numerical interval of first_ustar0_m_s, which holds its load "
+        "step and the known error of the method"
+    ),
+    "first_ustar0_numerical_high_m_s": (
+        "upper end of this interval; empty where the known error leaves it open"
+    ),
+    "first_known_error": (
+        "known relative error of the flow at which motion starts; empty where none was "
+        "measured at so small a fraction"
+    ),
+    "pivot_x_m": (
+        "first_x_m by pivots of grains around it; empty where they were not asked for"
+    ),
+    "pivot_first_m_s": "first_ustar0_m_s by those pivots",
+}
+"""Columns of where motion starts."""
+
+
 def _starts(answer: Answer) -> Row:
     """Columns of where motion starts, by the method and by the pivots."""
     first_x, first_ustar0 = answer.first
@@ -617,6 +884,13 @@ def _first_interval(answer: Answer, error: float | None) -> tuple[float, float]:
     low = np.append(grains.low[is_first], np.sqrt(least)).min()
     high = np.append(grains.high[is_first], np.sqrt(most)).max()
     return float(low), float(high)
+
+
+DECIDED: Mapping[str, str] = {
+    **phrases("criterion"),
+    **several("decides"),
+}
+"""Columns of criteria."""
 
 
 def _decided(answer: Answer) -> Row:
@@ -662,6 +936,26 @@ def _smooth_bed(scene: Scene, ustar0: float) -> float:
     return PER_E_FOLD * log(outer / scene.solve_roughness)
 
 
+SMOOTHING: Mapping[str, str] = {
+    "smoothing_needed_m": (
+        "smoothing, m, that a noisy profile needs: the noise of its points then has a "
+        "slope of 0.01"
+    ),
+    "smoothing_compared_m": (
+        "smoothing of a noisy profile whose half and twice are compared, m: the one "
+        "used, or needed if that is more"
+    ),
+    "first_smoothing_m_s": (
+        "first_ustar0_m_s by the closed form along the bed line with that smoothing"
+    ),
+    "first_half_smoothing_m_s": (
+        "the same with half of it; empty where the bed cannot be meshed"
+    ),
+    "first_twice_smoothing_m_s": "the same with twice of it",
+}
+"""Columns of a noisy profile."""
+
+
 def _smoothing(answer: Answer) -> Row:
     """Columns of a noisy profile: the smoothing, and the first motion around it."""
     length = smoothing.length_of(answer.pile.scene)
@@ -673,6 +967,48 @@ def _smoothing(answer: Answer) -> Row:
     for factor, column in SMOOTHED.items():
         row[column] = answer.smoothed.get(factor, np.nan)
     return row
+
+
+SIZE_CLASS: Mapping[str, str] = {
+    **several("scene_id", "fraction", "size_over_d", "count"),
+    "few": (
+        "whether the size class has fewer than ten counted grains that a free way "
+        "leads out"
+    ),
+    "class_moved": (
+        "part of the size class that had moved when the fraction of all grains had"
+    ),
+    "class_moved_low": (
+        "least part of the size class that has moved on a bed of many such grains, by "
+        "the number of them (binomial, 80 %)"
+    ),
+    "class_moved_high": "largest part of it, alike",
+    **several("ustar0_m_s"),
+    "shields_own": (
+        "Shields number at the threshold of a size class of diameter d_i, "
+        "tau_c/((rho_sol - rho_f) g d_i)"
+    ),
+    "shields_own_low": (
+        "lower end of the interval of shields_own: its number leaves that to chance "
+        "(binomial, 80 %), load steps, and the interval of the bed; empty where so few "
+        "bound nothing, and where that of the bed is open"
+    ),
+    "shields_own_high": "upper end of the interval of shields_own, alike",
+    "hiding": (
+        "shields_own over that at d50, between the two size classes beside d50; empty "
+        "where one of these has no threshold or its grains lie loose"
+    ),
+    "hiding_low": "least hiding of the size class, by shields_own_low",
+    "hiding_high": "largest hiding of the size class, by shields_own_high",
+    "hiding_equal_mobility": (
+        "hiding where the part of the size class that has moved is the fraction times "
+        "(d/d_i)^2, as in measurements at equal dimensionless transport; empty like "
+        "hiding, and where that part is above 1"
+    ),
+    "hiding_wilcock_crowe": "hiding of the size class by Wilcock and Crowe",
+    "hiding_egiazaroff": "hiding of the size class by Egiazaroff",
+}
+"""Columns of `size_class`."""
 
 
 def size_class(answer: Answer) -> Iterator[Row]:
@@ -766,6 +1102,22 @@ def _with_ends(name: str, values: Iterable[float]) -> Row:
     return dict(zip(names, values, strict=True))
 
 
+FORM: Mapping[str, str] = {
+    **several("scene_id"),
+    "form": "number of the form, from the first upstream",
+    **several("count", "fraction"),
+    "mean_ustar_over_ustar0": (
+        "mean of ustar_over_ustar0 over the form's counted grains"
+    ),
+    **several("ustar0_m_s"),
+    "over_first_form": (
+        "ustar0_m_s over that at which the same fraction of the first form has moved; "
+        "empty where its grains lie loose"
+    ),
+}
+"""Columns of `forms`."""
+
+
 def forms(answer: Answer) -> Iterator[Row]:
     """Find the thresholds of the forms of a train.
 
@@ -813,6 +1165,26 @@ def forms(answer: Answer) -> Iterator[Row]:
                 # multiple of that
                 "over_first_form": reached / first if first > 0 else np.nan,
             }
+
+
+BED_CHANGE: Mapping[str, str] = {
+    **several("scene_id"),
+    **phrases(*POINT),
+    **phrases("packing"),
+    **several("count", "moved", "fraction_moved", "shields"),
+    "shields_frozen": (
+        "shields of the same pile under the flow of the whole pile until the end"
+    ),
+    "change": "shields over shields_frozen, less 1",
+    "change_ustar0": (
+        "ustar0_m_s on the bed that changes over that on the frozen bed, less 1"
+    ),
+    "holds_until": (
+        "n/N at which shields first differs by more than 5 % from shields_frozen; "
+        "empty: nowhere up to the last fraction"
+    ),
+}
+"""Columns of `bed_changes`."""
 
 
 def bed_changes(answers: Sequence[Answer]) -> Iterator[Row]:
@@ -867,6 +1239,19 @@ def _thresholds_of(
     tau = np.array([at.tau for at in found])
     ustar0 = np.array([at.ustar0 for at in found])
     return tau, ustar0
+
+
+CHECK: Mapping[str, str] = {
+    **several("scene_id"),
+    **phrases(*POINT),
+    **phrases("packing"),
+    **several(
+        "fraction", "shields", "shields_dem", "shields_dem_low", "shields_dem_high"
+    ),
+    "difference": "shields over shields_dem, less 1",
+    **several("case"),
+}
+"""Columns of `check`."""
 
 
 def check(plan: Plan, cases: Path, done: Container[str]) -> Iterator[Row]:

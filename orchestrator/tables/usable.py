@@ -18,6 +18,7 @@ from orchestrator.physics.verdict import Reason
 from orchestrator.study import fields
 from orchestrator.study.methods import METHODS
 from orchestrator.tables.check import Contradictions
+from orchestrator.tables.columns import several
 from orchestrator.tables.facts import needs_run, packs_grains
 from orchestrator.tables.kinds import INTERLOCKED, tested_as
 from orchestrator.tables.quoted import OF_PILE, of_rows, quoted, with_laws
@@ -35,6 +36,15 @@ LAYOUTS = {"aligned": "rows along the bed", "disordered": "rows along the bed"}
 """Packings whose grains lie alike: a lattice scatters as one with small random gaps."""
 POURED = ["width", "sizes", "poured_depth"]
 """Columns in which poured beds agree whose grains lie alike."""
+
+
+SCATTER: Mapping[str, str] = {
+    "scatter": (
+        "half the range of shields over seeds, over its mean: the largest of the piles "
+        "whose grains lie alike, of the same slope, force law and fraction"
+    ),
+}
+"""The column that `with_scatter` adds."""
 
 
 def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame:
@@ -175,6 +185,13 @@ def with_usable(
     made = {**of_verdict, **measured, **units}
     judged = pd.concat([table, pd.DataFrame(made, index=table.index)], axis=1)
     return Judged(judged, pd.DataFrame(_listed(records, reasons)))
+
+
+REASON: Mapping[str, str] = {
+    **several("scene_id", "fraction"),
+    **{name: verdict.COLUMNS[name] for name in ("reason", "why_not", "remedy")},
+}
+"""Columns of the reasons against thresholds."""
 
 
 def _listed(

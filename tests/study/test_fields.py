@@ -15,7 +15,7 @@ from orchestrator.study.fields import Quantity
 from orchestrator.study.parts import Gusts, LogNormal, PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import changed
-from orchestrator.tables import COLUMNS, rows
+from orchestrator.tables import meanings, rows
 
 PAGE = Path(__file__).parents[2] / "docs" / "study-file.md"
 REFERENCE = runpy.run_path(str(PAGE.with_name("study_file.py")))
@@ -163,7 +163,7 @@ def test_a_row_has_the_scene_that_was_asked_and_the_one_that_answered_it() -> No
     assert {"scene_id": scene.id, **answer}.items() <= how.items()
     assert (how["asked"], how["method"], how["fidelity"]) == ("auto", "pivot", "quick")
     assert not {*row} & {*how} - {"scene_id"}
-    assert {*row, *how} <= set(COLUMNS)
+    assert {*row, *how} <= set(meanings())
 
 
 def test_the_reference_of_study_files_is_written_from_the_registry() -> None:
@@ -180,7 +180,7 @@ def test_columns_are_distinct_and_explained() -> None:
     assert without == 1
     quantities = (*fields.FIELDS, *fields.DERIVED)
     assert len(fields.COLUMNS) == len(quantities) - without
-    assert {*fields.COLUMNS} <= set(COLUMNS)
+    assert {*fields.COLUMNS} <= set(meanings())
 
 
 OF_POURED = """
