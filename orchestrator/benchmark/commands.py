@@ -151,7 +151,7 @@ PARTS = (
 """The parts of the command, in the order of `--help`."""
 COMMAND = Command(
     name="benchmark",
-    order=12,
+    order=13,
     help="compare another solver with this one",
     page="docs/benchmark.md",
     examples={

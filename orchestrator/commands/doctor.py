@@ -21,7 +21,7 @@ def _run(options: Namespace) -> int:
 
 COMMAND = Command(
     name="doctor",
-    order=11,
+    order=12,
     help="check solvers and drawing, and say what to install",
     page="docs/troubleshooting.md",
     examples={

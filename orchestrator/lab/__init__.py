@@ -1,7 +1,8 @@
-"""Measures the package: ladder, budget, maps of failure, validation."""
+"""Measures the package: ladder, budget, convergence, maps of failure, validation."""
 
 from argparse import Namespace
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -57,6 +58,25 @@ def _run_budget(options: Namespace) -> int:
     return _on_study(options, Budget)
 
 
+def _of_convergence(command: Parser) -> None:
+    """Add the options of `convergence`."""
+    add_run_options(command, "", "command")
+    add = command.add_argument
+    add("source", metavar="FILE|PRESET", help="study file, or name of a preset")
+    text = "a scene, by its id in the tables of the study; may be given several times"
+    add("--scene", action="append", default=[], metavar="ID", help=text)
+    text = "all scenes; default: of each class of scenes the one with the fewest grains"
+    add("--all", action="store_true", help=text)
+
+
+def _run_convergence(options: Namespace) -> int:
+    """Refine the meshes and load steps of scenes of a study."""
+    from orchestrator.lab.convergence import Convergence
+
+    made = partial(Convergence, ids=options.scene, every=options.all)
+    return _on_study(options, made)
+
+
 def _run_stability(options: Namespace) -> int:
     """Run the maps of failure."""
     from orchestrator.lab.stability import Stability
@@ -105,8 +125,20 @@ OFFER = Offer(
             run=_run_budget,
         ),
         Command(
-            name="stability",
+            name="convergence",
             order=8,
+            help="refine the meshes and load steps of scenes of a study",
+            page="docs/convergence.md",
+            examples={
+                "convergence sand.toml --plan": "list what would run, with time",
+                "convergence sand.toml --all": "refine every scene, not one of a class",
+            },
+            options=_of_convergence,
+            run=_run_convergence,
+        ),
+        Command(
+            name="stability",
+            order=9,
             help="draw maps of where each method fails; for developers",
             page="docs/stability.md",
             examples={
@@ -118,7 +150,7 @@ OFFER = Offer(
         ),
         Command(
             name="validate",
-            order=9,
+            order=10,
             help="compare the models with measured thresholds",
             page="docs/validation.md",
             examples={

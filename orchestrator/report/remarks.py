@@ -183,9 +183,11 @@ def _usable(table: pd.DataFrame, reasons: pd.DataFrame) -> Iterator[Remark]:
         return
     of_table = reasons[reasons["scene_id"].isin(table["scene_id"])]
     code = of_table["reason"].value_counts().idxmax()
-    most = of_table.loc[of_table["reason"] == code, "why_not"].iloc[0]
-    head = f"Usable: {usable} of {count} thresholds."
-    yield Remark(head, f"The most frequent reason against the others: {most}.")
+    most = of_table[of_table["reason"] == code].iloc[0]
+    said = f"The most frequent reason against the others: {most['why_not']}."
+    if pd.notna(most["remedy"]):
+        said += f" What helps: {most['remedy']}."
+    yield Remark(f"Usable: {usable} of {count} thresholds.", said)
 
 
 def _of_piles(results: Results, piles: pd.DataFrame) -> Iterator[Remark]:

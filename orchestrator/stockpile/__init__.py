@@ -28,7 +28,7 @@ OFFER = guests.Offer(
     commands=(
         Command(
             name="erosion",
-            order=10,
+            order=11,
             help="compute what wind takes from a stockpile, also by AP-42",
             page="docs/stockpile.md",
             examples={
