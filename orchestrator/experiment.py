@@ -161,6 +161,11 @@ class Experiment(ABC):
             self.limit_s = study.time_limit_s
             self.source = study.source
 
+    @property
+    def outline(self) -> Sequence[str]:
+        """What `--plan` says of it before its cases: mostly nothing."""
+        return ()
+
     @abstractmethod
     def results(self, runs: Runs) -> Results | None:
         """Make tables and page of the runs that are done.
@@ -268,7 +273,7 @@ class Experiment(ABC):
             self.check(out)
             cases = out.absolute() / "cases"
             listed = plan.expected(self.planned, cases, options.workers, beside)
-            print(*listed, sep="\n")
+            print(*self.outline, *listed, sep="\n")
             return 0
         return self.run(out, workers=options.workers, beside=beside).tell()
 

@@ -28,13 +28,11 @@ SHOWN = {
     "mixture": "hiding.svg",
     "shields": "shields.svg",
     "paper": "fractions-reynolds-alpha15.svg",
-    "ladder": "speed-against-accuracy.svg",
 }
 """The figure that is shown of each preset."""
 COMMANDS = {
     "stockpile": "erosion stockpile",
     "paper": "study paper --tolerance 0.2",
-    "ladder": "ladder",
 }
 """Commands of presets that `study PRESET` does not run."""
 NOTES = {

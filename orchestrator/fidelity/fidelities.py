@@ -9,7 +9,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from orchestrator.digits import rounded
 from orchestrator.physics.constants import KARMAN
 from orchestrator.study import fidelities as written
 from orchestrator.study import models
@@ -49,10 +48,7 @@ class Rung:
     not_on
         The packings that it cannot answer.
     derived
-        The field that follows from the scene: "threshold_speed" or "paper_stiffness";
-        else empty.
-    same_model
-        Whether it is of the model of the reference, so that its difference is an error.
+        The field that follows from the scene: "threshold_speed", else empty.
     most_grains
         The ladder measures it on piles of at most so many exposed grains.
     """
@@ -63,7 +59,6 @@ class Rung:
     on: Mapping[str, Fields] = field(default_factory=dict)
     not_on: Sequence[str] = ()
     derived: str = ""
-    same_model: bool = True
     most_grains: float = math.inf
 
     @property
@@ -162,9 +157,6 @@ class Rung:
             speed = ustar / KARMAN * math.log1p(10 * bed.height / bed.roughness)
             fields["method.flow.speed"] = float(f"{speed:.6g}")
             fields["method.flow.first_cell_height"] = scene.first_cell_height
-        elif self.derived == "paper_stiffness":
-            stiffness = 1e6 * scene.grain.diameter / scene.weight  # of 1e6 N/m
-            fields["method.grains.stiffness"] = rounded(stiffness)
         return fields
 
 

@@ -6,25 +6,17 @@ one rung of each, show that the errors add up.
 """
 
 import math
-import time
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from adjustText import adjust_text
-from matplotlib.artist import Artist
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure as Canvas
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
-from matplotlib.patheffects import Normal, Stroke
-from matplotlib.text import Text
 
 from orchestrator import plan
 from orchestrator.bed.line import of_bed
+from orchestrator.digits import number
 from orchestrator.experiment import (
     Experiment,
     Results,
@@ -44,21 +36,18 @@ from orchestrator.fidelity.fidelities import (
     Rung,
     packing,
 )
-from orchestrator.grains.loads import forget
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import of_pile
-from orchestrator.lab import calibration
-from orchestrator.report import style
-from orchestrator.report.card import Card, Number, Worth
+from orchestrator.lab import calibration, chart, choices
+from orchestrator.lab.timing import time_alone_s
 from orchestrator.report.page import Limits, Paragraphs, Section, Table
-from orchestrator.report.style import Figure, Look
 from orchestrator.runs.case import Case
 from orchestrator.study.criterion import ENTRAINED
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study, changed
 from orchestrator.tables.rows import point
-from orchestrator.types import FloatArray, Row
+from orchestrator.types import Row
 
 
 def _rungs() -> dict[str, tuple[Rung, ...]]:
@@ -89,24 +78,9 @@ REFERENCES = (
 """The reference of a scene is the first of these pairs that it has (over a level bed no
 flow is solved); beside it stands a pair as good with all of its numbers changed: the
 uncertainty."""
-MOST_WHOLE = 24
-"""Most exposed grains of piles on which whole fidelities are run."""
 CURVE = np.arange(0.05, 0.76, 0.05)
 """Fractions at which whole curves are compared."""
-HEADS = {
-    "error_10": "$n/N$ = 10 %",
-    "error_30": "$n/N$ = 30 %",
-    "error_50": "$n/N$ = 50 %",
-    "error_70": "$n/N$ = 70 %",
-    "error_curve": "whole curve",
-}
-"""Heads of the columns of errors."""
-AT_FRACTIONS = ["error_10", "error_30", "error_50", "error_70"]
-"""Those of them at single fractions."""
 COLUMN_HEADS = {
-    **{name: f"{name.removeprefix('error_')} %" for name in HEADS},
-    "flow_rung": "flow",
-    "grain_rung": "grains",
     "scene_class": "scene class",
     "cost_core_s": "core-s",
 }
@@ -115,21 +89,6 @@ KNOWN_BY = ["part", "rung", "scene_class", "fraction"]
 """Columns by which known errors are looked up."""
 PAIR = ["flow_rung", "grain_rung"]
 """Columns that name a pair of rungs."""
-FLOOR = 1e-3
-"""Relative errors below it are drawn on it."""
-TOLERANCES = (0.05, 0.2)
-"""Relative errors at which a panel has a line."""
-BANDS = (
-    ("error of the reference itself", "0.88"),
-    ("the model's own spread: better numerics buy nothing", "#fdf3dc"),
-)
-MARKS: Mapping[str, Look] = {
-    "threshold too high": {"marker": "^", "mfc": "0.2"},
-    "threshold too low": {"marker": "v", "mfc": "0.2"},
-    "open: another model": {"marker": "^", "mfc": "white"},
-}
-METHODS = {"quick": "#009e73", "static": "#d55e00", "DEM": "#0072b2"}
-FRONT: Look = {"color": "0.25", "lw": 0.9, "zorder": 1.5}
 
 
 class Ladder(Experiment):
@@ -149,7 +108,27 @@ class Ladder(Experiment):
     def __init__(self, study: Study, out: Path) -> None:
         limits.check_study(study)
         self.pairs = decisions(study)
-        super().__init__(plan.of(self.pairs, cases=out.absolute() / "cases"), study)
+        self.kinds = choices.kinds(study)
+        self.study = study.name
+        asked = dict(self.pairs)
+        for kind in self.kinds:
+            asked |= kind.decisions
+        super().__init__(plan.of(asked, cases=out.absolute() / "cases"), study)
+
+    @property
+    def outline(self) -> Sequence[str]:
+        """Say which choices are charted, of which scenes."""
+        lines = []
+        for kind in self.kinds:
+            scenes = number(len(kind.scenes), "pile")
+            thresholds = sum(len(one.threshold.fractions) for one in kind.scenes)
+            pairs = sum(bool(one.fields) for one in kind.choices)
+            lines.append(
+                f"{kind.name}: {scenes}, {number(thresholds, 'threshold')}, by "
+                f"{number(pairs, 'pair')} of flow and grains and "
+                f"{number(len(choices.TOLERANCES), 'tolerance')}, against the reference"
+            )
+        return lines
 
     def results(self, runs: Runs) -> Results | None:
         """Compare the pairs of rungs whose runs are done."""
@@ -159,13 +138,17 @@ class Ladder(Experiment):
         compared = errors(measured)
         if compared.empty:
             return None
-        means = join_points(compared)
-        rows = compared.merge(means[["packing", *PAIR, "pareto"]], how="left")
-        rows = rows.fillna({"pareto": False})
         known = known_errors(measured)
         done = [pair for key, pair in self.pairs.items() if runs.are_done(key)]
-        tables = {"points": rows, "errors": known, "domain": measured_domain(done)}
-        return Results(tables, _sections(means, known))
+        shares = choices.shares(self.kinds, runs)
+        tables = {
+            "shares": shares,
+            "points": compared,
+            "errors": known,
+            "domain": measured_domain(done),
+        }
+        charts = chart.sections(self.kinds, shares, self.study)
+        return Results(tables, [*charts, _section(known)])
 
 
 def decisions(study: Study) -> dict[str, Decision]:
@@ -216,10 +199,6 @@ def _pairs(scene: Scene, bed: PileBed) -> Iterator[Fidelity]:
         best = FLAT
     for grains in taken(GRAINS):
         yield _pair(best, grains)
-    if is_solved and exposed <= MOST_WHOLE:
-        for one in FIDELITIES:
-            if one.takes(scene):
-                yield _pair(one.flow, one.grains)
 
 
 def points(pairs: Mapping[str, Decision], runs: Runs) -> pd.DataFrame:
@@ -271,7 +250,6 @@ def _about(scene: Scene, pair: Fidelity, count: int) -> Row:
         "count": count,
         "flow_rung": pair.flow.name,
         "grain_rung": pair.grains.name,
-        "same_model": pair.flow.same_model and pair.grains.same_model,
         "model_floor": floor.error if floor else math.nan,
     }
 
@@ -300,31 +278,6 @@ def _thresholds(scene: Scene, pile: Pile, cases: Path) -> Row:
     for name, at in names.items():
         row[name] = of_pile(motion, speed, at, scene.fluid.density).tau
     return row
-
-
-def time_alone_s(pile: Pile, cases: Path) -> float:
-    """Measure the time in which the grains of a pile move without a run of DEM.
-
-    It is the time of this pile alone: a packing or a threshold that another pile needed
-    before is found again.
-
-    Parameters
-    ----------
-    pile
-        The pile.
-    cases
-        The directory of the finished runs.
-
-    Returns
-    -------
-    float
-        Time of one core, s.
-    """
-    forget()
-    alone = Pile(pile.scene, pile.cases)
-    started = time.process_time()
-    alone.motion(cases)
-    return time.process_time() - started
 
 
 def errors(points: pd.DataFrame) -> pd.DataFrame:
@@ -374,57 +327,6 @@ def _compared(
     return rows.assign(**columns)
 
 
-def join_points(points: pd.DataFrame) -> pd.DataFrame:
-    """Put the points of each pair and packing together.
-
-    Parameters
-    ----------
-    points
-        The points with their errors, by `errors`.
-
-    Returns
-    -------
-    DataFrame
-        A row for each pair and packing: the mean cost and the largest signed errors.
-        `pareto` marks the pairs that no other of their packing and model beats in both,
-        by the largest error over the four fractions; a pair that did not reach one is
-        left out.
-    """
-
-    def largest(values: pd.Series) -> float:
-        if values.isna().any():
-            return math.nan
-        return float(max(values, key=abs))
-
-    rows = points[points["in_time"]].groupby(["packing", *PAIR], sort=False)
-    columns: dict[str, Any] = {
-        "piles": ("scene_id", "size"),
-        "cost_core_s": ("cost_core_s", "mean"),
-        **{name: (name, largest) for name in HEADS},
-        "reference_error": ("reference_error", "max"),
-        "model_floor": ("model_floor", "min"),
-        "same_model": ("same_model", "first"),
-    }
-    table: pd.DataFrame = rows.agg(**columns).reset_index()
-    each = table[AT_FRACTIONS].to_numpy(float)
-    worst = each[np.arange(len(each)), np.nan_to_num(np.abs(each)).argmax(axis=1)]
-    is_whole = np.isfinite(each).all(axis=1)
-    table = table.assign(largest=np.where(is_whole, worst, math.nan), pareto=False)
-    for _, alike in table[is_whole & table["same_model"]].groupby("packing"):
-        values = alike[["cost_core_s", "largest"]].abs().to_numpy(float)
-        table.loc[alike.index, "pareto"] = [
-            not _is_beaten(row, values) for row in values
-        ]
-    return table
-
-
-def _is_beaten(row: FloatArray, others: FloatArray) -> bool:
-    """Whether one of some rows is as good in all columns, and better in one."""
-    as_good = (others <= row).all(axis=1)
-    better = (others < row).any(axis=1)
-    return bool(np.any(as_good & better))
-
-
 def known_errors(points: pd.DataFrame) -> pd.DataFrame:
     """Find the numerical error of each rung, by class and fraction.
 
@@ -462,7 +364,7 @@ def scene_errors(points: pd.DataFrame) -> pd.DataFrame:
     """
     beside = np.where(points["class_flow"] == LEVEL_BED, FLAT.name, REFERENCE.name)
     grains = points[(points["flow_rung"] == beside) & points["in_time"]]
-    flow = points[(points["grain_rung"] == PEELING.name) & points["same_model"]]
+    flow = points[points["grain_rung"] == PEELING.name]
     # over a level bed no flow is solved, and no rung of it has an error
     flow = flow[flow["class_flow"] != LEVEL_BED]
     tables = [
@@ -543,113 +445,13 @@ def geometry(scene: Scene, bed: PileBed) -> str:
     return ", ".join(words)
 
 
-def _sections(pairs: pd.DataFrame, known: pd.DataFrame) -> list[Section]:
-    """The sections of the page."""
+def _section(known: pd.DataFrame) -> Section:
+    """The section of the page on each rung by itself."""
     words = page_texts(__file__, "ladder")
-    charts = [
-        Figure(
-            "speed-against-accuracy",
-            "Cost against error",
-            words["largest"],
-            (),
-            chart(pairs, {"largest": ""}),
-        ),
-        Figure(
-            "error-at-fractions",
-            "The error at each fraction",
-            words["fractions"],
-            (),
-            chart(pairs, HEADS),
-        ),
-    ]
-    means = pairs_table(pairs)
-    title = "The rungs, and what is known of them"
-    of_rungs = _tables_of_rungs(known)
-    accuracy = Paragraphs(words["accuracy"], "lead")
     rungs = Paragraphs(words["rungs"], "lead")
     limit = Limits([words["limit"]])
-    return [
-        Section("", [_card(_of_most_piles(pairs))]),
-        Section("Speed against accuracy", [*charts, accuracy, Table.of(means)]),
-        Section(title, [rungs, limit, *map(Table.of, of_rungs)]),
-    ]
-
-
-def pairs_table(pairs: pd.DataFrame) -> pd.DataFrame:
-    """List the pairs of rungs with their numbers in the charts, costs and errors.
-
-    Parameters
-    ----------
-    pairs
-        The pairs, by `join_points`.
-
-    Returns
-    -------
-    DataFrame
-        A row for each packing and pair, by rising cost; errors in %.
-    """
-    percent = 100 * pairs[[*HEADS]]
-    means = pairs.assign(number=_numbers(pairs), **percent)
-    means = means.sort_values(["packing", "cost_core_s"])
-    means = means[["number", "packing", *PAIR, "piles", "cost_core_s", *HEADS]]
-    return means.rename(columns=COLUMN_HEADS)
-
-
-def _numbers(pairs: pd.DataFrame) -> Any:
-    """The number of each pair of rungs, in the figures and in the table."""
-    names = pairs["flow_rung"] + ", " + pairs["grain_rung"]
-    return pd.factorize(names)[0] + 1
-
-
-def _of_most_piles(pairs: pd.DataFrame) -> pd.DataFrame:
-    """The pairs of rungs of the packing that most piles have.
-
-    Packings have different pairs: over a level bed no flow is solved.
-    """
-    packing = pairs.groupby("packing")["piles"].max().idxmax()
-    return pairs[pairs["packing"] == packing]
-
-
-def _card(pairs: pd.DataFrame) -> Card:
-    """The answer card of one packing: what the cheapest models within errors cost."""
-    alike = pairs[pairs["same_model"]]
-    each = alike.assign(largest=alike["largest"].abs()).groupby(PAIR, sort=False)
-    worst = each["largest"].max()
-    cost = each["cost_core_s"].mean()
-    numbers = []
-    for tolerance in TOLERANCES:
-        within = cost[worst <= tolerance]
-        if within.empty:
-            continue
-        flow, grains = within.sort_values().index.tolist()[0]
-        meaning = f"of one core for a pile within {100 * tolerance:g} %"
-        note = f"flow by “{flow}”, grains by “{grains}”"
-        numbers.append(Number(float(within.min()), "s", meaning, note))
-    best = (REFERENCE.name, REFERENCE.name)
-    if best in cost.index:
-        meaning = "of one core for the reference"
-        off = 100 * float(pairs["reference_error"].max())
-        note = ""
-        if math.isfinite(off):
-            note = f"other numbers of its own move it by up to {off:.2g} %"
-        numbers.append(Number(float(cost[best]), "s", meaning, note))
-    count = int(pairs["piles"].max())
-    piles_ = "pile" if count == 1 else "piles, each"
-    return Card(
-        "How much computing time does a threshold need, by how far off it may be?",
-        f"{count} {piles_} by {len(worst)} pairs of models for flow and grains; "
-        f"{pairs['packing'].iloc[0]} packing.",
-        tuple(numbers),
-        "Nothing is measured here: errors are those from the most costly models, the "
-        "reference, at 10, 30, 50 and 70 % of the grains.",
-        Worth(
-            "good",
-            "usable",
-            "These errors are of these piles. A tolerance in a study file chooses by "
-            "those that the package has, from the preset `ladder`. To answer by a pair "
-            "of this page, write its numbers under `[method]`.",
-        ),
-    )
+    title = "The rungs, and what is known of them"
+    return Section(title, [rungs, limit, *map(Table.of, _tables_of_rungs(known))])
 
 
 def _tables_of_rungs(known: pd.DataFrame) -> list[pd.DataFrame]:
@@ -667,123 +469,3 @@ def _tables_of_rungs(known: pd.DataFrame) -> list[pd.DataFrame]:
         key=lambda keys: keys.map(order) if keys.name == "rung" else keys,
     )
     return [meanings, table.reset_index().rename(columns=COLUMN_HEADS)]
-
-
-def chart(pairs: pd.DataFrame, columns: Mapping[str, str]) -> Canvas:
-    """Draw errors against cost: a row of panels for each packing.
-
-    A single column has the number of every pair, the front and its names; several have
-    the numbers on the front.
-
-    Parameters
-    ----------
-    pairs
-        The pairs, by `join_points`.
-    columns
-        Heads of the panels by the columns of errors, one panel for each.
-
-    Returns
-    -------
-    Figure
-        The chart.
-    """
-    is_single = len(columns) == 1
-    names = pairs["flow_rung"] + ", " + pairs["grain_rung"]
-    colours = pairs["grain_rung"].map(METHODS).fillna(METHODS["DEM"])
-    table = pairs.assign(name=names, number=_numbers(pairs), colour=colours)
-    packings = [rows for _, rows in table.groupby("packing", sort=False)]
-    of_row = 2.6 if is_single else 1.7
-    height = of_row * len(packings) + 1.2
-    canvas = style.canvas(height)
-    grid = canvas.subplots(
-        len(packings), len(columns), sharex=True, sharey=True, squeeze=False
-    )
-    tags = []
-    for axes, rows in zip(grid, packings, strict=True):
-        tags += _row_of_panels(axes, rows, columns)
-    for ax in grid.ravel():
-        ax.set(xscale="log", yscale="log", ylim=(FLOOR / 1.5, None))
-        ax.yaxis.set_major_formatter(lambda value, _: f"{100 * value:g}")
-        for tolerance in TOLERANCES:
-            ax.axhline(tolerance, color="0.45", lw=0.7, ls=(0, (4, 2)), zorder=1)
-    grid[-1, len(columns) // 2].set_xlabel("cost, s of one core")
-    samples = _samples(has_front=is_single)
-    style.legends(canvas, [style.entry(*method) for method in METHODS.items()], samples)
-    canvas.draw_without_rendering()  # labels are placed in a finished layout
-    for ax, texts in tags:
-        _place(ax, texts)
-    return canvas
-
-
-def _row_of_panels(
-    axes: Sequence[Axes], rows: pd.DataFrame, columns: Mapping[str, str]
-) -> list[tuple[Axes, list[Text]]]:
-    """Draw the panels of a packing; return the labels of each."""
-    is_single = len(columns) == 1
-    title = f"{rows['packing'].iloc[0]} packing"
-    aligned: Literal["left", "center"] = "center"
-    axes[0].set_ylabel(f"{title}\nerror of $θ_c$, %")
-    if is_single:
-        aligned = "left"
-        axes[0].set_ylabel("largest error of $θ_c$, %")
-    ends = [rows["reference_error"].max(), rows["model_floor"].min()]
-    tags = []
-    for ax, (column, head) in zip(axes, columns.items(), strict=True):
-        ax.set_title(head or title, loc=aligned)
-        for number, (end, (_, colour)) in enumerate(zip(ends, BANDS, strict=True)):
-            order = 0.2 - number / 10
-            ax.axhspan(0, np.nan_to_num(end), color=colour, lw=0, zorder=order)
-        tags.append((ax, _points(ax, rows, column, named=is_single)))
-    return tags
-
-
-def _samples(*, has_front: bool) -> list[Artist]:
-    """Samples for the legend: marks, bands and the front."""
-    samples: list[Artist] = []
-    mark: Look = {"ls": "", "ms": 5, "mec": "0.2", "mew": 0.9}
-    for text, look in MARKS.items():
-        samples.append(Line2D([], [], label=text, **mark, **look))
-    for text, colour in BANDS:
-        samples.append(Patch(label=text, color=colour, lw=0))
-    if has_front:
-        text = "no pair of rungs is cheaper and better"
-        samples.append(Line2D([], [], label=text, **FRONT))
-    return samples
-
-
-def _place(ax: Axes, texts: list[Text]) -> None:
-    """Move the labels of a panel apart."""
-    arrow = {"arrowstyle": "-", "lw": 0.4, "color": "0.5"}
-    room = {"expand": (1.15, 1.4), "iter_lim": 100}
-    if texts:
-        x, y = np.transpose([text.get_position() for text in texts])
-        adjust_text(texts, x, y, ax=ax, arrowprops=arrow, **room)
-    for text in texts:
-        text.set_in_layout(False)
-
-
-def _points(ax: Axes, rows: pd.DataFrame, column: str, *, named: bool) -> list[Text]:
-    """Draw the points of a panel, and the front; return their labels."""
-    shown = rows[(rows["cost_core_s"] > 0) & rows[column].notna()]
-    shown = shown.assign(y=shown[column].abs().clip(lower=FLOOR))
-    halo = [Stroke(linewidth=1.8, foreground="white"), Normal()]
-    look: Look = {"fontsize": 5.5, "color": "0.1", "zorder": 5, "path_effects": halo}
-    if named:
-        look["fontsize"] = 6.0
-    mark: Look = {"gid": "point", "zorder": 3, "ms": 5, "mew": 0.9}
-    tags: list[Text] = []
-    each: Any = shown.itertuples(index=False)
-    for row in each:
-        shape = "v" if getattr(row, column) < 0 else "^"
-        face = row.colour if row.same_model else "white"
-        mark |= {"marker": shape, "mfc": face, "mec": row.colour}
-        ax.plot(row.cost_core_s, row.y, **mark)
-        text = str(row.number)
-        if named and row.pareto:
-            text += f": {row.name}"
-        if named or row.pareto:
-            tags.append(ax.text(row.cost_core_s, row.y, text, **look))
-    if named:
-        front = shown[shown["pareto"]].sort_values("cost_core_s")
-        ax.step(front["cost_core_s"], front["y"], where="post", **FRONT)
-    return tags

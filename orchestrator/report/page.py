@@ -288,6 +288,19 @@ class Text:
 
 
 @dataclass(frozen=True)
+class Lines:
+    """Lines of a file or a command, which a page and a terminal have as they are.
+
+    Attributes
+    ----------
+    text
+        The lines.
+    """
+
+    text: str
+
+
+@dataclass(frozen=True)
 class Limits:
     """What a reader should not conclude.
 
@@ -339,7 +352,7 @@ class Table:
         return cls(frame, fold=f"All {len(frame)} rows" if is_long else "")
 
 
-Element = Union[Card, "Figure", "Sheet", Table, Paragraphs, Text, Limits]
+Element = Union[Card, "Figure", "Sheet", Table, Paragraphs, Lines, Text, Limits]
 """What a section holds."""
 
 
@@ -381,6 +394,8 @@ class Section:
         for each in self.content:
             if isinstance(each, Card):
                 told += [*lines(each), ""]
+            elif isinstance(each, Lines):
+                told += [each.text, ""]
             elif isinstance(each, Paragraphs) and not self.title:
                 told.append(each.text.replace("\n\n", "\n"))
         return "\n".join(told)
