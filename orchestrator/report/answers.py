@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.digits import percent
+from orchestrator.fidelity import crest
 from orchestrator.grains.pile import Pile
 from orchestrator.physics.constants import GRAIN_COLUMNS
 from orchestrator.physics.fluids import is_gas
@@ -208,17 +209,19 @@ def _numbers_of_bed(
     if has_place:
         yield _place(row, pile, results)
     if first > 0:
-        yield _first_motion(row, told)
+        yield _first_motion(row, pile, told)
     yield share(row, told)
     if not has_place:
         yield ustar_number(row)
 
 
-def _first_motion(row: pd.Series, told: Quantity) -> Number:
+def _first_motion(row: pd.Series, pile: Pile, told: Quantity) -> Number:
     """The flow that moves the first grains, with its interval."""
     of_what = single.interval_of(row, "load step and the known error of the method")
     meaning = f"{told.name} that moves the first grains"
     place = single.place_of(told, row)
+    if crest.has_sharp_crest(pile.scene):
+        place += f"; a finer first cell moves u*₀ by {crest.told(crest.FIRST_GRAIN)}"
     return single.reported(row, told, meaning, place, of_what, "first_")
 
 
@@ -344,7 +347,7 @@ def _first_of_several(
         return None
     row = starts.loc[starts["first_ustar0_m_s"].idxmin()]
     bed = results.plan.piles[str(row["scene_id"])].bed
-    number = _first_motion(row, told)
+    number = _first_motion(row, results.plan.piles[str(row["scene_id"])], told)
     what = ", ".join(labels.told(row, list(telling)[:3]))
     where = counted.spot(float(row["first_x_m"]), bed)
     meaning = f"least {told.name} that moves the first grains, {where}: {what}"

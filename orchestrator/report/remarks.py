@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.digits import percent
+from orchestrator.fidelity import crest
 from orchestrator.fidelity.decision import floor_of
 from orchestrator.fidelity.limits import FROZEN_BED
 from orchestrator.physics.fluids import is_gas
@@ -42,6 +43,13 @@ SOLID_FENCE = Remark(
     "A fence is solid.",
     "Nothing flows through it. Fences that collect sand or dust are about half porous "
     "and shelter the bed behind them otherwise, which is not computed.",
+)
+SHARP_CREST = Remark(
+    "The first grains depend on the mesh at the crest.",
+    f"With a quarter of the first cell, on {crest.PILES} piles, u*₀ changed by "
+    f"{crest.told(crest.FIRST_GRAIN)} for the first grain and by "
+    f"{crest.told(crest.TENTH)} for 10 %. No numerical interval contains it. "
+    "`orchestrator convergence` estimates it for a study.",
 )
 FIRST_MOTION = Remark(
     "First motion, not transport.",
@@ -202,6 +210,8 @@ def _of_piles(results: Results, piles: pd.DataFrame) -> Iterator[Remark]:
         asked = results.plan.decisions[str(row["scene_id"])].asked
         yield from _closed_form(row, pile.bed, is_asked=not asked.method.is_open)
         yield from _model(row, results)
+    if any(map(crest.has_sharp_crest, results.study.scenes)):
+        yield SHARP_CREST
     fences = [scene for scene in results.study.scenes if _has_fence(scene)]
     if fences:
         yield SOLID_FENCE

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from orchestrator.report import remarks, sheets
+from orchestrator.fidelity import crest
+from orchestrator.report import answers, remarks, sheets
 from orchestrator.report.results import Results
 from tests import small_study
 from tests.report.conftest import changed, copies, only
@@ -104,3 +105,15 @@ def test_two_beds_are_the_two_numbers_of_the_card_and_one_is_one(
     numbers = answers.card(changed(both, pile_threshold=alone)).numbers
     assert len(numbers) == 2
     assert numbers[0].meaning.startswith("stress that moves 30 %: d = ")
+
+
+def test_a_pile_with_an_edge_is_told_what_its_mesh_is_worth(
+    results: Results, tmp_path: Path
+) -> None:
+    pile = only(results, "pile")
+    assert remarks.SHARP_CREST in remarks.remarks(pile)
+    moved = crest.told(crest.FIRST_GRAIN)
+    assert [one for one in answers.card(pile).numbers if moved in one.note]
+    poured = small_study.run(tmp_path, SEEDS_IN_WATER)
+    assert remarks.SHARP_CREST not in remarks.remarks(poured)
+    assert not [one for one in answers.card(poured).numbers if moved in one.note]
