@@ -10,8 +10,9 @@ from pathlib import Path
 import pandas as pd
 from markupsafe import Markup
 
-from orchestrator.paper import measures
-from orchestrator.paper.evidence import RULE, Comparison, Evidence, Verdict, combined
+from orchestrator.paper import findings, measures
+from orchestrator.paper.evidence import FLOWS, RULE, Comparison, Evidence, Verdict
+from orchestrator.paper.findings import COUNTED, WORDS, Finding, columns_of, finding_of
 from orchestrator.report import page
 from orchestrator.report.card import Card, Mark, Number, Worth
 from orchestrator.report.page import Guest, Section, Text
@@ -19,14 +20,13 @@ from orchestrator.report.sheets import Sheet
 from orchestrator.tables import Tables
 
 FILE = Path(__file__).with_name("claims.toml")
-WORDS: dict[Verdict, str] = {
-    "reproduced": "reproduced",
-    "partly": "in part",
-    "not": "not reproduced",
-    "no data": "not judged",
+IN_PART: tuple[Verdict, ...] = ("mostly", "half", "mostly not")
+"""Verdicts on claims that hold in a part of the comparisons."""
+MARKS: dict[Verdict, Mark] = {
+    "reproduced": "good",
+    **dict.fromkeys(IN_PART, "care"),
+    "not": "bad",
 }
-"""Verdicts, and what the page calls them."""
-MARKS: dict[Verdict, Mark] = {"reproduced": "good", "partly": "care", "not": "bad"}
 """Verdicts, and their marks; one that was not judged has none."""
 
 
@@ -42,20 +42,20 @@ class Claim:
         Section or figure of the paper.
     measure
         Gives the comparisons that judge the claim.
-    verdict
-        The verdict on the data of the preset ``paper``.
     why
-        Why it is this one.
+        Why the verdict on the data of the preset ``paper`` is the one that it is.
     figures
         Beginnings of the names of the page's figures that show the claim.
+    found
+        What the preset found: by all lines, then by those under each flow.
     """
 
     says: str
     where: str
     measure: Callable[[Evidence], Iterator[Comparison]]
-    verdict: Verdict
     why: str
     figures: tuple[str, ...]
+    found: tuple[Finding, ...]
 
 
 @dataclass(frozen=True)
@@ -74,30 +74,37 @@ class Judged:
     comparisons: tuple[Comparison, ...]
 
     @property
-    def verdict(self) -> Verdict:
-        """By the comparisons that count."""
-        return combined(one.verdict for one in self.comparisons if one.is_decisive)
+    def decisive(self) -> list[Comparison]:
+        """The comparisons that count."""
+        return [one for one in self.comparisons if one.is_decisive]
 
     @property
-    def held(self) -> tuple[int, int]:
-        """In how many of the comparisons that count it is true, and of how many."""
-        decisive = [one for one in self.comparisons if one.is_decisive]
-        true = sum(int(one.true.sum()) for one in decisive)
-        return true, sum(len(one.numbers) for one in decisive)
+    def findings(self) -> tuple[Finding, ...]:
+        """What all lines that count say together, then those under each flow."""
+        lines = self.decisive
+        flows = [name for name in FLOWS if any(one.flow == name for one in lines)]
+        by_flow = ([one for one in lines if one.flow == name] for name in flows)
+        return (finding_of("", lines), *map(finding_of, flows, by_flow))
+
+    @property
+    def verdict(self) -> Verdict:
+        """By the comparisons that count."""
+        return self.findings[0].verdict
 
     @property
     def why(self) -> str:
         """The explanation of the claim, if it explains this verdict."""
-        if self.verdict == self.claim.verdict:
+        expected = self.claim.found[0].verdict
+        if self.verdict == expected:
             return self.claim.why
         if self.verdict == "no data":
             lacking = []
-            for one in self.comparisons:
-                if one.is_decisive and one.verdict == "no data":
-                    lacking.append(one.name)
+            for one in self.decisive:
+                if one.verdict == "no data":
+                    lacking.append(one.title)
             names = "; ".join(lacking) or "any of its comparisons"
             return f"This study, by its methods, has nothing to compare for: {names}."
-        there = f"on the preset `paper` without a tolerance it is {self.claim.verdict}"
+        there = f"on the preset `paper` without a tolerance it is {WORDS[expected]}"
         return f"Not explained: {there}."
 
 
@@ -148,6 +155,7 @@ def guest(judged: Sequence[Judged], tables: Tables, file: str) -> Guest:
             entries=entries,
             rule=RULE,
             words=WORDS,
+            flows=FLOWS,
             marks=MARKS,
             file=file,
             links={},
@@ -185,15 +193,17 @@ def claims_card(judged: Sequence[Judged], tables: Tables) -> Card:
     if lacking:
         which += f"; {lacking} could not be judged: this study has nothing to compare, "
         which += "since it lacks the scenes, or its methods lack the load steps"
-    told: tuple[tuple[Verdict, str, str], ...] = (
-        ("reproduced", "claims reproduced", "in at least 95 % of the comparisons"),
-        ("partly", "claims that hold in part", "the reason stands under each claim"),
-        ("not", "claims not reproduced", which),
+    sides = [f"{counts[side]} {WORDS[side]}" for side in IN_PART if counts[side]]
+    part = ", ".join(sides) or "none"
+    told: tuple[tuple[tuple[Verdict, ...], str, str], ...] = (
+        (("reproduced",), "claims reproduced", "in at least 95 % of the comparisons"),
+        (IN_PART, "claims that hold in part", part),
+        (("not",), "claims not reproduced", which),
     )
     figures = []
-    for verdict, meaning, note in told:
-        mark = MARKS[verdict]
-        figures.append(Number.counted(counts[verdict], of, meaning, note, mark))
+    for verdicts, meaning, note in told:
+        count = sum(counts[verdict] for verdict in verdicts)
+        figures.append(Number.counted(count, of, meaning, note, MARKS[verdicts[0]]))
     return Card(
         "Do the paper’s claims hold when its method is run anew?",
         "Bravo, Ortiz and Pérez-Aparicio on sediment transport by the discrete element"
@@ -242,9 +252,12 @@ def claims_sheet(judged: Sequence[Judged], file: str) -> Sheet:
     """
     rows = []
     for number, one in enumerate(judged, 1):
-        true, of = one.held
-        held = f"{true} of {of}" if of else "—"
-        rows.append((str(number), one.claim.says, held, WORDS[one.verdict]))
+        whole, *by_flow = one.findings
+        verdict = WORDS[whole.verdict]
+        if len({each.verdict for each in by_flow}) > 1:
+            told = [f"by {FLOWS[each.flow]} {each}" for each in by_flow]
+            verdict = f"{verdict}: {'; '.join(told)}"
+        rows.append((str(number), one.claim.says, whole.count, verdict))
     columns = ["no", "claim of the paper", "holds in", "verdict"]
     return Sheet("The claims", pd.DataFrame(rows, columns=columns), file=file)
 
@@ -260,20 +273,29 @@ def frame(judged: Sequence[Judged]) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        A row for each; its comparisons are one text, a line for each.
+        A row for each, with the verdict and the counts of all lines, then those by
+        each flow; its comparisons are one text, a line for each.
     """
-    columns = ["claim", "where", "measured", "verdict", "rule", "why"]
     rows = []
     for one in judged:
-        text = "\n".join(map(str, one.comparisons))
-        claim = one.claim
-        rows.append((claim.says, claim.where, text, one.verdict, RULE, one.why))
-    return pd.DataFrame(rows, columns=columns)
+        by_flow = {each.flow: each for each in one.findings}
+        row: dict[str, object] = {"claim": one.claim.says, "where": one.claim.where}
+        for flow in ("", *FLOWS):
+            of_flow = by_flow.get(flow)
+            for name, column in zip(COUNTED, columns_of(flow), strict=True):
+                row[column] = getattr(of_flow, name) if of_flow else None
+        row["measured"] = "\n".join(map(str, one.comparisons))
+        rows.append({**row, "rule": RULE, "why": one.why})
+    table = pd.DataFrame(rows)
+    counts = [name for flow in ("", *FLOWS) for name in columns_of(flow)[1:]]
+    return table.astype(dict.fromkeys(counts, "Int64"))
 
 
 def _claims() -> Iterator[Claim]:
     """The claims of the file; one of neighbours in a column is measured by `along`."""
-    for entry in tomllib.loads(FILE.read_text(encoding="utf-8"))["claim"]:
+    entries = tomllib.loads(FILE.read_text(encoding="utf-8"))["claim"]
+    for entry, found in zip(entries, findings.of_preset(), strict=True):
+        entry["found"] = found
         pairs = entry.pop("pairs", None)
         measure = entry.pop("measure", "")
         entry["figures"] = tuple(entry["figures"])

@@ -11,10 +11,10 @@ import pandas as pd
 from orchestrator.study import fields
 from orchestrator.study.method import HELD_FROM
 from orchestrator.tables import Tables, meanings, with_methods, with_scenes
-from orchestrator.tables.facts import needs_run
+from orchestrator.tables.facts import has_contacts, needs_run
 from orchestrator.types import BoolArray, FloatArray
 
-Verdict = Literal["reproduced", "partly", "not", "no data"]
+Verdict = Literal["reproduced", "mostly", "half", "mostly not", "not", "no data"]
 
 SHARE = 0.95
 """Part of comparisons that must be true where a statement counts as true.
@@ -22,14 +22,21 @@ SHARE = 0.95
 It counts as false if at most the other part is."""
 RULE = (
     f"reproduced: so in at least {SHARE:.0%} of the comparisons of each judged line; "
-    f"not: in at most {1 - SHARE:.0%} of each; else partly; no data: if a judged line "
-    "has none"
+    f"not: in at most {1 - SHARE:.0%} of each; else mostly or mostly not: in more or "
+    "in less than half of all comparisons of these lines together; no data: if a judged"
+    " line has none"
 )
 REGIMES = {"low": "low regime", "high": "high regime"}
 BRIDGED = "bridged"
 """The force law that has an answer where neither of the paper's has one."""
 ANSWERS = ("pile_threshold", "wall_stress")
-"""Tables that any threshold method fills; of all others the rows by DEM are taken."""
+"""Tables of which the rows by every threshold method are taken."""
+FREEING = ("pile_curve",)
+"""Tables of which the rows by methods are taken in which grains free one another: DEM
+and peeling. Of all other tables those by DEM are taken."""
+FLOWS = {"eq10": "Eq. 10", "wall": "wall stress"}
+"""The stresses on the grains of piles by which a claim on piles is judged: that of the
+paper first."""
 BESIDE = ("fraction", "fidelity")
 """Columns in which two rows must agree beside those of their scenes."""
 GRAIN = ("alpha_deg", "beta_deg", "d_m", "z0_over_d", "nu_m2_s", "force_law")
@@ -57,6 +64,9 @@ class Comparison:
         Format of a number.
     is_judged
         Whether the verdict of a claim may depend on the values.
+    flow
+        The stress on the grains under which the values were found, of `FLOWS`; empty
+        where they depend on no flow over a pile, or on both stresses.
     """
 
     name: str
@@ -65,6 +75,7 @@ class Comparison:
     below: float = np.inf
     form: str = ".3g"
     is_judged: bool = True
+    flow: str = ""
 
     @cached_property
     def has_bools(self) -> bool:
@@ -92,25 +103,30 @@ class Comparison:
     @property
     def verdict(self) -> Verdict:
         """The verdict by the share of true comparisons."""
-        if not len(self.numbers):
-            return "no data"
-        share = self.true.mean()
-        if share >= SHARE:
-            return "reproduced"
-        return "not" if share <= 1 - SHARE else "partly"
+        return combined([self])
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        """In how many of the `numbers` the claim is true, and of how many."""
+        return int(self.true.sum()), len(self.numbers)
+
+    @property
+    def title(self) -> str:
+        """The flow, and what the values are."""
+        return f"{FLOWS[self.flow]}, {self.name}" if self.flow else self.name
 
     def __str__(self) -> str:
         if not len(self.numbers):
-            return f"{self.name}: no data"
-        count = f"in {int(self.true.sum())} of {len(self.numbers)}"
+            return f"{self.title}: no data"
+        count = "in {} of {}".format(*self.counts)
         if self.has_bools:
-            return f"{self.name}: {count}"
+            return f"{self.title}: {count}"
         limits = []
         if np.isfinite(self.above):
             limits.append(f"above {self.above:{self.form}}")
         if np.isfinite(self.below):
             limits.append(f"at most {self.below:{self.form}}")
-        text = f"{self.name}: {self._spread()}"
+        text = f"{self.title}: {self._spread()}"
         if limits:
             text += f", {' and '.join(limits)} {count}"
         missing = np.size(self.values) - len(self.numbers)
@@ -127,25 +143,31 @@ class Comparison:
         return f"{middle} in the median ({least} … {most})"
 
 
-def combined(verdicts: Iterable[Verdict]) -> Verdict:
-    """Combine the verdicts of several statements.
+def combined(lines: Iterable[Comparison]) -> Verdict:
+    """Judge a claim by several lines, by `RULE`.
 
     Parameters
     ----------
-    verdicts
-        The verdicts.
+    lines
+        The judged lines.
 
     Returns
     -------
     str
-        Partly where they differ, no data where one lacks them.
+        Mostly, half or mostly not by all comparisons together, where the lines are not
+        all true or all false; no data where one of them has none, or none is given.
     """
-    different = set(verdicts)
-    if not different or "no data" in different:
+    counts = [line.counts for line in lines]
+    if not counts or not all(of for _, of in counts):
         return "no data"
-    if len(different) > 1:
-        return "partly"
-    return different.pop()
+    if all(true >= SHARE * of for true, of in counts):
+        return "reproduced"
+    if all(of - true >= SHARE * of for true, of in counts):
+        return "not"
+    true, of = map(sum, zip(*counts, strict=True))
+    if 2 * true == of:
+        return "half"
+    return "mostly" if 2 * true > of else "mostly not"
 
 
 class Evidence:
@@ -192,6 +214,8 @@ class Evidence:
         table = with_scenes(table, self.scenes)
         if name in ANSWERS:
             return table
+        if name in FREEING:
+            return table[has_contacts(table)]
         return table[needs_run(table)]
 
     @cached_property
@@ -236,19 +260,23 @@ class Evidence:
             return _alike(table[table["force_law"] == BRIDGED])
         return commonest(table[table["force_law"] == BRIDGED])
 
-    def piles(
-        self, name: str, packing: str = "aligned", *stresses: str
-    ) -> pd.DataFrame:
+    @cached_property
+    def flows(self) -> list[str]:
+        """The stresses of `FLOWS` under which the study has piles."""
+        piles = self.scenes[self.scenes["bed"] == "pile"]
+        return [flow for flow in FLOWS if (piles["stress"] == flow).any()]
+
+    def piles(self, name: str, *flows: str, packing: str = "aligned") -> pd.DataFrame:
         """Look up the piles of a packing whose force law holds.
 
         Parameters
         ----------
         name
             Name of a table.
+        *flows
+            The stresses on their grains.
         packing
             Their packing.
-        *stresses
-            The stresses on their grains, by default the wall stress.
 
         Returns
         -------
@@ -256,14 +284,24 @@ class Evidence:
             Rows of the table with the columns of their scenes.
         """
         table = self.joined(name)
-        is_chosen = table["stress"].isin(stresses or ("wall",))
-        is_chosen &= table["packing"] == packing
+        is_chosen = table["stress"].isin(flows) & (table["packing"] == packing)
         return table[is_chosen & (table["force_law"] == table["regime"])]
 
-    @cached_property
-    def curves(self) -> list[pd.DataFrame]:
-        """Of each pile the load steps in which some grains had moved, in order."""
-        table = self.piles("pile_curve")
+    def curves(self, flow: str) -> list[pd.DataFrame]:
+        """List how the fraction of each pile grows.
+
+        Parameters
+        ----------
+        flow
+            The stress on the grains.
+
+        Returns
+        -------
+        list of DataFrame
+            Of each pile in rows along the slope the load steps in which some grains
+            had moved, in order.
+        """
+        table = self.piles("pile_curve", flow)
         moved = table[table["moved"] > 0].sort_values("load_step")
         by_scene = [rows for _, rows in moved.groupby("scene_id")]
         return [rows for rows in by_scene if rows["fraction_moved"].nunique() > 2]
@@ -351,12 +389,14 @@ def pairs(
     Returns
     -------
     DataFrame
-        A row for each pair, with its ``force_law`` and the ``ratio`` of the value at
-        the higher end to that at the lower; NaN where one of them is missing.
+        A row for each pair, with ``force_law`` and ``alpha_deg`` of its higher end and
+        the ``ratio`` of the value there to that at the lower; NaN where one of them is
+        missing.
     """
     series = table.groupby(other_columns(table, along, *ignore), dropna=False).ngroup()
     ordered = table.assign(series=series).sort_values(["series", along], kind="stable")
     before = ordered.shift()
     beside = (ordered["series"] == before["series"]) & (ordered[along] > before[along])
-    ratios = ordered[["force_law"]].assign(ratio=ordered[value] / before[value])
+    own = ordered[["force_law", "alpha_deg"]]
+    ratios = own.assign(ratio=ordered[value] / before[value])
     return ratios[beside].reset_index(drop=True)

@@ -68,6 +68,51 @@ PILE = ("reynolds", "shields", "shields_low", "shields_high")
 """Columns of a pile: x, y and the ends of its interval."""
 
 
+EQ10 = "eq10"
+"""The stress by which the paper computes its piles: Eq. 10 at the first cell."""
+
+
+class OfStress(NamedTuple):
+    """Piles under one stress on their grains, and how their figures differ.
+
+    Attributes
+    ----------
+    name, title
+        Endings of the names and titles of their figures.
+    after
+        Added to the figure of the paper that a figure follows.
+    rows
+        The piles.
+    """
+
+    name: str
+    title: str
+    after: str
+    rows: pd.DataFrame
+
+
+def by_stress(piles: pd.DataFrame) -> Iterator[OfStress]:
+    """Part piles by the stress on their grains, that of the paper first.
+
+    Parameters
+    ----------
+    piles
+        Piles with the column ``stress``, which is blank where no flow is solved.
+
+    Yields
+    ------
+    OfStress
+        Those by Eq. 10, then all others.
+    """
+    by_eq10 = piles["stress"] == EQ10
+    if by_eq10.any():
+        yield OfStress("-eq10", ", stress of Eq. 10", "", piles[by_eq10])
+    if not by_eq10.all():
+        others = piles[~by_eq10]
+        title = ", wall stress" if by_eq10.any() else ""
+        yield OfStress("", title, ", by the wall stress", others)
+
+
 class Sheet(NamedTuple):
     """Panels of one figure, and the rows that they show.
 
@@ -218,6 +263,7 @@ def about(rows: pd.DataFrame) -> dict[str, Any]:
         "methods": labels.methods(rows),
         "others": labels.methods(rows[~is_run]),
         "dem": is_run.any(),
+        "stress": _stresses(rows),
         "increment": used("load_increment", 100.0),
         "waiting": used("waiting_time"),
         "criterion": used("displacement_criterion"),
@@ -231,6 +277,12 @@ def about(rows: pd.DataFrame) -> dict[str, Any]:
         "bagnold_from": f"{theory.BAGNOLD_FROM:g}",
     }
     return of_the_points | of_the_lines
+
+
+def _stresses(rows: pd.DataFrame) -> str:
+    """The stresses on the grains of some rows, in words."""
+    named = sorted(set(rows["stress"].dropna()) or {"wall"})
+    return " or ".join(labels.value("stress", name) for name in named)
 
 
 def ends(scenes: pd.DataFrame, *drawn: pd.DataFrame) -> tuple[float, float]:

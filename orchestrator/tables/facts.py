@@ -24,6 +24,23 @@ def needs_run(rows: pd.DataFrame) -> "pd.Series[bool]":
     return rows["method"].map(runs).astype(bool)
 
 
+def has_contacts(rows: pd.DataFrame) -> "pd.Series[bool]":
+    """Tell in which rows a grain that left freed others.
+
+    Parameters
+    ----------
+    rows
+        Rows with the column ``method`` of their answers.
+
+    Returns
+    -------
+    Series
+        Truth values; in all others each grain is taken by itself.
+    """
+    frees = {name: method.has_contacts for name, method in METHODS.items()}
+    return rows["method"].map(frees).astype(bool)
+
+
 def packs_grains(row: Any) -> bool:
     """Tell whether the threshold of a pile is of packed grains, not of places.
 

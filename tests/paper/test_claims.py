@@ -14,16 +14,19 @@ from orchestrator.paper.claims import CLAIMS, Judged
 from orchestrator.paper.evidence import (
     BRIDGED,
     Comparison,
+    Evidence,
     Verdict,
     combined,
     pairs,
 )
+from orchestrator.paper.findings import Finding
 from orchestrator.physics import curves
 from orchestrator.report.results import Results
 from orchestrator.runs.files import Folder
 from orchestrator.study import fields, study
 from orchestrator.study.closed_form import closed_form, law_holds
 from orchestrator.tables import Tables
+from tests.report.conftest import copies
 
 NAMES = [
     " ".join((claim.measure.keywords["table"], claim.measure.keywords["along"]))
@@ -63,20 +66,82 @@ def exact() -> Tables:
     }
 
 
+def line(true: int, of: int, **others: str) -> Comparison:
+    """A line of comparisons, some of which are true."""
+    return Comparison("", np.where(np.arange(of) < true, 2.0, 0.5), 1.0, **others)
+
+
 @pytest.mark.parametrize(
-    ("true", "verdict"),
-    [(19, "reproduced"), (18, "partly"), (1, "not"), (None, "no data")],
+    ("true", "of", "verdict"),
+    [
+        (19, 20, "reproduced"),
+        (18, 20, "mostly"),
+        (11, 20, "mostly"),
+        (10, 20, "half"),
+        (9, 20, "mostly not"),
+        (2, 20, "mostly not"),
+        (1, 20, "not"),
+        (0, 0, "no data"),
+    ],
 )
-def test_a_verdict_follows_from_the_share(true: int | None, verdict: Verdict) -> None:
-    numbers = np.where(np.arange(0 if true is None else 20) < (true or 0), 2.0, 0.5)
-    assert Comparison("", numbers, 1.0).verdict == verdict
+def test_a_verdict_follows_from_the_share(true: int, of: int, verdict: Verdict) -> None:
+    one = line(true, of)
+    numbers = one.numbers
+    assert one.counts == (true, of)
+    assert one.verdict == verdict
     assert Comparison("", -numbers, below=-1.0).verdict == verdict
     assert Comparison("", numbers > 1).verdict == verdict
     assert Comparison("", [*numbers, np.nan], 1.0).verdict == verdict
-    assert combined([verdict, verdict]) == verdict
-    if verdict != "no data":
-        assert combined([verdict, "partly"]) == "partly"
-    assert combined([verdict, "no data"]) == combined([]) == "no data"
+    assert combined([one, one]) == verdict
+    assert combined([one, line(0, 0)]) == combined([]) == "no data"
+
+
+@pytest.mark.parametrize(
+    ("lines", "verdict"),
+    [
+        # the two claims that "in part" did not tell apart
+        ([(0, 475), (12, 12)], "mostly not"),
+        ([(78, 78), (4, 16), (20, 20)], "mostly"),
+        ([(8, 8), (0, 8)], "half"),
+        # many true ones do not carry a line that fails
+        ([(1000, 1000), (5, 6)], "mostly"),
+        ([(0, 1000), (1, 6)], "mostly not"),
+        ([(19, 20), (1000, 1000)], "reproduced"),
+        ([(1, 20), (0, 1000)], "not"),
+    ],
+)
+def test_a_claim_that_holds_in_part_says_on_which_side_it_is(
+    lines: list[tuple[int, int]], verdict: Verdict
+) -> None:
+    assert combined(line(*counts) for counts in lines) == verdict
+
+
+def test_a_claim_is_judged_by_each_flow_and_by_both() -> None:
+    lines = (
+        line(4, 4, flow="eq10"),
+        line(1, 3, flow="wall"),
+        line(2, 2, flow="wall"),
+        Comparison("", [7.0], flow="wall"),
+    )
+    one = Judged(CLAIMS[0], lines)
+    assert one.findings == (
+        Finding("", "mostly", 7, 9),
+        Finding("eq10", "reproduced", 4, 4),
+        Finding("wall", "mostly", 3, 5),
+    )
+    assert [str(each) for each in one.findings] == [
+        "mostly, 7 of 9", "reproduced, 4 of 4", "mostly, 3 of 5",
+    ]  # fmt: skip
+    (row,) = claims.frame([one]).to_dict("records")
+    assert (row["verdict"], row["true"], row["of"]) == ("mostly", 7, 9)
+    assert (row["verdict_eq10"], row["true_eq10"], row["of_eq10"]) == (
+        "reproduced", 4, 4,
+    )  # fmt: skip
+    assert (row["verdict_wall"], row["true_wall"], row["of_wall"]) == ("mostly", 3, 5)
+    verdict = claims.claims_sheet([one], "").frame["verdict"].item()
+    assert verdict == (
+        "mostly: by Eq. 10 reproduced, 4 of 4; by wall stress mostly, 3 of 5"
+    )
 
 
 def test_pairs_agree_in_all_else() -> None:
@@ -101,12 +166,12 @@ def test_a_small_study_is_judged(results: Results) -> None:
         name: one.verdict for name, one in judged.items() if one.verdict != "no data"
     }
     assert verdicts == {
-        "constant": "partly",
+        "constant": "half",
         "held beta_deg": "reproduced",
-        "held z0_over_d": "partly",
+        "held z0_over_d": "mostly not",
         "held alpha_deg": "reproduced",
         "order": "reproduced",
-        "coupling": "partly",
+        "coupling": "mostly not",
     }
 
 
@@ -116,7 +181,8 @@ def test_a_reason_explains_its_verdict_or_is_none(
     asked = {name: results.tables[name] for name in ("scenes", "methods")}
     for tables in (results.tables, exact, asked):
         for one in claims.judge_claims(tables):
-            assert (one.why == one.claim.why) == (one.verdict == one.claim.verdict)
+            found = one.claim.found[0].verdict
+            assert (one.why == one.claim.why) == (one.verdict == found)
 
 
 def test_ramps_alone_reproduce_nothing(results: Results) -> None:
@@ -135,7 +201,7 @@ def test_ramps_alone_reproduce_nothing(results: Results) -> None:
     raised = grains.assign(shields_dem_low=factor * grains["shields_closed_form"])
     assert (
         judge(results.tables, methods=both, single_grain=raised)["numerical"].verdict
-        == "partly"
+        == "mostly not"
     )
 
 
@@ -154,10 +220,42 @@ def test_verdicts_turn_with_the_numbers(results: Results) -> None:
         )
 
 
+def test_a_claim_on_piles_is_judged_under_each_stress(results: Results) -> None:
+    slopes = [{"alpha_deg": 15.0, "shields": 0.1}, {"alpha_deg": 20.0, "shields": 0.2}]
+    falling = [{**slope, "shields": 1 / slope["shields"]} for slope in slopes]
+    piles = copies(
+        results,
+        *({**slope, "stress": "eq10"} for slope in slopes),
+        *({**slope, "stress": "wall"} for slope in falling),
+    )
+    in_regime = {"force_law": "high", "regime": "high", "packing": "aligned"}
+    scenes = piles.tables["scenes"].assign(**in_regime)
+    table = piles.tables["pile_threshold"].assign(**in_regime)
+    one = judge(piles.tables, scenes=scenes, pile_threshold=table)["piles alpha_deg"]
+    high = [each for each in one.decisive if "high" in each.name]
+    assert [(each.flow, each.counts) for each in high] == [
+        ("eq10", (4, 4)), ("wall", (0, 4)),
+    ]  # fmt: skip
+
+
+def test_curves_are_of_methods_in_which_grains_free_one_another(
+    results: Results,
+) -> None:
+    methods = ("dem", "peeling", "pivot")
+    piles = copies(results, *({"method": name} for name in methods))
+    evidence = Evidence(piles.tables)
+    assert {curve["method"].iloc[0] for curve in evidence.curves("wall")} == {
+        "dem", "peeling",
+    }  # fmt: skip
+    assert evidence.curves("eq10") == []
+    assert set(evidence.joined("pile_grain")["method"]) == {"dem"}
+    assert set(evidence.joined("pile_threshold")["method"]) == set(methods)
+
+
 def test_the_closed_form_is_judged(exact: Tables) -> None:
     judged = judge(exact)
     assert judged["conditioning"].verdict == "not"
-    assert judged["best_fit"].verdict == "partly"
+    assert judged["best_fit"].verdict == "mostly not"
     # lift over drag at Re* = 3 is alpha_s/pi, over tan(beta)
     steepest = 1 / (1 + 1.615 / np.pi) - 1
     lines = judged["constant"].comparisons
@@ -168,7 +266,7 @@ def test_the_closed_form_is_judged(exact: Tables) -> None:
     grains = exact["single_grain"]
     factor = np.where(soft.loc[grains["scene_id"]], 1.2, 1.0)
     softer = grains.assign(ustar_m_s=grains["ustar_m_s"] * factor)
-    assert judge(exact, single_grain=softer)["conditioning"].verdict == "partly"
+    assert judge(exact, single_grain=softer)["conditioning"].verdict == "mostly not"
 
 
 def test_the_transition_and_other_fluids_are_not_judged(results: Results) -> None:

@@ -166,6 +166,35 @@ def test_captions_of_fractions_say_what_is_drawn(results: Results) -> None:
         assert "Between the two neither holds" in said
 
 
+@pytest.mark.parametrize("others", [[], [{"stress": "wall", "d_m": 7e-4}]])
+def test_piles_by_eq10_have_figures_of_their_own(
+    results: Results, others: list[dict[str, object]]
+) -> None:
+    """Figs. 14 to 16 are by Eq. 10; those of the wall stress say that they are not."""
+    both = copies(results, {"stress": "eq10"}, *others)
+    table = both.tables["pile_threshold"]
+    figures = [*pile_figures(both), *fractions.FIGURE.draw(both)]
+    found = {figure.name: figure for figure in figures}
+    stems = ["fractions-alpha15", "extended-shields-d30", "fractions-reynolds-alpha15"]
+    names = [f"{stem}-eq10" for stem in stems]
+    assert set(found) >= set(names)
+    assert ({*stems} <= set(found)) == bool(others)
+    for number, (stem, name) in enumerate(zip(stems, names, strict=True)):
+        own = found[name]
+        assert "stress of Eq. 10" in own.title
+        assert "mean stress of Eq. 10" in " ".join(own.caption.split())
+        assert own.follows == ["Fig. 14, right", "Fig. 16", "Fig. 14, left"][number]
+        if others:
+            assert "wall stress" in found[stem].title
+            assert "mean wall stress" in " ".join(found[stem].caption.split())
+            assert found[stem].follows == f"{own.follows}, by the wall stress"
+    for name, scene in ((names[1], "copy 0"), (stems[1], "copy 1"))[: 1 + len(others)]:
+        (ax,) = axes_of(found[name])
+        own_rows = table[table["scene_id"] == scene]
+        expected = rows(own_rows, "reynolds", "shields")
+        assert points(marked(ax, SOLID, HOLLOW)) == expected
+
+
 def test_extended_diagram_shows_each_fraction_that_was_reached(
     results: Results, heaps: dict[str, list[Axes]]
 ) -> None:

@@ -53,10 +53,11 @@ the measured threshold of one grain.{% endif %}"""
 CAPTION = """\
 {% from "captions.j2" import laws, protocol, is_open, low_regime %} After Fig. 14 of the
 paper. Each marker is a flow: the fraction of the N(d) exposed grains that had moved,
-against {{ {"shields": "τ", "reynolds": "Re*"}[along] }} of the mean wall stress over
-these grains, as in the paper. The mean falls where the next grains to move feel less
-stress. Above n/N = 90 % a curve may leave the frame. Forces: {{ laws(about, "Between
-the two") }}. {{ protocol(about) }} {{ is_open(about) }} {{ low_regime(about) }}"""
+against {{ {"shields": "τ", "reynolds": "Re*"}[along] }} of the mean {{ about.stress
+}} over these grains, as in the paper. The mean falls where the next grains to move feel
+less stress. Above n/N = 90 % a curve may leave the frame. Forces: {{ laws(about,
+"Between the two") }}. {{ protocol(about) }} {{ is_open(about) }} {{ low_regime(about)
+}}"""
 
 
 def draw(results: Results) -> Iterator[Figure]:
@@ -152,19 +153,21 @@ def _of_all(results: Results, along: Along) -> Iterator[Figure]:
     colours = style.palette(by, sorted(set(piles[by])))
     least = scenes["alpha_deg"].min()
     for (alpha,), of_slope in split(scenes, "alpha_deg"):
-        for figure in _of_slope(of_slope, curves, by, colours, along):
-            is_shown = figure.place == "" and alpha == least and along == "shields"
-            yield replace(figure, place="" if is_shown else "folded")
+        for part in shields.by_stress(of_slope):
+            for figure in _of_slope(part, curves, by, colours, along):
+                is_shown = figure.place == "" and alpha == least and along == "shields"
+                yield replace(figure, place="" if is_shown else "folded")
 
 
 def _of_slope(
-    scenes: pd.DataFrame,
+    part: shields.OfStress,
     curves: Mapping[str, pd.DataFrame],
     by: str,
     colours: Mapping[float, str],
     along: Along,
 ) -> Iterator[Figure]:
-    """The figures of one slope, of which further panels are folded."""
+    """The figures of piles of one slope, of which further panels are folded."""
+    scenes = part.rows
     choices, rows = shields.parted(scenes, "alpha_deg", "z0_over_d", "force_law", by)
     alpha = float(scenes["alpha_deg"].iloc[0])
     slope = labels.plain("alpha_deg", alpha)
@@ -173,13 +176,13 @@ def _of_slope(
     keys = ["z0_over_d", *choices]
     for sheet in shields.sheets(rows, keys, 2.3, AXES[along], "n/N"):
         yield Figure(
-            name=f"fractions{name}-alpha{alpha:g}{sheet.name}",
-            title=f"Fraction of moving grains{title}, {slope}{sheet.title}",
+            name=f"fractions{name}-alpha{alpha:g}{part.name}{sheet.name}",
+            title=f"Fraction of moving grains{title}, {slope}{part.title}{sheet.title}",
             caption=written(CAPTION, about=shields.about(sheet.rows), along=along),
             cases=case_names(sheet.rows),
             drawing=partial(_draw_panels, sheet, curves, by, colours, along),
             place="folded" if sheet.name else "",
-            follows=follows if is_of_paper and not sheet.name else "",
+            follows=follows + part.after if is_of_paper and not sheet.name else "",
         )
 
 
