@@ -236,3 +236,32 @@ def test_exposed_grains_follow_the_bed_one_by_one(name: str) -> None:
     np.testing.assert_allclose(line.over(centres, segment), 0.5 + GAP, atol=0.1)
     apart = np.diff(np.sort(along))
     assert np.median(apart) == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize("beta", [60.0, 52.0])
+@pytest.mark.parametrize("pattern", ["aligned", "horizontal"])
+def test_rows_of_a_pile_begin_at_its_crest(pattern: Pattern, beta: float) -> None:
+    """Exact places: rows 2 cos(beta) apart within, sin(beta) from one to the next.
+
+    The uppermost grain stands over the crest, so high that the centres of a row along
+    the face lie half a grain and z0 over it, and each row below is shifted by half.
+    """
+    slope, height = 20.0, 12.0
+    line = triangle(slope, height)
+    packed = pile(line, _lattice(pattern, entrainment_angle_deg=beta))
+    tilt = np.radians(slope if pattern == "aligned" else 0.0)
+    along = np.array([np.cos(tilt), np.sin(tilt)])
+    down = np.array([np.sin(tilt), -np.cos(tilt)])
+    top = np.array([height / np.tan(np.radians(slope)), height])
+    top[1] += (0.5 + GAP) / np.cos(np.radians(slope))
+    apart = packed.centres - top
+    apart = apart[packed.mobile & (apart[:, 0] <= 1e-9)]
+    assert len(apart) > 20
+    assert np.hypot(*apart.T).min() == pytest.approx(0, abs=1e-9)
+    row = apart @ down / np.sin(np.radians(beta))
+    place = apart @ along / np.cos(np.radians(beta))
+    assert row == pytest.approx(np.round(row), abs=1e-6)
+    assert place == pytest.approx(np.round(place), abs=1e-6)
+    # places of even rows are even, of odd rows odd
+    assert not ((np.round(row) + np.round(place)) % 2).any()
+    assert len(np.unique(np.round(row))) > (1 if pattern == "aligned" else 5)
