@@ -124,6 +124,45 @@ def test_a_failure_costs_the_cases_that_need_it_and_no_others(tmp_path: Path) ->
     assert case.done_state(fine, tmp_path)
 
 
+@dataclass(frozen=True)
+class Ends(Step):
+    """A case whose program leaves a whole result and ends with an exit code."""
+
+    def write(self, directory: Path, cases: Path) -> None:
+        (directory / "Allrun").write_text(f"echo 42 > result.txt\nexit {self.by}\n")
+
+
+@pytest.mark.parametrize("code", [1, 3, 137])
+def test_an_exit_code_is_a_failure_though_there_are_results(
+    tmp_path: Path, code: int
+) -> None:
+    ended = Ends(1.0, by=code)
+    with pytest.raises(SolverError, match=rf"\./Allrun ended with {code}\b"):
+        engine.execute(ended, tmp_path, HANGS_S)
+    assert (tmp_path / ended.name / "result.txt").read_text() == "42\n"
+    assert not case.done_state(ended, tmp_path)
+    state, said = case.failure(tmp_path / ended.name) or ("", "")
+    assert state == "failed"
+    assert f"ended with {code}" in said
+
+
+def test_a_solver_beyond_its_time_is_a_failure(tmp_path: Path) -> None:
+    """Whatever it has written so far; what it left is not taken for an answer."""
+    slow = Sleeps(1.0)
+    with pytest.raises(SolverError, match=r"did not end within 0\.2 s"):
+        engine.execute(slow, tmp_path, limit_s=0.2)
+    assert not case.done_state(slow, tmp_path)
+
+
+@dataclass(frozen=True)
+class Sleeps(Step):
+    """A case whose program leaves a whole result and goes on for ever."""
+
+    def write(self, directory: Path, cases: Path) -> None:
+        script = f"echo 42 > result.txt\nexec sleep {HANGS_S}\n"
+        (directory / "Allrun").write_text(script)
+
+
 def test_the_time_left_follows_the_pace_of_the_cases_so_far(tmp_path: Path) -> None:
     first, second, third = Step(10.0), Step(20.0), Step(400.0)
     display = Display([first, second, third], tmp_path, workers=2, after_s=20.0)
@@ -148,6 +187,17 @@ def test_failures_that_are_an_answer_are_counted_and_not_told(
     assert f"{sought.name} died" not in said
     assert f"{other.name} died" in said
     assert "[1/2] failed" in said
+
+
+def test_a_failure_gives_its_cores_back() -> None:
+    """Before the tests of those that wait: without it they wait for ever."""
+    cores = Cores(3)
+    with pytest.raises(ValueError, match="lost"), cores.held(2):
+        raise ValueError("lost")
+    with cores.held(1):
+        pass
+    free = [cores._free.acquire(blocking=False) for _ in range(4)]
+    assert free == [True, True, True, False]
 
 
 class Queue:
@@ -189,14 +239,6 @@ def test_a_large_solver_is_served_before_those_that_ask_later() -> None:
     for thread in threads:
         thread.join()
     assert served == ["large", "small"]
-
-
-def test_a_failure_gives_its_cores_back() -> None:
-    cores = Cores(1)
-    with pytest.raises(ValueError, match="lost"), cores.held(1):
-        raise ValueError("lost")
-    with cores.held(1):
-        pass
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
