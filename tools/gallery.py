@@ -27,18 +27,14 @@ SHOWN = {
     "poured": "bed-alpha0.svg",
     "mixture": "hiding.svg",
     "shields": "shields.svg",
-    "paper": "fractions-reynolds-alpha15.svg",
+    "paper": "fractions-alpha15-eq10.svg",
 }
 """The figure that is shown of each preset."""
 COMMANDS = {
     "stockpile": "erosion stockpile",
-    "paper": "study paper --tolerance 0.2",
 }
 """Commands of presets that `study PRESET` does not run."""
-NOTES = {
-    "paper": "Without a tolerance DEM answers all piles, and all claims are judged: "
-    "[paper.md](paper.md)."
-}
+NOTES = {"paper": "The claims one by one: [paper.md](paper.md)."}
 """What is added to the section of a preset."""
 WIDE = 900  # pixels
 COLOURS = 256

@@ -84,15 +84,39 @@ def copied(place: Path) -> Path:
 
 def outcome(root: Path, tests: Iterable[str]) -> tuple[str, str]:
     """What tests say of a copy: "passed", "failed", "hung" or "not run"; and the first that failed."""
-    command = [sys.executable, "-m", "pytest", "-q", "-x", "-n0", "-p", "no:cacheprovider", "--tb=no", *tests]
-    environment = {**os.environ, "PYTHONPATH": str(root), "PYTHONDONTWRITEBYTECODE": "1"}
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-x",
+        "-n0",
+        "-p",
+        "no:cacheprovider",
+        "--tb=no",
+        *tests,
+    ]
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(root),
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
     try:
         ended = subprocess.run(
-            command, cwd=root, env=environment, capture_output=True, text=True, timeout=LIMIT_S
+            command,
+            cwd=root,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=LIMIT_S,
         )
     except subprocess.TimeoutExpired:
         return "hung", ""
-    lines = [line for line in ended.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
+    lines = [
+        line
+        for line in ended.stdout.splitlines()
+        if line.startswith(("FAILED", "ERROR"))
+    ]
     by = lines[0].split(" - ")[0].split(" ", 1)[1] if lines else ""
     words = {PASSED: "passed", FAILED: "failed"}
     return words.get(ended.returncode, "not run"), by
@@ -125,24 +149,40 @@ def table(found: Sequence[tuple[Fault, str, str]]) -> str:
 def main(words: Sequence[str]) -> int:
     """Plant the faults; 1 if too few are noticed, or a grave one is not."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--only", nargs="+", metavar="WORD", help="faults whose name or file has one of these words")
+    parser.add_argument(
+        "--only",
+        nargs="+",
+        metavar="WORD",
+        help="faults whose name or file has one of these words",
+    )
     parser.add_argument("--table", type=Path, help="write the table there")
     asked = parser.parse_args(words)
     chosen = faults()
     if asked.only:
-        chosen = [one for one in chosen if any(word in one.name + one.file for word in asked.only)]
+        chosen = [
+            one
+            for one in chosen
+            if any(word in one.name + one.file for word in asked.only)
+        ]
     found = []
     with tempfile.TemporaryDirectory() as place:
         root = copied(Path(place))
-        said, by = outcome(root, dict.fromkeys(test for one in chosen for test in one.tests))
+        said, by = outcome(
+            root, dict.fromkeys(test for one in chosen for test in one.tests)
+        )
         if said != "passed":
             print(f"without a fault the tests have {said}: {by}", file=sys.stderr)
             return 1
         for number, fault in enumerate(chosen, 1):
             said, by = tried(fault, root)
             found.append((fault, said, by))
-            word = {"failed": "noticed", "passed": "NOT NOTICED"}.get(said, said.upper())
-            print(f"{number:3d} {fault.kind:12s} {word:12s} {fault.name}  [{by}]", flush=True)
+            word = {"failed": "noticed", "passed": "NOT NOTICED"}.get(
+                said, said.upper()
+            )
+            print(
+                f"{number:3d} {fault.kind:12s} {word:12s} {fault.name}  [{by}]",
+                flush=True,
+            )
     text = table(found)
     print(text)
     if asked.table:
