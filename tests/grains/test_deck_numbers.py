@@ -26,7 +26,7 @@ FIRST, STEP = 0.9, 0.05
 WATER = f"""
 fluid = {{ density = {RHO_F}, viscosity = {NU} }}
 forces = {{ law = "low" }}
-threshold.criterion = "leaves"
+threshold.criterion = "entrained"
 method.kind = "dem"
 method.grains.load_increment = {STEP}
 """

@@ -66,9 +66,9 @@ def exact() -> Tables:
     }
 
 
-def line(true: int, of: int, **others: str) -> Comparison:
+def line(true: int, of: int, flow: str = "") -> Comparison:
     """A line of comparisons, some of which are true."""
-    return Comparison("", np.where(np.arange(of) < true, 2.0, 0.5), 1.0, **others)
+    return Comparison("", np.where(np.arange(of) < true, 2.0, 0.5), 1.0, flow=flow)
 
 
 @pytest.mark.parametrize(

@@ -192,7 +192,7 @@ def test_piles_by_eq10_have_figures_of_their_own(
         (ax,) = axes_of(found[name])
         own_rows = table[table["scene_id"] == scene]
         expected = rows(own_rows, "reynolds", "shields")
-        assert points(marked(ax, SOLID, HOLLOW)) == expected
+        assert points(marked(ax, SOLID, OPEN)) == expected
 
 
 def test_extended_diagram_shows_each_fraction_that_was_reached(

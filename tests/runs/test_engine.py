@@ -141,7 +141,7 @@ def test_an_exit_code_is_a_failure_though_there_are_results(
         engine.execute(ended, tmp_path, HANGS_S)
     assert (tmp_path / ended.name / "result.txt").read_text() == "42\n"
     assert not case.done_state(ended, tmp_path)
-    state, said = case.failure(tmp_path / ended.name) or ("", "")
+    state, said = case.failure(tmp_path / ended.name)
     assert state == "failed"
     assert f"ended with {code}" in said
 
