@@ -103,34 +103,17 @@ def run(
     # what cannot be answered is refused before anything is written
     planned = plan.make(study, cases=space.cases)
     with claimed(space.root, STUDY, study.name):
-        changed = space.describe(
-            STUDY,
-            study.name,
-            planned.cases,
-            study.source.described(space.root) if study.source else {},
-            study=study.text,
-            tolerance=study.tolerance,
+        changed = _describe(study, planned, space)
+        planned, states, failures, started = _completed(
+            study, planned, space, workers, queue
         )
-        states = reuse.done(planned.cases, space.cases)
-        todo = planned.missing(space.cases, states)
-        failed = complete(
-            todo,
-            space,
-            workers=workers,
-            limit_s=study.time_limit_s,
-            queue=queue,
-            after_s=planned.drawing_s,
-        )
-        failures = _with_advice(failed, planned)
-        if todo:
-            states |= reuse.done(todo, space.cases)
-        elif planned.cases:
+        if not started and planned.cases:
             print("every case was done already; no solver was started", file=sys.stderr)
-        else:
+        elif not started:
             print("its answer needs no case; no solver was started", file=sys.stderr)
         answer = space.answer(planned.ids)
         undrawn: Sequence[str] = ()
-        if todo or answer is None:
+        if started or answer is None:
             print("drawing tables, figures and page", file=sys.stderr)
             answer, undrawn = _draw(study, planned, space, states, failures, False)
         left = space.left(planned.cases) if changed else []
@@ -141,7 +124,55 @@ def run(
                 what, names = "1 case is not asked for any more", "names it"
             what = f"the study file has changed: {what}"
             print(f"{what}; `orchestrator status {out}` {names}", file=sys.stderr)
-        return Finished(space.page, len(todo), failures, answer, undrawn)
+        return Finished(space.page, started, failures, answer, undrawn)
+
+
+def _completed(
+    study: Study, planned: Plan, space: Workspace, workers: int, queue: Queue | None
+) -> tuple[Plan, dict[str, Any], Failures, int]:
+    """Run what is missing, and what the finished flows show to be missing.
+
+    Returned are the plan then, the states of its finished cases, the failures, and how
+    many cases were started.
+    """
+    failed: dict[str, OrchestratorError] = {}
+    started = 0
+    while True:
+        states = reuse.done(planned.cases, space.cases)
+        missing = planned.missing(space.cases, states)
+        todo = {name: case for name, case in missing.items() if name not in failed}
+        found = complete(
+            todo,
+            space,
+            workers=workers,
+            limit_s=study.time_limit_s,
+            queue=queue,
+            after_s=planned.drawing_s,
+        )
+        failed |= found
+        started += len(todo)
+        if todo:
+            states |= reuse.done(todo, space.cases)
+        refined = plan.refined(planned, space.cases)
+        if refined is planned:
+            return planned, states, _with_advice(failed, planned), started
+        planned = refined
+        _describe(study, planned, space)
+
+
+def _describe(study: Study, planned: Plan, space: Workspace) -> bool:
+    """Note in its directory which study this is, and with which cases.
+
+    Returned is whether it was another one before.
+    """
+    return space.describe(
+        STUDY,
+        study.name,
+        planned.cases,
+        study.source.described(space.root) if study.source else {},
+        study=study.text,
+        tolerance=study.tolerance,
+    )
 
 
 def _with_advice(failures: Failures, planned: Plan) -> Failures:

@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.digits import number
-from orchestrator.fidelity import decision, limits, smoothing
+from orchestrator.fidelity import decision, flows, limits, smoothing
 from orchestrator.fidelity.decision import Decision, decide
+from orchestrator.flow.between import MOST_ERROR
 from orchestrator.grains.cells import SingleGrainCase, batches
 from orchestrator.grains.pile import Pile
 from orchestrator.runs import reuse
@@ -51,6 +52,8 @@ class Plan:
         Cases of single grains, each of which answers its grains.
     checks
         Piles by DEM that check an answer without DEM, by the same id.
+    checked
+        The decisions on these, by the same id.
     cases
         Every run once, by name, after those whose results it needs.
     smoothings
@@ -62,6 +65,7 @@ class Plan:
     piles: dict[str, Pile]
     cells: tuple[SingleGrainCase, ...]
     checks: dict[str, Pile]
+    checked: dict[str, Decision]
     cases: dict[str, Case]
     smoothings: dict[str, dict[float, Pile]] = field(default_factory=dict)
 
@@ -144,10 +148,30 @@ def make(study: Study, cases: Path | None = None) -> Plan:
     """
     limits.check_study(study)
     decisions = {scene.id: decide(scene, study.tolerance) for scene in study.scenes}
-    checks = {}
-    if study.tolerance:
-        checks = decision.checks(decisions.values())
-    return of(decisions, checks, cases)
+    if not study.tolerance:
+        return of(decisions, {}, cases)
+    checks = decision.checks(decisions.values())
+    planned = of(*flows.shared(decisions, checks), cases)
+    return refined(planned, cases) if cases else planned
+
+
+def refined(plan: Plan, cases: Path) -> Plan:
+    """Solve the flows that finished ones show not to lie between them.
+
+    Parameters
+    ----------
+    plan
+        The plan.
+    cases
+        The directory of the runs.
+
+    Returns
+    -------
+    Plan
+        The same plan where there are none.
+    """
+    groups = flows.solved(plan.decisions, plan.checked, cases)
+    return of(*groups, cases) if groups else plan
 
 
 def of(
@@ -190,7 +214,8 @@ def of(
     for pile in every:
         runs += pile.runs
     listing = listed((*runs, *cells))
-    return Plan(dict(decisions), piles, cells, checking, listing, smoothings)
+    checked = dict(checks or {})
+    return Plan(dict(decisions), piles, cells, checking, checked, listing, smoothings)
 
 
 def _piles(decisions: Mapping[str, Decision], cases: Path | None) -> dict[str, Pile]:
@@ -240,7 +265,7 @@ def of_cases(cases: Iterable[Case]) -> Plan:
     Plan
         The plan of them and of all that they need.
     """
-    return Plan({}, {}, (), {}, listed(cases))
+    return Plan({}, {}, (), {}, {}, listed(cases))
 
 
 def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
@@ -274,6 +299,11 @@ def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
         yield f"  {thresholds} of piles will not be usable: {why}"
     if plan.checks:
         yield f"  {number(len(plan.checks), 'check')} by DEM of answers without it"
+    put = flows.lying([*plan.decisions.values(), *plan.checked.values()])
+    if put:
+        between = "lie between solved ones of other roughness"
+        most = f"solved too if that is off by more than {MOST_ERROR:.1%}"
+        yield f"  {number(len(put), 'flow')} {between}; {most}"
     if plan.smoothings:
         noisy = number(len(plan.smoothings), "noisy profile")
         other = "half and twice the smoothing, and with what it needs"

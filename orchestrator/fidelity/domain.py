@@ -258,6 +258,7 @@ APART: Mapping[str, Iterable[str]] = {
     "judged by what they give": SOLVED,
     "a draw among beds that are alike": (SEED,),
     "ends a run, and moves no grain before it": ("method.grains.final_fraction",),
+    "its error is measured in the run": ("method.flow.between",),
 }
 """Fields that are in no quantity, by the reason."""
 

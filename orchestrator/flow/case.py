@@ -110,7 +110,7 @@ class FlowCase(OpenFoamCase[WallStress]):
     def parameters(self) -> dict[str, Any]:
         """The settings, the height and the slope, and a digest of the bed line."""
         return {
-            **self.settings.model_dump(mode="json"),
+            **self.settings.model_dump(mode="json", exclude={"between"}),
             **self.above.model_dump(mode="json"),
             "height": float(self.height_m),
             "slope_deg": float(self.slope_deg),

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from orchestrator.bed.line import BedLine, of_bed
-from orchestrator.flow import theory
+from orchestrator.flow import between, theory
 from orchestrator.flow.case import FlowCase
 from orchestrator.flow.run import SPEED_HEIGHT, WALL_STRESS
 from orchestrator.flow.stress import WallStress
@@ -60,6 +60,27 @@ class FlowModel:
         """
         return ()
 
+    @property
+    def is_between(self) -> bool:
+        """Whether the flow is not solved, and lies between others that are."""
+        return len(self.cases) > 1
+
+    def error(self, cases: Path) -> float:
+        """Measure how far a flow that lies between others is off.
+
+        Parameters
+        ----------
+        cases
+            The directory of the finished runs.
+
+        Returns
+        -------
+        float
+            The relative error of tau, of `between.error`; 0 of one that does not.
+        """
+        del cases
+        return 0.0
+
     def stress(self, cases: Path) -> WallStress:
         """The stress along the bed.
 
@@ -89,14 +110,33 @@ class Solve(FlowModel):
 
     @cached_property
     def cases(self) -> tuple[FlowCase, ...]:
-        """The run of OpenFOAM."""
-        return (_case(self.scene),)
+        """The run of OpenFOAM, or those of the roughnesses that it lies between."""
+        between = self.scene.method.flow.between
+        if not between:
+            return (_case(self.scene, self.scene.solve_roughness),)
+        return tuple(_case(self.scene, roughness) for roughness in between)
 
     def stress(self, cases: Path) -> WallStress:
-        """The stress that the finished run left."""
-        (run,) = self.cases
-        path = cases / run.name / WALL_STRESS
-        return _read(path, state_of(path))
+        """The stress that the finished run left, or that between those of some."""
+        solved = self._solved(cases)
+        if len(solved) == 1:
+            return next(iter(solved.values()))
+        return between.stress(self.scene.solve_roughness, solved)
+
+    def error(self, cases: Path) -> float:
+        """Measure how far the stress between solved flows is off; 0 if it is solved."""
+        solved = self._solved(cases)
+        if len(solved) == 1:
+            return 0.0
+        return between.error(solved, self.scene.forces.stress)
+
+    def _solved(self, cases: Path) -> dict[float, WallStress]:
+        """The stress that each finished run left, by its roughness length, m."""
+        found = {}
+        for run in self.cases:
+            path = cases / run.name / WALL_STRESS
+            found[run.roughness_m] = _read(path, state_of(path))
+        return found
 
 
 class Waves(FlowModel):
@@ -159,14 +199,15 @@ def _read(path: Path, state: tuple[int, ...]) -> WallStress:
     return WallStress.from_csv(path)
 
 
-def _case(scene: Scene) -> FlowCase:
-    """The run of a scene whose flow is solved."""
+def _case(scene: Scene, roughness: float) -> FlowCase:
+    """The run of a scene whose flow is solved, with a roughness length, m."""
     bed = scene.bed
     assert isinstance(bed, PileBed)
     numbers = {
-        "roughness": scene.solve_roughness,
+        "roughness": roughness,
         "viscosity": scene.solve_viscosity,
         "first_cell_height": scene.first_cell_height,
+        "between": (),
     }
     settings = scene.method.flow.model_copy(update=numbers)
     above = scene.flow.model_copy(update={"gusts": None})

@@ -83,7 +83,9 @@ class Pile(Geometry):
 
     @property
     def solves(self) -> "dict[str, Pile]":
-        """The pile by the name of its solved flow, if its flow is solved."""
+        """The pile by the name of its flow, if one is solved for it."""
+        if self.model.is_between:
+            return {}
         return {run.name: self for run in self.model.cases}
 
     def stress(self, cases: Path) -> WallStress:

@@ -7,12 +7,13 @@ is ``auto`` leaves the choice to the program.
 """
 
 from functools import partial
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from orchestrator.study import methods, models
 from orchestrator.study.declare import (
     Fraction,
     Length,
+    List,
     Part,
     Roughness,
     Viscosity,
@@ -26,6 +27,8 @@ else:
     MethodName = Literal[tuple(methods.MEANINGS)]
     ModelName = Literal[tuple(models.MODELS)]
 Turbulence = Literal["kEpsilon", "RNGkEpsilon", "realizableKE", "kOmegaSST"]
+LEAST_FLOWS = 4
+"""Least number of solved flows that another is put between."""
 _solved = partial(field, scope="solved flows")
 _dem = partial(field, scope="DEM")
 
@@ -109,6 +112,16 @@ class FlowMethod(Part):
         100.0, unit="h", label="flat bed downstream", ge=3, le=1000
     )
     """flat bed from the forms to the outlet"""
+    between: Annotated[tuple[Length, ...], List] = field(
+        (),
+        scope="flows between others",
+        unit="m",
+        column="solved_z0_m",
+        label="roughness lengths of the flows that it lies between",
+    )
+    """roughness lengths, four or more, at which the flow is solved in place of that of
+    the bed, which lies between them: the stress is interpolated in ln z0; within a
+    tolerance the program chooses them"""
 
     @property
     def facts(self) -> models.FlowModel:

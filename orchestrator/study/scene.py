@@ -12,7 +12,7 @@ from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.runs.files import canonical_json, digest_text
 from orchestrator.study.declare import UnfitError
-from orchestrator.study.method import Method
+from orchestrator.study.method import LEAST_FLOWS, Method
 from orchestrator.study.methods import ThresholdMethod
 from orchestrator.study.parts import PileBed, Sizes, percentile
 from orchestrator.study.question import LEAST_DEPTH, OUT, Question, check
@@ -202,6 +202,24 @@ def _check_flow(scene: Scene, bed: PileBed) -> None:
     if model.is_solved and scene.first_cell_height > bed.relief / 4:
         what = "above a quarter of the pile"
         raise UnfitError("method.flow.first_cell_height", what, "lower it")
+    if between := scene.method.flow.between:
+        _check_between(scene, between)
+
+
+def _check_between(scene: Scene, between: tuple[float, ...]) -> None:
+    """Refuse roughness lengths between which no flow can be put."""
+    name = "method.flow.between"
+    if len(between) < LEAST_FLOWS:
+        what = f"flows of {len(between)} roughness lengths do not tell their error"
+        raise UnfitError(name, what, f"name {LEAST_FLOWS} or more")
+    if list(between) != sorted({*between}):
+        raise UnfitError(name, "roughness lengths that do not rise", "sort them")
+    if not between[0] <= scene.solve_roughness <= between[-1]:
+        what = f"{scene.solve_roughness:g} m is not between them"
+        raise UnfitError(name, what, "name one below it and one above")
+    if scene.threshold.update:
+        what = "flows over a bed that changes are solved at its own roughness"
+        raise UnfitError(name, what, OUT)
 
 
 def _check_points(scene: Scene, bed: PileBed, is_solved: bool) -> None:

@@ -68,6 +68,11 @@ APPLIES: Mapping[str, Callable[[Asked], bool]] = {
         lambda _, bed: bed.packing in RANDOM or bed.is_replica
     ),
     "solved flows": _of_piles(lambda scene, bed: scene.method.flow.facts.is_solved),
+    "flows between others": _of_piles(
+        lambda scene, bed: (
+            scene.method.flow.facts.is_solved and scene.method.flow.between
+        )
+    ),
     "flows that change along the bed, and shared stress": _of_piles(
         lambda scene, bed: (
             scene.method.flow.facts.follows_bed or scene.forces.sheltering != "none"
@@ -93,6 +98,7 @@ BY: Mapping[str, str] = {
     "poured beds": 'bed.packing = "poured"',
     "random beds and replicas": "a bed.packing",
     "solved flows": 'method.flow.model = "solve"',
+    "flows between others": 'method.flow.model = "solve"',
     "flows that change along the bed, and shared stress": (
         'method.flow.model = "solve", or forces.sheltering'
     ),

@@ -72,6 +72,7 @@ TABLES: Mapping[str, Listed] = {
             rows.STARTS,
             rows.DECIDED,
             rows.SMOOTHING,
+            rows.BETWEEN,
             usable.SCATTER,
             verdict.COLUMNS,
             beside.MEASURED,

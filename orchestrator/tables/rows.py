@@ -2,6 +2,7 @@
 
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from functools import cached_property
 from math import ceil, log, nan
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -135,7 +136,7 @@ def scenes(study: Study, plan: Plan) -> Iterator[Row]:
         if pile:
             case = pile.last_run
             if pile.model.cases:
-                flow_case = pile.flow.name
+                flow_case = "; ".join(run.name for run in pile.model.cases)
         yield {
             "scene_id": asked.id,
             "group": "; ".join(groups[asked.id]),
@@ -542,6 +543,27 @@ class Answer:
                 around = pile.around(self.first[0])
                 self.checked = around.first(around.motion(cases))
 
+    @cached_property
+    def between(self) -> float:
+        """Relative error of a flow that lies between others; 0 of one that does not."""
+        return self.pile.model.error(self.cases)
+
+    def error_at(self, fraction: float) -> float | None:
+        """Find the known error at a fraction, with that of a flow between others.
+
+        Parameters
+        ----------
+        fraction
+            Fraction n/N of the counted grains.
+
+        Returns
+        -------
+        float or None
+            The relative error; None where it is not known.
+        """
+        error = self.decision.error_at(fraction)
+        return error if error is None else float(np.hypot(error, self.between))
+
     def at(self, fraction: float, chosen: BoolArray | None = None) -> PileThreshold:
         """Find the threshold of the pile, or of some of its counted grains.
 
@@ -791,7 +813,7 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
         model = spread.spread(answer.decision.asked, fraction)
         value = shields(scene, found.tau)
         smooth = _smooth_bed(scene, found.ustar0)
-        error = answer.decision.error_at(fraction)
+        error = answer.error_at(fraction)
         low, high = _interval(scene, found, error, smooth)
         yield {
             "scene_id": answer.scene_id,
@@ -821,6 +843,7 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
             "interlocking": answer.interlocking,
             **_decided(answer),
             **_smoothing(answer),
+            **_between(answer),
             "case": pile.last_run,
         }
 
@@ -854,7 +877,7 @@ def _starts(answer: Answer) -> Row:
     """Columns of where motion starts, by the method and by the pivots."""
     first_x, first_ustar0 = answer.first
     # the first grain of all is a fraction, too
-    error = answer.decision.error_at(1 / answer.motion.count)
+    error = answer.error_at(1 / answer.motion.count)
     low, high = _first_interval(answer, error)
     pivot_x, pivot_ustar0 = answer.checked
     bed = answer.pile.bed
@@ -934,6 +957,23 @@ def _smooth_bed(scene: Scene, ustar0: float) -> float:
         return 0.0
     outer = float(outer_roughness(scene.bed.roughness, ustar0, scene.fluid.viscosity))
     return PER_E_FOLD * log(outer / scene.solve_roughness)
+
+
+BETWEEN: Mapping[str, str] = {
+    "between_error": (
+        "relative error of the stress of a flow that is not solved and lies between "
+        "solved ones of other roughness (solved_z0_m): the largest where one of these "
+        "is left out; known_error contains it"
+    ),
+}
+"""Column of a flow that lies between others."""
+
+
+def _between(answer: Answer) -> Row:
+    """The column of a flow that lies between others: how far it is off."""
+    if not answer.pile.model.is_between:
+        return {}
+    return {"between_error": answer.between}
 
 
 SMOOTHING: Mapping[str, str] = {

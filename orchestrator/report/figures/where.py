@@ -212,7 +212,7 @@ def _broken(x: Any, y: Any, cuts: Any) -> tuple[Any, Any]:
 
 def _stress(ax: Axes, results: Results, pile: Pile, grains: pd.DataFrame) -> None:
     """The stress over the undisturbed one: of the flow, and as grains feel it."""
-    if pile.model.cases:
+    if pile.solves:
         wall = stress_on(pile, results)
         x = wall["x_m"].to_numpy(float)
         stress = _signed_square(wall["ustar_over_ustar0_wall"])
