@@ -44,7 +44,7 @@ def nodes(roughnesses: Sequence[float]) -> tuple[float, ...]:
     count = max(LEAST_FLOWS, ceil(span - 1e-9) + 1)
     if len(each) <= count:
         return tuple(each.tolist())
-    steps = np.linspace(*np.log(each[[0, -1]]), count)
+    steps = np.linspace(log(each[0]), log(each[-1]), count)
     nearest = np.abs(np.log(each)[:, None] - steps).argmin(axis=0)
     chosen = np.unique(nearest)
     if len(chosen) < LEAST_FLOWS:

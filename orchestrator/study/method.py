@@ -27,7 +27,7 @@ else:
     MethodName = Literal[tuple(methods.MEANINGS)]
     ModelName = Literal[tuple(models.MODELS)]
 Turbulence = Literal["kEpsilon", "RNGkEpsilon", "realizableKE", "kOmegaSST"]
-LEAST_FLOWS = 4
+LEAST_FLOWS = 5
 """Least number of solved flows that another is put between."""
 _solved = partial(field, scope="solved flows")
 _dem = partial(field, scope="DEM")
@@ -119,7 +119,7 @@ class FlowMethod(Part):
         column="solved_z0_m",
         label="roughness lengths of the flows that it lies between",
     )
-    """roughness lengths, four or more, at which the flow is solved in place of that of
+    """roughness lengths, five or more, at which the flow is solved in place of that of
     the bed, which lies between them: the stress is interpolated in ln z0; within a
     tolerance the program chooses them"""
 

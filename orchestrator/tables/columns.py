@@ -16,8 +16,8 @@ SEVERAL: Mapping[str, str] = {
         "closed form, pivots and peeling"
     ),
     "flow_case": (
-        "directory of the flow's case, below cases/; of a flow that lies between others "
-        "those of these"
+        "directory of the flow's case, below cases/; of a flow that lies between "
+        "others those of these"
     ),
     "reynolds": "friction Reynolds number u* d/nu at the threshold",
     "shields": "Shields number at the threshold, tau_c/((rho_sol - rho_f) g d)",

@@ -109,7 +109,7 @@ OTHERS: Mapping[str, tuple[Any, ...]] = {
     "fluid.kind": ("air",),
     "forces.law": ("profile",),
     "grain.sizes": ({"sigma_g": 1.2},),
-    "method.flow.between": ([5e-5, 9e-5, 1.7e-4, 3e-4],),
+    "method.flow.between": ([5e-5, 8e-5, 1.3e-4, 2e-4, 3e-4],),
     "method.flow.first_cell_height": (1e-3,),
     "method.flow.roughness": (2e-4,),
     "method.flow.viscosity": (5e-6,),
