@@ -27,6 +27,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Collection, Iterator
 from functools import cache
+from importlib import import_module
 from importlib.util import find_spec
 from math import inf
 from pathlib import Path
@@ -388,6 +389,23 @@ def test_a_study_of_a_page_is_planned(
     assert not (reader / "results").exists()
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("name", _planned())
+def test_a_command_says_what_it_would_run_on_its_own_scenes(
+    name: str, reader: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Pages name the experiments without a study, too."""
+    needed = [
+        action.dest
+        for action in parts(taking_placeholders())[name]._actions
+        if action.required
+    ]
+    source = ["first-look"] if "source" in needed else []
+    assert cli.main([name, *source, "--plan"]) == 0
+    assert "expected: about" in capsys.readouterr().out
+    assert not (reader / "results").exists()
+
+
 FINISHED = ("status", "report", "gallery", "prune")
 """Commands on results that are there."""
 
@@ -432,3 +450,70 @@ def test_a_script_of_a_page_runs_and_changes_no_page(
         assert (ROOT / redirected).read_text(encoding="utf-8") == run.stdout
     for page in (ROOT / "docs").glob("*.md"):
         assert (checkout / "docs" / page.name).read_bytes() == page.read_bytes()
+
+
+def _uses(script: Path) -> Iterator[tuple[str, str]]:
+    """The names of this package that a script takes from its modules."""
+    tree = ast.parse(script.read_text(encoding="utf-8"))
+    modules: dict[str, str] = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            modules |= {one.asname or one.name: one.name for one in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            for one in node.names:
+                yield node.module, one.name
+                modules[one.asname or one.name] = f"{node.module}.{one.name}"
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            module = modules.get(node.value.id, "")
+            if module.startswith("orchestrator") and _is_module(module):
+                yield module, node.attr
+
+
+def _is_module(name: str) -> bool:
+    try:
+        return find_spec(name) is not None
+    except ModuleNotFoundError:
+        return False  # a name of a module that is no package
+
+
+def _missing(script: Path) -> list[str]:
+    """The names that a script takes from modules of this package that have no such."""
+    used = {
+        each for each in _uses(script) if each[0].partition(".")[0] == "orchestrator"
+    }
+    return [
+        f"{module}.{name}"
+        for module, name in sorted(used)
+        if not hasattr(import_module(module), name)
+        and not _is_module(f"{module}.{name}")
+    ]
+
+
+@pytest.mark.parametrize(
+    "script",
+    [
+        path
+        for name in ("docs", "examples", "tools")
+        for path in sorted((ROOT / name).rglob("*.py"))
+    ],
+    ids=lambda path: str(path.relative_to(ROOT)),
+)
+def test_a_script_takes_names_that_the_package_has(script: Path) -> None:
+    """Scripts that take hours fail where they first use a name that is gone."""
+    assert _missing(script) == []
+
+
+def test_a_name_that_is_gone_is_found(tmp_path: Path) -> None:
+    script = tmp_path / "one.py"
+    script.write_text(
+        "from orchestrator.runs import case, engine\n"
+        "from orchestrator.digits import text, nothing\n"
+        "import numpy as np\n"
+        "def late():\n    np.gone()\n    engine.run()\n    return case.is_done\n",
+        encoding="utf-8",
+    )
+    assert _missing(script) == [
+        "orchestrator.digits.nothing",
+        "orchestrator.runs.case.is_done",
+    ]
