@@ -323,7 +323,8 @@ def _not_usable(plan: Plan, tolerance: float | None) -> Iterator[str]:
             if is_plane and scene.grain.sizes is None:
                 yield "equal spheres in one plane settle into a crystal"
             elif error is None:
-                yield "the error of their fidelity on such beds is not known"
+                what = "the error of their fidelity on such beds is not known"
+                yield f"{what}; `orchestrator convergence` estimates it"
             elif tolerance is not None and error > tolerance * (1 + 1e-9):
                 yield "no fidelity is known to be within the tolerance"
 

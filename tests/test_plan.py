@@ -28,7 +28,7 @@ bed = {{ kind = "pile", slope_deg = 15.0{} }}
             "",
             'method.flow.model = "waves"\nmethod.kind = "pivot"',
             "4 thresholds of piles will not be usable: the error of their fidelity on such "
-            "beds is not known",
+            "beds is not known; `orchestrator convergence` estimates it",
         ),
         (
             "",
