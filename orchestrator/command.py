@@ -119,7 +119,7 @@ def add_run_options(command: Parser, preset: str, of: str = "command") -> None:
         add("source", nargs="?", default=preset, metavar="FILE|PRESET", help=text)
     text = f"directory of the results; default: results/ and the name of the {of}"
     add("--out", type=Path, metavar="DIR", help=text)
-    count = processors.count()
+    count = processors.usable_count()
     text = "number of cases at a time; default: one for each processor that it may use"
     add("--workers", type=whole_number, default=count, metavar="N", help=text)
     text = "list what would run, with time and disk, and end"

@@ -101,7 +101,7 @@ class Runs:
 
 
 @dataclass(frozen=True)
-class Results:
+class ExperimentResults:
     """What an experiment makes of its runs.
 
     Attributes
@@ -167,7 +167,7 @@ class Experiment(ABC):
         return ()
 
     @abstractmethod
-    def results(self, runs: Runs) -> Results | None:
+    def results(self, runs: Runs) -> ExperimentResults | None:
         """Make tables and page of the runs that are done.
 
         Parameters
@@ -268,7 +268,9 @@ class Experiment(ABC):
         int
             The exit code.
         """
-        beside = workspace.beside(out, Path("results")) if self.shares_cases else ()
+        beside = (
+            workspace.other_results(out, Path("results")) if self.shares_cases else ()
+        )
         if options.plan:
             self.check(out)
             cases = out.absolute() / "cases"

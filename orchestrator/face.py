@@ -246,7 +246,7 @@ def run(
         goes on.
     """
     if workers is None:
-        workers = processors.count()
+        workers = processors.usable_count()
     given: Any = workers  # Python gives what it likes
     if isinstance(given, bool) or not isinstance(given, Integral):
         raise InputError(f"{workers!r} is no whole number", where="workers")
@@ -287,7 +287,9 @@ def open(directory: str | Path) -> "Opened":
     _check_path("directory", directory)
     space = Workspace(Path(directory).absolute())
     asked, planned = pipeline.reopen(space)
-    return Opened(Results(asked, planned, tables.read(space, "tables"), space.cases))
+    return Opened(
+        Results(asked, planned, tables.read_tables(space, "tables"), space.cases)
+    )
 
 
 def _check_path(name: str, path: object) -> None:

@@ -15,7 +15,7 @@ from orchestrator.runs.workspace import STUDY
 NAME = "gallery.html"
 
 
-def write(directory: Path) -> Path:
+def write_gallery(directory: Path) -> Path:
     """Write the gallery of the studies in a directory.
 
     Parameters

@@ -96,7 +96,7 @@ def figures() -> list[str]:
     return [offer.figures for offer in offers() if offer.figures]
 
 
-def load(source: str | Path, tolerance: float | None) -> "Study[Any]":
+def load_study(source: str | Path, tolerance: float | None) -> "Study[Any]":
     """Read a study file, also on the beds of a guest.
 
     Parameters
@@ -130,7 +130,7 @@ def taken_over(study: "Study[Any]", options: Namespace) -> int | None:
     Parameters
     ----------
     study
-        The study, as `load` reads it.
+        The study, as `load_study` reads it.
     options
         The options of the command.
 

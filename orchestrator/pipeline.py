@@ -321,15 +321,17 @@ def prune(directory: Path) -> str:
         # tables and pictures of experiments are made of results alone
         with claimed(space.root, EXPERIMENT, about["name"], new=False):
             ids = {name: case.id_of(space.cases / name) for name in about["cases"]}
-            return workspace.prune(space, ids, ())
+            return workspace.prune_cases(space, ids, ())
     study, planned = reopen(space)
     with claimed(space.root, STUDY, study.name, new=False):
         done = reuse.done(planned.cases, space.cases)
-        made = tables.make(study, planned, space.cases, done)
+        made = tables.make_tables(study, planned, space.cases, done)
         results = Results(study, planned, made, space.cases)
         drawn = report.drawn_from(results, guests.figures())
         kept = {case.name for case in drawn}
-        return workspace.prune(space, {name: planned.ids[name] for name in done}, kept)
+        return workspace.prune_cases(
+            space, {name: planned.ids[name] for name in done}, kept
+        )
 
 
 def _draw(
@@ -348,14 +350,14 @@ def _draw(
     """
     space.drop(STATE)
     states = {name: done[name] for name in planned.cases if name in done}
-    made = tables.make(study, planned, space.cases, states)
+    made = tables.make_tables(study, planned, space.cases, states)
     results = Results(study, planned, made, space.cases)
     times = tables.timings(planned, states)
     causes = {name: str(error) for name, error in failures.items()}
     cards = guests.cards(study, made)
     with space.renewed():
-        tables.write(made, space, "tables")
-        tables.write({"timings": times}, space, "timings")
+        tables.write_tables(made, space, "tables")
+        tables.write_tables({"timings": times}, space, "timings")
         answer = report.said(results, cards)
         try:
             rooms = guests.figures()
@@ -364,7 +366,7 @@ def _draw(
             # no memory for a picture, or an interrupt: the answer is found
             print(answer, file=sys.stderr)
             raise
-    terminal.check()
+    terminal.check_signals()
     if not failures and not undrawn:
         space.note_answer(planned.ids, answer)
     return answer, undrawn

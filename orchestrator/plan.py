@@ -213,7 +213,7 @@ def of(
     runs: list[Case] = []
     for pile in every:
         runs += pile.runs
-    listing = listed((*runs, *cells))
+    listing = with_needs((*runs, *cells))
     checked = dict(checks or {})
     return Plan(dict(decisions), piles, cells, checking, checked, listing, smoothings)
 
@@ -227,7 +227,7 @@ def _piles(decisions: Mapping[str, Decision], cases: Path | None) -> dict[str, P
     return piles
 
 
-def listed(cases: Iterable[Case]) -> dict[str, Case]:
+def with_needs(cases: Iterable[Case]) -> dict[str, Case]:
     """List some cases and all that they need.
 
     Parameters
@@ -265,7 +265,7 @@ def of_cases(cases: Iterable[Case]) -> Plan:
     Plan
         The plan of them and of all that they need.
     """
-    return Plan({}, {}, (), {}, {}, listed(cases))
+    return Plan({}, {}, (), {}, {}, with_needs(cases))
 
 
 def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:

@@ -47,5 +47,5 @@ def run(out: Path, text: str = TEXT) -> Results:
     todo = {name: one for name, one in planned.cases.items() if name not in done}
     with engine.local(cases, workers=2, limit_s=HANGS_S) as pool:
         assert not engine.run(todo, pool, lambda *_: None)
-    made = tables.make(asked, planned, cases, reuse.done(planned.cases, cases))
+    made = tables.make_tables(asked, planned, cases, reuse.done(planned.cases, cases))
     return Results(asked, planned, made, cases)

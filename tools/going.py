@@ -495,7 +495,7 @@ def draw(table: pd.DataFrame) -> Canvas:
         ax.set_ylabel("grains in sustained motion, %")
     for ax in axes[1]:
         ax.set_xlabel("Shields number $θ$")
-    style.legends(canvas, [one, curve, field], [])
+    style.legends_below(canvas, [one, curve, field], [])
     return canvas
 
 

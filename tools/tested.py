@@ -24,7 +24,7 @@ from orchestrator.lab.validate import (
     MODELS,
     measured_grains,
     single,
-    sustained,
+    sustained_shields,
 )
 from orchestrator.physics import saltation
 from orchestrator.physics.beside import (
@@ -132,7 +132,7 @@ def of_grains() -> pd.DataFrame:
         ratios = sorted({name, *span})
         hops = {each: saltation.hops(measured_grains(beds, each)) for each in ratios}
         further = {
-            each: sustained(beds, GUST, is_entrained=False, ratio=each)
+            each: sustained_shields(beds, GUST, is_entrained=False, ratio=each)
             for each in ratios
         }
         for (beta, betas), law in itertools.product(BETAS.items(), LAWS):
@@ -158,9 +158,9 @@ def of_grains() -> pd.DataFrame:
                 **_range("alpha_deg", 0.0, MOST_SLOPE_DEG),
             }
             in_flumes = beds["set"].isin([*FLUMES, *STEEP])
-            for row in _of_liquids(beds[in_flumes], sustained):
+            for row in _of_liquids(beds[in_flumes], sustained_shields):
                 made.append({**sloping, **place, **row})
-            row = _of_air(beds[beds["set"].isin(WIND)], sustained)
+            row = _of_air(beds[beds["set"].isin(WIND)], sustained_shields)
             made.append({**sloping, **place, **row})
     return _sorted(
         made, ["medium", "criterion", "force_law"], ["beta_deg", "d_over_z0"]

@@ -18,7 +18,7 @@ from orchestrator.errors import SolverError
 from orchestrator.runs.case import Case
 from orchestrator.solvers.dem import ENGINE
 from orchestrator.study.method import GrainMethod
-from orchestrator.study.parts import Grain, Gusts, extremes
+from orchestrator.study.parts import GrainPart, Gusts, extremes
 from orchestrator.types import FloatArray, IntArray
 
 DIAMETER = 1e-3
@@ -142,7 +142,7 @@ class DeckCase(Case):
 
 
 def protocol(
-    grain: Grain,
+    grain: GrainPart,
     method: GrainMethod,
     displacement: float,
     enough: int = 0,
@@ -221,7 +221,7 @@ def cost_s(
     grains: float,
     rest: float,
     method: GrainMethod,
-    grain: Grain,
+    grain: GrainPart,
     exposed: float = math.nan,
 ) -> float:
     """Estimate the time of one core for a deck.
@@ -300,7 +300,7 @@ class GrainTable:
         return int((self.kind > FIXED).sum())
 
 
-def write(
+def write_deck(
     directory: Path,
     grains: GrainTable,
     parameters: Mapping[str, float | int],

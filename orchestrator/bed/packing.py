@@ -300,7 +300,7 @@ class Lattice:
         return Packing(centres + shift, sizes, mobile, windward, lee, arc_length)
 
 
-def along(line: BedLine, counts: str | Range) -> Packing:
+def places_along(line: BedLine, counts: str | Range) -> Packing:
     """Lay places on a bed line: the middles of `SAMPLES` equal counted lengths.
 
     Parameters
@@ -327,7 +327,7 @@ def along(line: BedLine, counts: str | Range) -> Packing:
     corners = np.array(finer.x)
     middle = (corners[1:] + corners[:-1]) / 2
     is_counted = line.counted(counts)[np.searchsorted(line.x, middle) - 1]
-    is_counted &= within(middle, counts)
+    is_counted &= places_within(middle, counts)
     for start, end in line.bare:
         is_counted &= (middle < start) | (middle > end)
     lengths = np.where(is_counted, finer.lengths, 0.0)
@@ -643,7 +643,7 @@ def cover(
     under, depth = _depth(top, centres)
     slack = 0.0 if lattice.pattern == "horizontal" else max(SLIT, lattice.disorder)
     seen = exposed(centres, top.tangents[under], slack) & (depth < 1)
-    chosen = is_counted[under] & within(centres[:, 0], counts)
+    chosen = is_counted[under] & places_within(centres[:, 0], counts)
     for start, end in line.bare:
         chosen &= (centres[:, 0] <= start - BARE) | (centres[:, 0] >= end + BARE)
     is_near = depth < (lattice.mobile_layers - 0.5) * np.sin(lattice.beta)
@@ -940,7 +940,7 @@ def _touching(centres: FloatArray, chosen: BoolArray) -> BoolArray:
     return np.asarray(distance < 1 + TOUCH)
 
 
-def within(x: FloatArray, counts: str | Range) -> BoolArray:
+def places_within(x: FloatArray, counts: str | Range) -> BoolArray:
     """Find the places that a range contains.
 
     Parameters

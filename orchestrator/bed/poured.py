@@ -16,7 +16,7 @@ from orchestrator import digits
 from orchestrator.bed import deck
 from orchestrator.bed.deck import DENSITY, DIAMETER, GRAVITY, WEIGHT, DeckCase
 from orchestrator.bed.line import BedLine
-from orchestrator.bed.packing import APRON, Packing, Places, unshadowed, within
+from orchestrator.bed.packing import APRON, Packing, Places, places_within, unshadowed
 from orchestrator.errors import InputError, Noisy, SolverError
 from orchestrator.solvers.dem import ENGINE
 from orchestrator.study.parts import LogNormal, Range, Sizes
@@ -62,7 +62,7 @@ LOCAL = 5.0
 """Length of bed before and behind a grain that its height is compared with, d."""
 
 
-def drawn(
+def drawn_sizes(
     sizes: Sizes | None, diameter: float, count: int, seed: int, dimensions: int
 ) -> FloatArray:
     """Draw the diameters of grains.
@@ -213,7 +213,7 @@ class PouredBed(DeckCase):
 
     def _drawn(self, count: int, seed: int) -> FloatArray:
         """Diameters of so many of its grains, d."""
-        return drawn(self.sizes, self.diameter, count, seed, self.dimensions)
+        return drawn_sizes(self.sizes, self.diameter, count, seed, self.dimensions)
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -386,7 +386,7 @@ class PouredBed(DeckCase):
         bed.to_csv(directory / BED, index=False, float_format=digits.FORMAT)
 
 
-def read(
+def read_poured(
     directory: Path,
     line: BedLine,
     counts: str | Range,
@@ -433,7 +433,9 @@ def read(
     on_form = (segment > 0) & (segment < len(line.lengths) - 1)
     mobile = surface - height < (mobile_layers - 0.5) * LAYER
     mobile = is_poured & (mobile | is_free) & on_form
-    counted = is_free & line.counted(counts)[segment] & within(centres[:, 0], counts)
+    counted = (
+        is_free & line.counted(counts)[segment] & places_within(centres[:, 0], counts)
+    )
     _check_counted(counted)
     needed = mobile | _near_to(mobile, places, sizes)
     # along the bed; the fixed ones last, for a deck must not lose the grain of its

@@ -7,7 +7,7 @@ import numpy as np
 from orchestrator.bed.deck import DENSITY, DIAMETER, GRAVITY
 from orchestrator.benchmark.mechanics import mechanics, three_grains
 from orchestrator.benchmark.pack import Problem, expectation
-from orchestrator.study.parts import Grain
+from orchestrator.study.parts import GrainPart
 from orchestrator.types import Row
 
 CHECK = 0.01
@@ -43,7 +43,7 @@ def all_checks() -> Iterator[Problem]:
     Problem
         The scenes, with exact answers and without ours.
     """
-    friction_deg = Grain(diameter=DIAMETER).friction_angle_deg
+    friction_deg = GrainPart(diameter=DIAMETER).friction_angle_deg
     friction = float(np.tan(np.radians(friction_deg)))
     for damping in DAMPINGS:
         yield _collision(damping)
@@ -123,7 +123,7 @@ def _contact(
         "rho_sol_kg_m3": DENSITY,
         "time_step": time_step,
         "damping": damping,
-        "phi_deg": Grain(diameter=DIAMETER).friction_angle_deg,
+        "phi_deg": GrainPart(diameter=DIAMETER).friction_angle_deg,
         "stiffness": stiffness,
         **mechanics(DIAMETER, DENSITY, GRAVITY, weight, stiffness),
     }

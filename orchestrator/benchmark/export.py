@@ -97,14 +97,16 @@ def export(root: Path, source: Path | None, levels: Collection[int]) -> int:
     if not space.drawn.is_file():
         what = "the study is not finished"
         raise InputError(what, str(source), "run it to its end")
-    times = tables.read(space, "timings")["timings"].set_index("case")["solver_s"]
+    times = tables.read_tables(space, "timings")["timings"].set_index("case")[
+        "solver_s"
+    ]
     if set(times.index) != set(planned.cases):
         what = (
             "the study was run by another version of the program: its cases are others"
         )
         raise InputError(what, str(source), "run it again")
     sharing = {cell.name: len(cell.scenes) for cell in planned.cells}
-    results = tables.read(space, "tables")
+    results = tables.read_tables(space, "tables")
     listed = []
     for problem in problems(asked, planned, results, space.cases, kinds):
         if problem.runs:
@@ -408,7 +410,7 @@ class Ours:
         states = reuse.done(planned.cases, self.root)
         results: Tables = {}
         if states:
-            results = tables.make(asked, planned, self.root, states)
+            results = tables.make_tables(asked, planned, self.root, states)
         (problem,) = problems(asked, planned, results, self.root, [kind])
         times: Times = {}
         if problem.runs:

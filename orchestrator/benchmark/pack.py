@@ -23,7 +23,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from orchestrator.errors import InputError
 from orchestrator.runs import processors, workspace
 from orchestrator.runs.files import (
-    beside,
+    beside_package,
     canonical_json,
     digest_files,
     digest_text,
@@ -504,7 +504,7 @@ def write_pack(
             "schema": SCHEMA,
             "scenes": scene_names,
             "programs": dict(programs),
-            "machine": {"processor": _processor(), "cores": processors.count()},
+            "machine": {"processor": _processor(), "cores": processors.usable_count()},
             "sha256": digest_files([*paths, *scenes.glob("*/*")], root=root),
         }
         folder.note(MANIFEST, text_of(about | manifest))
@@ -541,7 +541,7 @@ def contract() -> str:
     str
         The page from its section "Write a solver" to the links at its end.
     """
-    page = (beside("docs") / "benchmark.md").read_text(encoding="utf-8")
+    page = (beside_package("docs") / "benchmark.md").read_text(encoding="utf-8")
     return page[page.index(CONTRACT) : page.index(AFTER_CONTRACT)]
 
 

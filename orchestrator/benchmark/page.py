@@ -251,7 +251,7 @@ def _legends(
         mark = Line2D([], [], color="0.3", mfc="none", ls="none")
         mark.set(marker=MARKERS[level], label=f"level {level}")
         marks.append(mark)
-    style.legends(canvas, solvers, [*samples, *marks])
+    style.legends_below(canvas, solvers, [*samples, *marks])
 
 
 def _panels(

@@ -155,7 +155,7 @@ def pivot(name: str, scene: Scene, ours: float) -> Problem:
     row["ours"] = ours
     centres, _, sizes = cells.cell(scene)
     d = scene.grain.diameter
-    rising = cells.flows(scene)
+    rising = cells.cell_flows(scene)
     fx, fz = cells.force(scene, rising).T
     load_steps = pd.DataFrame(
         {

@@ -12,7 +12,7 @@ if TYPE_CHECKING:  # this loads numpy
     from orchestrator.types import Row
 
 
-def card(rows: Sequence["Row"]) -> Card:
+def grain_card(rows: Sequence["Row"]) -> Card:
     """Make the answer card of one point.
 
     Parameters
@@ -27,7 +27,7 @@ def card(rows: Sequence["Row"]) -> Card:
         the laws that hold.
     """
     chosen = next(row for row in rows if row["answer"])
-    made = single.card(as_row(chosen))
+    made = single.single_card(as_row(chosen))
     holding = [row["law"] for row in rows if row["valid"]]
     if chosen["valid"] or not holding:
         return made

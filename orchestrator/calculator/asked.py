@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from orchestrator.calculator import BY_FLUID, ENTRAINED, OF_FLUID, PARAMETERS
 from orchestrator.errors import InputError
 from orchestrator.physics.fluids import PAPER, TEMPERATURE, numbers_of
-from orchestrator.study.units import Remark, hinted, questions
+from orchestrator.study.units import NumberRemark, hinted, questions
 
 if TYPE_CHECKING:  # this loads numpy
     from orchestrator.calculator.table import Table
@@ -70,7 +70,7 @@ def thresholds_and_questions(
     fields[f"fluid.{TEMPERATURE}"] = names["temperature"]
     fields["law"] = names["law"]
     fields["criterion"] = names["criterion"]
-    asked: list[Remark] = []
+    asked: list[NumberRemark] = []
     try:
         points = _of_fluid(points, fluid, temperature)
         if fluid == PAPER and criterion == BY_FLUID:

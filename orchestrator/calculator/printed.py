@@ -147,13 +147,13 @@ def as_text(
 
 def _of_one(rows: Sequence["Row"]) -> Iterator[str]:
     """The answer card of one point, a table of laws, and the terms of its heads."""
-    from orchestrator.calculator.answer import card, nearest
+    from orchestrator.calculator.answer import grain_card, nearest
     from orchestrator.physics.threshold import LAWS_OF
     from orchestrator.report.card import lines
     from orchestrator.report.subjects import TERMS
 
     chosen = [row for row in rows if row["answer"]]
-    yield from lines(card(rows))
+    yield from lines(grain_card(rows))
     if "decides" in chosen[0]:
         yield ""
         yield from _criteria(chosen)

@@ -14,7 +14,7 @@ def _run(options: Namespace) -> int:
     from orchestrator.solvers import doctor
 
     findings = list(doctor.examine())
-    print(doctor.text(findings))
+    print(doctor.findings_text(findings))
     is_good = all(finding.good for finding in findings)
     return int(not is_good)
 

@@ -16,7 +16,7 @@ def _run(options: Namespace) -> int:
     """Write the page, and print its place."""
     from orchestrator import gallery
 
-    print(gallery.write(options.directory))
+    print(gallery.write_gallery(options.directory))
     return 0
 
 

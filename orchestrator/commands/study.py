@@ -7,7 +7,7 @@ from pathlib import Path
 from orchestrator import guests
 from orchestrator.command import Command, Parser, add_run_options
 from orchestrator.runs.cluster import SYSTEMS, Queue
-from orchestrator.study.units import number
+from orchestrator.study.units import number_of
 
 
 def _options(command: Parser) -> None:
@@ -15,7 +15,7 @@ def _options(command: Parser) -> None:
     add_run_options(command, "first-look", of="file")
     text = "accepted relative error of a threshold, such as 0.05; the fastest models "
     text += "known to be within it are taken"
-    command.add_argument("--tolerance", type=number, metavar="X", help=text)
+    command.add_argument("--tolerance", type=number_of, metavar="X", help=text)
     text = "run the cases in jobs of a queue: %(choices)s; its settings stand in the "
     text += "table [cluster] of the file"
     queues = sorted(SYSTEMS)
@@ -25,12 +25,12 @@ def _options(command: Parser) -> None:
 def _run(options: Namespace) -> int:
     """Run a study; of one that was finished before its answer is printed."""
     if not options.plan:
-        answered = finished(options)
+        answered = answer_finished(options)
         if answered:
             print("it was answered already; no solver was started", file=sys.stderr)
             print(*answered, sep="\n")
             return 0
-    study = guests.load(options.source, options.tolerance)
+    study = guests.load_study(options.source, options.tolerance)
     code = guests.taken_over(study, options)
     if code is not None:
         return code
@@ -46,7 +46,7 @@ def _run(options: Namespace) -> int:
     return ended.tell()
 
 
-def finished(options: Namespace) -> tuple[str, Path] | None:
+def answer_finished(options: Namespace) -> tuple[str, Path] | None:
     """Look up a study that was finished before.
 
     No study is read: the bytes of its files are compared with those that it was made

@@ -26,7 +26,7 @@ from orchestrator.fidelity.classes import (
 )
 from orchestrator.fidelity.fidelities import FIDELITIES
 from orchestrator.fidelity.measured import Spanned
-from orchestrator.study.closed_form import outer_roughness, single_grain
+from orchestrator.study.closed_form import flow_roughness, single_grain
 from orchestrator.study.criterion import ENTRAINED, SUSTAINED
 from orchestrator.study.fields import FIELDS, SEED
 from orchestrator.study.fields import Quantity as Field
@@ -72,7 +72,7 @@ OF_GRAINS = ("method.grains.",)
 
 
 @dataclass(frozen=True)
-class Quantity:
+class MeasuredQuantity:
     """A number or a word of a scene of which the measured values are kept.
 
     Attributes
@@ -206,41 +206,41 @@ def _galileo(scene: Scene) -> Iterator[float]:
 
 OBSTACLES = ("bed.obstacles",)
 SIZES = ("grain.sizes",)
-SIMILAR: tuple[Quantity, ...] = (
-    Quantity(
+SIMILAR: tuple[MeasuredQuantity, ...] = (
+    MeasuredQuantity(
         "grain.density/fluid.density",
         ("grain.density", "fluid.density"),
         lambda scene: [scene.grain.density / scene.fluid.density],
     ),
-    Quantity(
+    MeasuredQuantity(
         "Galileo number",
         ("grain.diameter", "fluid.viscosity", "fluid.gravity"),
         _galileo,
     ),
-    Quantity("lift/weight", (), lambda scene: [lift_over_weight(scene)]),
-    Quantity("bed.height/grain.diameter", ("bed.height",), _over_diameter),
-    Quantity(
+    MeasuredQuantity("lift/weight", (), lambda scene: [lift_over_weight(scene)]),
+    MeasuredQuantity("bed.height/grain.diameter", ("bed.height",), _over_diameter),
+    MeasuredQuantity(
         "bed.roughness/grain.diameter",
         ("bed.roughness",),
         lambda scene: [scene.bed.roughness / scene.grain.diameter],
     ),
-    Quantity("bed.lee_slope_deg", ("bed.lee_slope_deg",), _lee_slope),
-    Quantity("bed.length/bed.height", ("bed.length",), _level_length),
-    Quantity("bed.spacing/bed.height", ("bed.spacing",), _spacing),
-    Quantity("bed.brink_radius/bed.height", ("bed.brink_radius",), _brink),
-    Quantity("bed.counted", ("bed.counted",), _counted),
-    Quantity("flow.depth/bed.height", ("flow.depth",), _depth),
-    Quantity("bed.obstacles: number", OBSTACLES, _obstacles),
-    Quantity("bed.obstacles: kind", OBSTACLES, _kinds),
-    Quantity("bed.obstacles: x/bed.height", OBSTACLES, _places),
-    Quantity("bed.obstacles: height/bed.height", OBSTACLES, _heights),
-    Quantity("bed.obstacles: length/height", OBSTACLES, _lengths),
-    Quantity("grain.sizes", SIZES, _sizes),
-    Quantity("grain.sizes.sigma_g", SIZES, _sigma),
-    Quantity("grain.sizes.smallest", SIZES, _smallest),
-    Quantity("grain.sizes.largest", SIZES, _largest),
-    Quantity(CRITERION, (CRITERION, "fluid.kind"), _criterion),
-    Quantity(FRACTIONS, (FRACTIONS,), lambda scene: scene.threshold.fractions),
+    MeasuredQuantity("bed.lee_slope_deg", ("bed.lee_slope_deg",), _lee_slope),
+    MeasuredQuantity("bed.length/bed.height", ("bed.length",), _level_length),
+    MeasuredQuantity("bed.spacing/bed.height", ("bed.spacing",), _spacing),
+    MeasuredQuantity("bed.brink_radius/bed.height", ("bed.brink_radius",), _brink),
+    MeasuredQuantity("bed.counted", ("bed.counted",), _counted),
+    MeasuredQuantity("flow.depth/bed.height", ("flow.depth",), _depth),
+    MeasuredQuantity("bed.obstacles: number", OBSTACLES, _obstacles),
+    MeasuredQuantity("bed.obstacles: kind", OBSTACLES, _kinds),
+    MeasuredQuantity("bed.obstacles: x/bed.height", OBSTACLES, _places),
+    MeasuredQuantity("bed.obstacles: height/bed.height", OBSTACLES, _heights),
+    MeasuredQuantity("bed.obstacles: length/height", OBSTACLES, _lengths),
+    MeasuredQuantity("grain.sizes", SIZES, _sizes),
+    MeasuredQuantity("grain.sizes.sigma_g", SIZES, _sigma),
+    MeasuredQuantity("grain.sizes.smallest", SIZES, _smallest),
+    MeasuredQuantity("grain.sizes.largest", SIZES, _largest),
+    MeasuredQuantity(CRITERION, (CRITERION, "fluid.kind"), _criterion),
+    MeasuredQuantity(FRACTIONS, (FRACTIONS,), lambda scene: scene.threshold.fractions),
 )
 """Quantities of several fields, without a unit, or of a field that is a table."""
 
@@ -282,7 +282,7 @@ def _own(field: Field) -> Read:
     return read
 
 
-def _quantities() -> tuple[Quantity, ...]:
+def _quantities() -> tuple[MeasuredQuantity, ...]:
     """Those of `SIMILAR`, and each other field by itself."""
     taken: set[str] = set()
     for names in APART.values():
@@ -290,7 +290,7 @@ def _quantities() -> tuple[Quantity, ...]:
     for one in SIMILAR:
         taken.update(one.fields)
     own = [each for each in FIELDS if each.name not in taken]
-    fields = [Quantity(each.name, (each.name,), _own(each)) for each in own]
+    fields = [MeasuredQuantity(each.name, (each.name,), _own(each)) for each in own]
     return (*fields, *SIMILAR)
 
 
@@ -451,7 +451,7 @@ def _unmeasured_solve(scene: Scene) -> str:
         return f"first cells of {cell:.3g} m in place of {default:.3g} m"
     if not roughness:
         return ""
-    for near in (bed.roughness, outer_roughness(scene) or bed.roughness):
+    for near in (bed.roughness, flow_roughness(scene) or bed.roughness):
         if abs(math.log2(roughness / near)) <= 0.5 + 1e-6:
             return ""
     return f"method.flow.roughness = {roughness:.3g} m"

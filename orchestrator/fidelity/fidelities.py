@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from orchestrator.physics.constants import KARMAN
 from orchestrator.study import fidelities as written
 from orchestrator.study import models
-from orchestrator.study.closed_form import closed_form, outer_roughness
+from orchestrator.study.closed_form import closed_form, flow_roughness
 from orchestrator.study.fidelities import Fields
 from orchestrator.study.methods import LOCAL as LOCAL_METHOD
 from orchestrator.study.methods import METHODS
@@ -107,7 +107,7 @@ class Rung:
         """
         fields = dict(self.fields(scene))
         if self.model is not None and self.model.follows_bed:
-            fields["method.flow.roughness"] = outer_roughness(scene)
+            fields["method.flow.roughness"] = flow_roughness(scene)
         return fields
 
     def describes(self, scene: Scene, *, or_finer: bool = False) -> bool:

@@ -111,10 +111,14 @@ def _spread(model: str, fraction: float) -> Spread:
     if shares.empty:
         return Spread()
     frozen_bed = float(shares.max(axis=1).get(FROZEN, math.nan))
-    return Spread(*together(shares), str(shares.sum(axis=1).idxmax()), frozen_bed)
+    return Spread(
+        *combined_shares(shares), str(shares.sum(axis=1).idxmax()), frozen_bed
+    )
 
 
-def together(shares: pd.DataFrame, quantity: str = "shields") -> tuple[float, float]:
+def combined_shares(
+    shares: pd.DataFrame, quantity: str = "shields"
+) -> tuple[float, float]:
     """Combine shares of independent choices by their squares.
 
     Nothing falls below zero, however many choices lower it.
@@ -168,7 +172,9 @@ def floors() -> dict[str, Floor]:
     unstated = _budget()[~_budget()["choice"].isin(STATED)]
     found = {}
     for model, rows in unstated.groupby("model_class"):
-        halves = [sum(together(part)) / 2 for _, part in rows.groupby("fraction")]
+        halves = [
+            sum(combined_shares(part)) / 2 for _, part in rows.groupby("fraction")
+        ]
         found[str(model)] = Floor(min(halves), int(rows["scenes"].min()))
     return found
 

@@ -21,7 +21,7 @@ from orchestrator.runs import process
 from orchestrator.runs.files import canonical_json
 from orchestrator.solvers.dem import ENGINE
 from orchestrator.study.closed_form import closed_form
-from orchestrator.study.parts import Grain
+from orchestrator.study.parts import GrainPart
 from orchestrator.study.scene import READ_LATER, Scene
 from orchestrator.types import FloatArray
 
@@ -101,7 +101,7 @@ class SingleGrainCase(GrainCase):
         return {"scenes": values}
 
     @property
-    def grain(self) -> Grain:
+    def grain(self) -> GrainPart:
         """The grain whose contact law all cells have."""
         return self.scenes[0].grain
 
@@ -138,12 +138,14 @@ class SingleGrainCase(GrainCase):
             "ceiling_z": 1e3 * DIAMETER,
             "behind": 1e3 * DIAMETER,
         }
-        rising = flows(self.scenes[0])
+        rising = cell_flows(self.scenes[0])
         pushes = np.zeros((len(rising), 3 * len(self.scenes), 2))
         for place, scene in enumerate(self.scenes):
             pushes[:, 3 * place + 2] = force(scene, rising) * WEIGHT / scene.weight
         grains = self._grains()
-        deck.write(directory, grains, parameters, rising, pushes, margin=4 * DIAMETER)
+        deck.write_deck(
+            directory, grains, parameters, rising, pushes, margin=4 * DIAMETER
+        )
 
     def collect(self, directory: Path) -> None:
         """Check the run and write what each grain did to ``motion.csv``.
@@ -158,7 +160,7 @@ class SingleGrainCase(GrainCase):
         stiffness = self.scenes[0].method.grains.stiffness
         motion.check_rest(directory, grains, WEIGHT, stiffness, all_rest=False)
         criterion = self.scenes[0].threshold.displacement
-        moved = motion.read(directory, grains, criterion, falls_out=True)
+        moved = motion.read_motion(directory, grains, criterion, falls_out=True)
         moved.to_csv(directory, grains)
 
     def _grains(self) -> deck.GrainTable:
@@ -221,7 +223,7 @@ def cell(scene: Scene) -> Cell:
     return Cell(centres, along, np.array([neighbour, neighbour, 1.0]))
 
 
-def flows(scene: Scene) -> FloatArray:
+def cell_flows(scene: Scene) -> FloatArray:
     """List the flows of a deck.
 
     Parameters
@@ -246,7 +248,7 @@ def force(scene: Scene, rising: FloatArray) -> FloatArray:
     scene
         The scene.
     rising
-        Flows, as `flows` gives them; shape (F,).
+        Flows, as `cell_flows` gives them; shape (F,).
 
     Returns
     -------

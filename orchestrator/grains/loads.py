@@ -65,8 +65,8 @@ _covered = cache(packing.cover)
 
 @cache
 def _poured(state: tuple[int, ...], directory: Path, *shown: Any) -> Packing:
-    """The packing of a poured bed by `poured.read`, from its file in a state."""
-    return poured.read(directory, *shown)
+    """The packing of a poured bed by `poured.read_poured`, from its file in a state."""
+    return poured.read_poured(directory, *shown)
 
 
 def has_rows_along(scene: Scene) -> bool:
@@ -99,7 +99,7 @@ def _packed(ground: BedLine, lattice: Lattice, line: BedLine) -> Packing:
     return replace(packed, arc_length=arc_length)
 
 
-def forget() -> None:
+def forget_loads() -> None:
     """Forget what beds and grains share within a process.
 
     The time that a bed takes afterwards is what it takes alone, whatever was asked
@@ -344,7 +344,7 @@ class Geometry:
         bed = self.bed
         d = self.scene.grain.diameter
         if not self.scene.method.may_pack_grains:
-            return packing.along(self.line, self.counts)
+            return packing.places_along(self.line, self.counts)
         for run in self.pouring:
             assert self.cases is not None, "the grains of a poured bed lie in its run"
             directory = self.cases / run.name

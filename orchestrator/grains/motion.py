@@ -389,7 +389,7 @@ def _ever(happened: BoolArray) -> BoolArray:
     return np.logical_or.accumulate(happened, axis=0)
 
 
-def read(
+def read_motion(
     directory: Path, grains: GrainTable, criterion: float, *, falls_out: bool
 ) -> Motion:
     """Read the deck's tables of a finished run.

@@ -143,14 +143,16 @@ class PileCase(GrainCase):
         scene = self.scene
         loads, worn = self._state(cases)
         rising = self._rising(loads, cases)
-        grains = table(loads, worn)
+        grains = grain_table(loads, worn)
         numbers = self._numbers(loads.geometry, grains)
         force = loads.loading.at(rising)
         gusts = deck.STEADY
         if scene.flow.gusts:
             gusts = in_time(scene.flow.gusts, loads, rising[1:])
         margin = MARGIN * scene.grain.diameter
-        deck.write(directory, grains, numbers, rising, force, margin, self.ranks, gusts)
+        deck.write_deck(
+            directory, grains, numbers, rising, force, margin, self.ranks, gusts
+        )
 
     def _rising(self, loads: Loads, cases: Path) -> FloatArray:
         """The flow of the settling and of each load step, u*_0 in m/s."""
@@ -205,7 +207,7 @@ class PileCase(GrainCase):
         ENGINE.check_log(directory)
         scene = self.scene
         loads, worn = self._state(directory.parent)
-        grains = table(loads, worn)
+        grains = grain_table(loads, worn)
         motion.check_rest(
             directory,
             grains,
@@ -215,7 +217,7 @@ class PileCase(GrainCase):
             remedy=motion.POURED_REMEDY if scene.is_poured else motion.REMEDY,
         )
         criterion = scene.threshold.displacement
-        moved = motion.read(directory, grains, criterion, falls_out=False)
+        moved = motion.read_motion(directory, grains, criterion, falls_out=False)
         moved.to_csv(directory, grains)
         if not scene.threshold.update:
             return
@@ -351,7 +353,7 @@ def _first(thresholds: FloatArray, geometry: Geometry) -> float:
     return float(held[0])
 
 
-def table(loads: Loads, worn: BedState) -> GrainTable:
+def grain_table(loads: Loads, worn: BedState) -> GrainTable:
     """Make the grains of the deck.
 
     Parameters

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure as Canvas
 from orchestrator import plan
 from orchestrator.digits import percent
 from orchestrator.errors import InputError
-from orchestrator.experiment import Experiment, Results, Runs, label, piles
+from orchestrator.experiment import Experiment, ExperimentResults, Runs, label, piles
 from orchestrator.fidelity import limits, spread
 from orchestrator.fidelity.decision import Decision, on_fidelity
 from orchestrator.fidelity.fidelities import OWN, Fidelity, named
@@ -370,14 +370,14 @@ class Budget(Experiment):
         bases = [self.planned.piles[change.base] for change in self.changes]
         self.failing = {run.name for pile in bases for run in pile.runs}
 
-    def results(self, runs: Runs) -> Results | None:
+    def results(self, runs: Runs) -> ExperimentResults | None:
         """Measure the changes whose runs are done."""
         moved = measure(self.changes, runs)
         if moved.empty:
             return None
         shared = shares_of_choices(moved)
         tables = {"changes": moved, "shares": shared, "budget": largest_shares(shared)}
-        return Results(tables, _sections(self.changes, moved, shared, runs))
+        return ExperimentResults(tables, _sections(self.changes, moved, shared, runs))
 
 
 def measure(listed: Sequence[Change], runs: Runs) -> pd.DataFrame:
@@ -572,7 +572,7 @@ def _from_usual(fraction: float) -> float:
 
 def _interval(largest: pd.DataFrame, quantity: str, value: float) -> _Interval:
     """A value with the interval of all choices together."""
-    low, high = spread.together(largest, quantity)
+    low, high = spread.combined_shares(largest, quantity)
     widths = largest[f"{quantity}_low"] + largest[f"{quantity}_high"]
     return _Interval(value, low, high, most=str(widths.idxmax()))
 
@@ -683,7 +683,7 @@ def tornado(largest: pd.DataFrame) -> Canvas:
     largest = largest.loc[rising.index]
     total: list[float] = []
     for name in QUANTITIES:
-        total += spread.together(largest, name)
+        total += spread.combined_shares(largest, name)
     together = pd.DataFrame([total], columns=ENDS, index=["all together"])
     rows = pd.concat([largest, together])
     canvas = style.canvas(0.28 * len(rows) + 1.0)
@@ -700,5 +700,5 @@ def tornado(largest: pd.DataFrame) -> Canvas:
     ax.set_xlabel("change of the threshold, %")
     ax.grid(axis="x", lw=0.4, color="0.85")
     entries = [style.entry(text, COLOURS[name]) for name, text in QUANTITIES.items()]
-    style.legends(canvas, entries, [])
+    style.legends_below(canvas, entries, [])
     return canvas

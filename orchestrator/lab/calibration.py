@@ -195,7 +195,7 @@ def family(part: str, scene_class: str) -> str:
     return name
 
 
-def table(measured: pd.DataFrame, again: dict[str, str]) -> pd.DataFrame:
+def half_widths(measured: pd.DataFrame, again: dict[str, str]) -> pd.DataFrame:
     """Make the table of half widths of single scenes.
 
     Parameters

@@ -27,7 +27,14 @@ from orchestrator.bed.line import of_bed
 from orchestrator.command import say
 from orchestrator.digits import number
 from orchestrator.errors import InputError
-from orchestrator.experiment import Experiment, Results, Runs, label, page_texts, piles
+from orchestrator.experiment import (
+    Experiment,
+    ExperimentResults,
+    Runs,
+    label,
+    page_texts,
+    piles,
+)
 from orchestrator.fidelity import limits
 from orchestrator.fidelity.classes import FLOW, GRAINS, scene_class
 from orchestrator.fidelity.decision import as_written
@@ -409,7 +416,7 @@ class Convergence(Experiment):
             print(*listed, sep="\n", file=sys.stderr)
         return super().command(options, out)
 
-    def results(self, runs: Runs) -> Results | None:
+    def results(self, runs: Runs) -> ExperimentResults | None:
         """Judge the numbers that all three meshes have."""
         found = points(self.members, runs)
         if found.empty:
@@ -418,7 +425,7 @@ class Convergence(Experiment):
         if judged.empty:
             return None
         tables = {"points": found, "convergence": judged}
-        return Results(tables, _sections(found, judged))
+        return ExperimentResults(tables, _sections(found, judged))
 
 
 def points(listed: Sequence[Member], runs: Runs) -> pd.DataFrame:
@@ -671,7 +678,7 @@ def chart_of(found: pd.DataFrame, judged: pd.DataFrame) -> Canvas:
     mark: Look = {"ls": "", "marker": "o", "ms": 4, "color": OTHER}
     if not set(verdicts["verdict"]) <= set(GOOD):
         looks.append(Line2D([], [], mfc="white", label="open: no order", **mark))
-    style.legends(canvas, [style.entry(*each) for each in colours.items()], looks)
+    style.legends_below(canvas, [style.entry(*each) for each in colours.items()], looks)
     return canvas
 
 

@@ -19,7 +19,7 @@ from orchestrator.bed.line import of_bed
 from orchestrator.digits import number
 from orchestrator.experiment import (
     Experiment,
-    Results,
+    ExperimentResults,
     Runs,
     label,
     page_texts,
@@ -130,12 +130,12 @@ class Ladder(Experiment):
             )
         return lines
 
-    def results(self, runs: Runs) -> Results | None:
+    def results(self, runs: Runs) -> ExperimentResults | None:
         """Compare the pairs of rungs whose runs are done."""
         measured = points(self.pairs, runs)
         if measured.empty:
             return None
-        compared = errors(measured)
+        compared = rung_errors(measured)
         if compared.empty:
             return None
         known = known_errors(measured)
@@ -148,7 +148,7 @@ class Ladder(Experiment):
             "domain": measured_domain(done),
         }
         charts = chart.sections(self.kinds, shares, self.study)
-        return Results(tables, [*charts, _section(known)])
+        return ExperimentResults(tables, [*charts, _section(known)])
 
 
 def decisions(study: Study) -> dict[str, Decision]:
@@ -280,7 +280,7 @@ def _thresholds(scene: Scene, pile: Pile, cases: Path) -> Row:
     return row
 
 
-def errors(points: pd.DataFrame) -> pd.DataFrame:
+def rung_errors(points: pd.DataFrame) -> pd.DataFrame:
     """Compare points with the reference that their scene has.
 
     Parameters
@@ -343,7 +343,7 @@ def known_errors(points: pd.DataFrame) -> pd.DataFrame:
         was not run with other numbers.
     """
     again = {GRAINS: AGAIN, FLOW: FINER}
-    return calibration.table(scene_errors(points), again)
+    return calibration.half_widths(scene_errors(points), again)
 
 
 def scene_errors(points: pd.DataFrame) -> pd.DataFrame:

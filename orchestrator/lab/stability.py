@@ -17,7 +17,7 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.patches import Patch, Rectangle
 
 from orchestrator import plan
-from orchestrator.experiment import Experiment, Results, Runs
+from orchestrator.experiment import Experiment, ExperimentResults, Runs
 from orchestrator.fidelity.decision import as_written
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import Motion
@@ -99,13 +99,13 @@ class Stability(Experiment):
                     asked[scene.id] = as_written(scene)
         super().__init__(plan.of(asked))
 
-    def results(self, runs: Runs) -> Results:
+    def results(self, runs: Runs) -> ExperimentResults:
         """Judge every place of every map."""
         judged = [judge_map(each, runs) for each in self.maps]
         table = pd.concat(judged, ignore_index=True)
         said = told.counted(self.maps, table)
         sections = _sections(self.maps, table, said)
-        return Results({"maps": table, "told": said}, sections)
+        return ExperimentResults({"maps": table, "told": said}, sections)
 
 
 def _sections(
@@ -318,7 +318,7 @@ def draw_maps(maps: Sequence[StabilityMap], table: pd.DataFrame) -> Canvas:
         _panel(ax, each, rows, font)
     for ax in axes[len(maps) :]:
         ax.set_axis_off()
-    style.legends(canvas, _samples(set(table["verdict"])), [])
+    style.legends_below(canvas, _samples(set(table["verdict"])), [])
     return canvas
 
 

@@ -3,7 +3,7 @@
 import time
 from pathlib import Path
 
-from orchestrator.grains.loads import forget
+from orchestrator.grains.loads import forget_loads
 from orchestrator.grains.pile import Pile
 
 
@@ -25,7 +25,7 @@ def time_alone_s(pile: Pile, cases: Path) -> float:
     float
         Time of one core, s.
     """
-    forget()
+    forget_loads()
     alone = Pile(pile.scene, pile.cases)
     started = time.process_time()
     alone.motion(cases)

@@ -25,7 +25,7 @@ HOW = (REFUSED, WARNED, NOT_USABLE, WITHIN, NO_FAULT, NOTHING)
 """What a study may say, from the strongest to the weakest."""
 
 
-def told(maps: Iterable[StabilityMap], table: pd.DataFrame) -> pd.DataFrame:
+def told_answers(maps: Iterable[StabilityMap], table: pd.DataFrame) -> pd.DataFrame:
     """Find what a study says of each answer that is wrong without a notice of its run.
 
     Parameters
@@ -74,7 +74,7 @@ def counted(maps: Sequence[StabilityMap], table: pd.DataFrame) -> pd.DataFrame:
         a study tells in each way of `HOW`, and the fields that it names.
     """
     rows = []
-    found = told(maps, table)
+    found = told_answers(maps, table)
     for one in maps:
         of_map = found[found["map"] == one.name]
         if of_map.empty:

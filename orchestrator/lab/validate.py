@@ -15,7 +15,7 @@ from matplotlib.figure import Figure as Canvas
 
 from orchestrator import plan
 from orchestrator.errors import InputError
-from orchestrator.experiment import Experiment, Results, Runs
+from orchestrator.experiment import Experiment, ExperimentResults, Runs
 from orchestrator.fidelity.decision import as_written
 from orchestrator.flow.stress import WallStress, bubble
 from orchestrator.lab.sphere import speed_of, sphere
@@ -195,7 +195,7 @@ def over_hump(stress: WallStress) -> pd.DataFrame:
     )
 
 
-def sustained(
+def sustained_shields(
     beds: pd.DataFrame,
     gust: float,
     *,
@@ -336,7 +336,9 @@ def compare_models(
     for model in MODELS:
         cessation = np.full(len(ends), np.nan)
         if model.is_sustained:
-            shields = sustained(beds, model.gust, is_entrained=model.is_entrained)
+            shields = sustained_shields(
+                beds, model.gust, is_entrained=model.is_entrained
+            )
             answers = _Answers(np.nan, np.nan, shields, np.nan)
             cessation = ceases
         else:
@@ -445,7 +447,7 @@ class Validation(Experiment):
         asked = {scene.id: as_written(scene) for scene in study.scenes}
         super().__init__(plan.of(asked, cases=out.absolute() / "cases"), study)
 
-    def results(self, runs: Runs) -> Results | None:
+    def results(self, runs: Runs) -> ExperimentResults | None:
         """Compare every model with every measurement, once all runs are done."""
         piles = self.planned.piles
         if not runs.are_done(*piles):
@@ -458,7 +460,7 @@ class Validation(Experiment):
         rows = compare_models(Strips(self.strips, runs.cases), over, lengths)
         scored = scores(rows)
         tables = {"measured": rows, "scores": scored}
-        return Results(tables, _sections(rows, scored))
+        return ExperimentResults(tables, _sections(rows, scored))
 
 
 def _is_hill(scene: Scene) -> bool:
@@ -507,7 +509,7 @@ def _sections(rows: pd.DataFrame, scored: pd.DataFrame) -> list[Section]:
     title = "Model over measurement"
     chart = Figure("factors", title, FACTORS_TEXT, (), factors(scored))
     of_points = "Thresholds of level beds"
-    points = Figure("shields", of_points, SHIELDS_TEXT, (), diagram(rows))
+    points = Figure("shields", of_points, SHIELDS_TEXT, (), validation_diagram(rows))
     wide = scored.pivot(index="set", columns="model", values="factor")
     wide = wide.loc[scored["set"].unique(), [model.name for model in MODELS]]
     wide = wide.reset_index()
@@ -521,7 +523,7 @@ def _sections(rows: pd.DataFrame, scored: pd.DataFrame) -> list[Section]:
         Section(title, [chart, Paragraphs(SETS_TEXT, "lead"), *medians]),
         Section("Thresholds", [points, of_beds, Table.of(scored)]),
         Section("From memory", [Paragraphs(MEMORY_TEXT, "lead"), Table.of(memory)]),
-        truth.section(truth.stored()),
+        truth.truth_section(truth.stored()),
     ]
 
 
@@ -626,11 +628,11 @@ def factors(scored: pd.DataFrame) -> Canvas:
     ax.set_yticks(range(len(sets)), labels)
     ax.invert_yaxis()
     ax.set_xlabel("model over measurement")
-    style.legends(canvas, ax.get_lines()[: len(MODELS)], [])
+    style.legends_below(canvas, ax.get_lines()[: len(MODELS)], [])
     return canvas
 
 
-def diagram(rows: pd.DataFrame) -> Canvas:
+def validation_diagram(rows: pd.DataFrame) -> Canvas:
     """Draw thresholds of level beds over the Galileo number.
 
     Parameters
@@ -668,5 +670,5 @@ def diagram(rows: pd.DataFrame) -> Canvas:
     named = [
         line for line in ax.get_lines() if not str(line.get_label()).startswith("_")
     ]
-    style.legends(canvas, [], named)
+    style.legends_below(canvas, [], named)
     return canvas

@@ -59,7 +59,7 @@ class Claim:
 
 
 @dataclass(frozen=True)
-class Judged:
+class JudgedClaim:
     """A claim with what a study finds of it.
 
     Attributes
@@ -108,7 +108,7 @@ class Judged:
         return f"Not explained: {there}."
 
 
-def judge_claims(tables: Tables) -> list[Judged]:
+def judge_claims(tables: Tables) -> list[JudgedClaim]:
     """Judge every claim of the paper.
 
     Parameters
@@ -122,10 +122,10 @@ def judge_claims(tables: Tables) -> list[Judged]:
         The claims in the paper's order, then those on its method.
     """
     evidence = Evidence(tables)
-    return [Judged(claim, tuple(claim.measure(evidence))) for claim in CLAIMS]
+    return [JudgedClaim(claim, tuple(claim.measure(evidence))) for claim in CLAIMS]
 
 
-def guest(judged: Sequence[Judged], tables: Tables, file: str) -> Guest:
+def guest(judged: Sequence[JudgedClaim], tables: Tables, file: str) -> Guest:
     """Make what the page of a study of the paper has beside that of any study.
 
     Parameters
@@ -169,7 +169,7 @@ def guest(judged: Sequence[Judged], tables: Tables, file: str) -> Guest:
     )
 
 
-def claims_card(judged: Sequence[Judged], tables: Tables) -> Card:
+def claims_card(judged: Sequence[JudgedClaim], tables: Tables) -> Card:
     """Make the answer card: how many claims hold.
 
     Parameters
@@ -235,7 +235,7 @@ def _worth(tables: Tables, lacking: int) -> Worth:
     return Worth("care", "usable, with gaps", f"{advice}reason.")
 
 
-def claims_sheet(judged: Sequence[Judged], file: str) -> Sheet:
+def claims_sheet(judged: Sequence[JudgedClaim], file: str) -> Sheet:
     """List the claims for a terminal.
 
     Parameters
@@ -262,7 +262,7 @@ def claims_sheet(judged: Sequence[Judged], file: str) -> Sheet:
     return Sheet("The claims", pd.DataFrame(rows, columns=columns), file=file)
 
 
-def frame(judged: Sequence[Judged]) -> pd.DataFrame:
+def frame(judged: Sequence[JudgedClaim]) -> pd.DataFrame:
     """List claims as a table.
 
     Parameters

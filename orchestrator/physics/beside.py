@@ -250,7 +250,7 @@ def tested(table: Any) -> FloatArray:
     return found
 
 
-class Interval(NamedTuple):
+class TestedInterval(NamedTuple):
     """A tested interval, and what it is of.
 
     Attributes
@@ -318,13 +318,13 @@ class Interval(NamedTuple):
 
 
 @cache
-def _intervals(path: Path) -> tuple[Interval, ...]:
+def _intervals(path: Path) -> tuple[TestedInterval, ...]:
     """The tested intervals of a file."""
     text = path.read_text(encoding="utf-8")
     return tuple(map(_interval, csv.DictReader(text.splitlines())))
 
 
-def _interval(row: Mapping[str, str]) -> Interval:
+def _interval(row: Mapping[str, str]) -> TestedInterval:
     """A tested interval of a row: numbers have columns for their two ends."""
     own = {name: float(row[name]) for name in ("low", "high", "rows", "held")}
     words, ranges = {}, {}
@@ -336,7 +336,7 @@ def _interval(row: Mapping[str, str]) -> Interval:
             ranges[column] = (float(value), float(row[f"{column}_high"]))
         elif end != "high":
             words[name] = value
-    return Interval(words, ranges, **own)
+    return TestedInterval(words, ranges, **own)
 
 
 def _columns(table: Any) -> dict[str, NDArray[Any]]:

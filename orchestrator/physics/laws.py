@@ -515,7 +515,7 @@ class BridgedGravel(Bridged, in_interval=True):
     sphere = CLIFT_GAUVIN
 
 
-class Profile(DragAndSaffman, in_interval=True):
+class ProfileLaw(DragAndSaffman, in_interval=True):
     """Drag and lift on van Driest's profile over a rough wall.
 
     The drag is Schiller and Naumann's, the lift Saffman's. Speed and shear are averaged
@@ -554,7 +554,7 @@ _EVERY: tuple[ForceLaw, ...] = (
     High(),
     Bridged(),
     BridgedGravel(),
-    Profile(),
+    ProfileLaw(),
 )
 LAWS: dict[str, ForceLaw] = {each.name: each for each in _EVERY}
 """Every force law by its name."""

@@ -45,17 +45,19 @@ class Criteria:
         return saltation.hops(self.hoppers)
 
     @cached_property
-    def _usual(self) -> saltation.Thresholds:
+    def _usual(self) -> saltation.SustainedThresholds:
         """The thresholds of hops, with the usual rebounds."""
         return saltation.tabulated(self.hoppers)
 
-    def _motion(self, thresholds: saltation.Thresholds) -> saltation.Motion:
+    def _motion(
+        self, thresholds: saltation.SustainedThresholds
+    ) -> saltation.MotionOnset:
         """What both criteria ask together."""
         further = thresholds.initiation(self.peak)
         return saltation.motion(self.steady, further, self.can_hop, self.peak)
 
     @cached_property
-    def _both(self) -> saltation.Motion:
+    def _both(self) -> saltation.MotionOnset:
         return self._motion(self._usual)
 
     @property

@@ -549,7 +549,7 @@ class _Hopping:
 
 
 @dataclass(frozen=True, eq=False)
-class Thresholds:
+class SustainedThresholds:
     """Shields numbers of the mean flow at which grains go on, arrays of shape (n,).
 
     A threshold of 0 lies below `LEAST`: such grains go on in any flow. Infinite is one
@@ -660,7 +660,7 @@ def hops(grains: Grain) -> BoolArray:
     return np.asarray(stokes >= REBOUNDS_FROM)
 
 
-class Motion(NamedTuple):
+class MotionOnset(NamedTuple):
     """The mean stress at which grains leave their pockets and go on.
 
     Attributes
@@ -680,7 +680,7 @@ def motion(
     goes_on: ArrayLike,
     can_hop: ArrayLike,
     peak: ArrayLike = PEAK,
-) -> Motion:
+) -> MotionOnset:
     """Find the mean stress at which grains leave their pockets and go on.
 
     A grain that can hop leaves in a gust and hops on after it: its threshold is the
@@ -713,7 +713,7 @@ def motion(
     further = np.asarray(goes_on)
     can = np.asarray(can_hop)
     shields = np.where(can, np.maximum(in_gust, further), leaves)
-    return Motion(shields, can & ~(in_gust > further))
+    return MotionOnset(shields, can & ~(in_gust > further))
 
 
 FAST = 10.0
@@ -727,7 +727,7 @@ def thresholds(
     *,
     rebound: Rebound = BEADS,
     steps: int = STEPS,
-) -> Thresholds:
+) -> SustainedThresholds:
     """Find the thresholds of grains in sustained motion, steady and of cessation.
 
     Parameters
@@ -766,7 +766,7 @@ def thresholds(
             steps=steps,
         )
 
-    return Thresholds(least(grains, from_pocket), least(grains, from_motion))
+    return SustainedThresholds(least(grains, from_pocket), least(grains, from_motion))
 
 
 def under_gust(
@@ -788,7 +788,7 @@ def under_gust(
     Returns
     -------
     FloatArray
-        Shields numbers of the mean flow, shape (n,), as in `Thresholds`.
+        Shields numbers of the mean flow, shape (n,), as in `SustainedThresholds`.
 
     Examples
     --------
@@ -866,7 +866,7 @@ SLOPE_NODES_DEG = np.linspace(-30.0, 30.0, 13)
 """Nodes of the table."""
 
 
-def tabulated(grains: Grain, *, at_most: bool = False) -> Thresholds:
+def tabulated(grains: Grain, *, at_most: bool = False) -> SustainedThresholds:
     """Find the thresholds of grains from the table, or by `thresholds` where it ends.
 
     The thresholds are interpolated linearly: their logarithms over the logarithms of
@@ -900,7 +900,7 @@ def tabulated(grains: Grain, *, at_most: bool = False) -> Thresholds:
         beyond = _beyond_table(grains.at(outside), at_most)
         found[0, outside] = beyond.steady
         found[1, outside] = beyond.cessation
-    return Thresholds(steady=found[0], cessation=found[1])
+    return SustainedThresholds(steady=found[0], cessation=found[1])
 
 
 _AXES = (np.log(GALILEO_NODES), np.log(DENSITY_NODES), SLOPE_NODES_DEG)
@@ -977,7 +977,7 @@ def weakest(density_ratio: FloatArray) -> FloatArray:
     return np.where(density_ratio < LIQUID_BELOW, 0.25, 0.55)
 
 
-def weakest_thresholds(grains: Grain) -> Thresholds:
+def weakest_thresholds(grains: Grain) -> SustainedThresholds:
     """Find the thresholds of grains whose rebounds are those of `weakest`.
 
     Parameters
@@ -999,7 +999,9 @@ def weakest_thresholds(grains: Grain) -> Thresholds:
     [0.054 0.009]
     """
     restitution = weakest(grains.density_ratio)
-    found = Thresholds(np.full(len(grains), np.nan), np.full(len(grains), np.nan))
+    found = SustainedThresholds(
+        np.full(len(grains), np.nan), np.full(len(grains), np.nan)
+    )
     for value in np.unique(restitution):
         places = np.flatnonzero(restitution == value)
         part = thresholds(grains.at(places), rebound=SIMULATED[float(value)])
@@ -1008,7 +1010,7 @@ def weakest_thresholds(grains: Grain) -> Thresholds:
     return found
 
 
-def _beyond_table(grains: Grain, at_most: bool) -> Thresholds:
+def _beyond_table(grains: Grain, at_most: bool) -> SustainedThresholds:
     """The thresholds of grains that the table does not hold, of alike ones once."""
     numbers = (
         grains.galileo,
@@ -1022,11 +1024,13 @@ def _beyond_table(grains: Grain, at_most: bool) -> Thresholds:
     unlike: dict[tuple[float, ...], int] = {}
     places = [unlike.setdefault(row, len(unlike)) for row in rows]
     found = _of_unlike(tuple(unlike), at_most)
-    return Thresholds(found.steady[places], found.cessation[places])
+    return SustainedThresholds(found.steady[places], found.cessation[places])
 
 
 @lru_cache(maxsize=64)  # tables, cards and pictures ask for the same grains
-def _of_unlike(rows: tuple[tuple[float, ...], ...], at_most: bool) -> Thresholds:
+def _of_unlike(
+    rows: tuple[tuple[float, ...], ...], at_most: bool
+) -> SustainedThresholds:
     """The same of grains by the numbers of each."""
     galileo, density_ratio, slope_deg, ratio, fall, relative_size = np.array(rows).T
     grains = Grain.of_numbers(

@@ -59,8 +59,8 @@ def write(
         for name, text in guest.files.items():
             folder.put(name, text)
     listed = sections.of_study(results, failures, guests, figures, faults)
-    terminal.check()
-    page.write(
+    terminal.check_signals()
+    page.write_page(
         folder,
         PAGE,
         results.study.title,
@@ -97,7 +97,7 @@ def _drawn(
                 fault = f"{kind.name}: {type(error).__name__}: {error}"
                 faults.append(fault)
                 print(f"a figure could not be drawn: {fault}", file=sys.stderr)
-            terminal.check()
+            terminal.check_signals()
     return found, faults
 
 
@@ -130,7 +130,7 @@ def drawn_from(results: "Results", packages: Sequence[str] = ()) -> "list[Case]"
 
 
 def said(results: "Results", guests: Sequence["Guest"] = ()) -> str:
-    """Write the answer of a study for a terminal, see `words.text`.
+    """Write the answer of a study for a terminal, see `words.answer_text`.
 
     Parameters
     ----------
@@ -146,4 +146,4 @@ def said(results: "Results", guests: Sequence["Guest"] = ()) -> str:
     """
     from orchestrator.report import words
 
-    return words.text(results, guests)
+    return words.answer_text(results, guests)

@@ -27,7 +27,7 @@ from orchestrator.report.subjects import (
     STRESS,
     TERMS,
     USTAR,
-    Quantity,
+    ReportedQuantity,
     digits_of_place,
     fluid,
     kind_of_grain,
@@ -75,7 +75,7 @@ def card(results: Results) -> Card:
         return _of_hills([*measured_hills(results)])
     if len(results.joined("pile_threshold")):
         return _of_beds(results)
-    grains = sheets.single_grains(results)
+    grains = sheets.single_grains_sheet(results)
     return _of_grains(grains) if len(grains) else NONE
 
 
@@ -90,7 +90,7 @@ def _of_beds(results: Results) -> Card:
     if are_several_beds(results.at_fraction):
         return _of_several(rows, results)
     row = rows.iloc[0]
-    if sheets.sizes(results) is not None:
+    if sheets.sizes_sheet(results) is not None:
         return _of_mixture(row, results)
     return _of_bed(row, results)
 
@@ -131,7 +131,7 @@ def is_one_grain(grains: pd.DataFrame) -> bool:
 def _of_bed(row: pd.Series, results: Results) -> Card:
     """The card of one bed: where motion starts, the first grains, a share of them."""
     pile = results.plan.piles[str(row["scene_id"])]
-    told = single.quantity(row)
+    told = single.quantity_of_row(row)
     return Card(
         _question(row, pile, told),
         _scene(row, pile, results),
@@ -151,7 +151,7 @@ def _worth(row: pd.Series, few: bool = False) -> Worth:
     return Worth("care", word, advice)
 
 
-def _question(row: pd.Series, pile: Pile, told: Quantity) -> str:
+def _question(row: pd.Series, pile: Pile, told: ReportedQuantity) -> str:
     """The question of one bed."""
     bed = pile.bed
     name = kind_of_grain(float(row["d_m"]))
@@ -193,7 +193,9 @@ def _scene(row: pd.Series, pile: Pile, results: Results) -> str:
     if obstacles:
         shape += f", behind {', '.join(map(str, obstacles))}"
     if pile.scene.flow.towards != WITH_X:
-        shape += f", {single.quantity(row).flow} towards {pile.scene.flow.towards}"
+        shape += (
+            f", {single.quantity_of_row(row).flow} towards {pile.scene.flow.towards}"
+        )
     within = fluid(float(row["rho_f_kg_m3"]), float(row["nu_m2_s"]))
     if not bed.profile:
         shape = f"{shape[:1].upper()}{shape[1:]}"
@@ -201,10 +203,10 @@ def _scene(row: pd.Series, pile: Pile, results: Results) -> str:
 
 
 def _numbers_of_bed(
-    row: pd.Series, pile: Pile, results: Results, told: Quantity
+    row: pd.Series, pile: Pile, results: Results, told: ReportedQuantity
 ) -> Iterator[Number]:
     """Where motion starts, the flow of the first grains, and that of a share."""
-    first = single.known(row["first_ustar0_m_s"])
+    first = single.known_number(row["first_ustar0_m_s"])
     has_place = first > 0 and not single.is_level(row)
     if has_place:
         yield _place(row, pile, results)
@@ -215,14 +217,14 @@ def _numbers_of_bed(
         yield ustar_number(row)
 
 
-def _first_motion(row: pd.Series, pile: Pile, told: Quantity) -> Number:
+def _first_motion(row: pd.Series, pile: Pile, told: ReportedQuantity) -> Number:
     """The flow that moves the first grains, with its interval."""
     of_what = single.interval_of(row, "load step and the known error of the method")
     meaning = f"{told.name} that moves the first grains"
-    place = single.place_of(told, row)
+    place = single.place_of_quantity(told, row)
     if crest.has_sharp_crest(pile.scene):
         place += f"; a finer first cell moves u*₀ by {crest.told(crest.FIRST_GRAIN)}"
-    return single.reported(row, told, meaning, place, of_what, "first_")
+    return single.reported_number(row, told, meaning, place, of_what, "first_")
 
 
 def _place(row: pd.Series, pile: Pile, results: Results) -> Number:
@@ -261,16 +263,18 @@ def _place(row: pd.Series, pile: Pile, results: Results) -> Number:
 def _places(row: pd.Series, results: Results) -> tuple[float, float]:
     """Ends of the places at which motion may start within the known error, m."""
     grains = results.tables.get("pile_grain", pd.DataFrame())
-    error = single.known(row["first_known_error"])
+    error = single.known_number(row["first_known_error"])
     if grains.empty or math.isnan(error):
         return math.nan, math.nan
     here = grains[grains["scene_id"] == row["scene_id"]]
-    most = single.known(row["first_ustar0_m_s"]) * math.sqrt(1 + error) * (1 + 1e-9)
+    most = (
+        single.known_number(row["first_ustar0_m_s"]) * math.sqrt(1 + error) * (1 + 1e-9)
+    )
     near = here[here["ustar0_m_s"] <= most]["x_m"]
     return (float(near.min()), float(near.max())) if len(near) else (math.nan, math.nan)
 
 
-def share(row: pd.Series, told: Quantity) -> Number:
+def share(row: pd.Series, told: ReportedQuantity) -> Number:
     """Make the number of the flow at which a share of a bed has moved.
 
     Parameters
@@ -289,7 +293,9 @@ def share(row: pd.Series, told: Quantity) -> Number:
     what = "of the grains" if packs_grains(row) else "of the bed"
     of_what = single.interval_of(row, NUMBERS)
     meaning = f"{told.name} that moves {part} {what}"
-    return single.reported(row, told, meaning, single.place_of(told, row), of_what)
+    return single.reported_number(
+        row, told, meaning, single.place_of_quantity(told, row), of_what
+    )
 
 
 def ustar_number(row: pd.Series) -> Number:
@@ -306,12 +312,12 @@ def ustar_number(row: pd.Series) -> Number:
         With its interval.
     """
     note = "√(τ_b/ρ), the bed shear stress as a speed"
-    return single.reported(row, USTAR, USTAR.name, note)
+    return single.reported_number(row, USTAR, USTAR.name, note)
 
 
 def _of_several(rows: pd.DataFrame, results: Results) -> Card:
     """The card of several beds: the least and the largest flow, and what is usable."""
-    told = sheets.quantity(rows)
+    told = sheets.quantity_of_rows(rows)
     usable = rows[valid(rows)]
     shown = usable if len(usable) else rows
     shown = shown.sort_values(told.column(), kind="stable")
@@ -336,7 +342,10 @@ def _of_several(rows: pd.DataFrame, results: Results) -> Card:
 
 
 def _first_of_several(
-    shown: pd.DataFrame, results: Results, told: Quantity, telling: Sequence[str]
+    shown: pd.DataFrame,
+    results: Results,
+    told: ReportedQuantity,
+    telling: Sequence[str],
 ) -> Number | None:
     """The least flow that moves the first grains of several beds, and where they lie.
 
@@ -354,7 +363,7 @@ def _first_of_several(
     return replace(number, meaning=meaning)
 
 
-def _no_difference(shown: pd.DataFrame, told: Quantity) -> str:
+def _no_difference(shown: pd.DataFrame, told: ReportedQuantity) -> str:
     """That the known errors hide the difference of several beds; empty if they do not.
 
     Unknown errors show no difference and hide none.
@@ -408,7 +417,9 @@ def _ends(values: Sequence[float]) -> list[str]:
     return list(dict.fromkeys([f"{values[0]:g}", f"{values[-1]:g}"]))
 
 
-def _range(rows: pd.DataFrame, told: Quantity, telling: Sequence[str]) -> list[Number]:
+def _range(
+    rows: pd.DataFrame, told: ReportedQuantity, telling: Sequence[str]
+) -> list[Number]:
     """The least and the largest flow of beds or grains that rise by it, or the one."""
     if len(rows) == 1:
         return [_end_of_range(rows.iloc[0], told, telling, "")]
@@ -419,7 +430,7 @@ def _range(rows: pd.DataFrame, told: Quantity, telling: Sequence[str]) -> list[N
 
 
 def _end_of_range(
-    row: pd.Series, told: Quantity, telling: Sequence[str], which: str
+    row: pd.Series, told: ReportedQuantity, telling: Sequence[str], which: str
 ) -> Number:
     """The least or the largest flow of several beds or grains."""
     what = ", ".join(labels.told(row, list(telling)[:3]))
@@ -429,7 +440,9 @@ def _end_of_range(
     is_bed = "fraction" in row
     of_what = single.interval_of(row, NUMBERS if is_bed else single.LOAD_STEP)
     meaning = f"{which}{told.name} that {moves}: {what}"
-    return single.reported(row, told, meaning, single.place_of(told, row), of_what)
+    return single.reported_number(
+        row, told, meaning, single.place_of_quantity(told, row), of_what
+    )
 
 
 def _usable_number(count: int, of: int) -> Number:
@@ -469,7 +482,7 @@ def _of_mixture(row: pd.Series, results: Results) -> Card:
         measured=beside[0],
         measured_last=beside[-1],
     )
-    told = single.quantity(row)
+    told = single.quantity_of_row(row)
     flow = ustar_number(row) if told is STRESS else share(row, told)
     pile = results.plan.piles[str(row["scene_id"])]
     name = kind_of_grain(float(row["d_m"]))
@@ -507,8 +520,8 @@ def measured_of_size(row: pd.Series, size: float) -> float:
 def _of_grains(grains: pd.DataFrame) -> Card:
     """The card of one grain, or of several."""
     if is_one_grain(grains):
-        return of_grain(grains.iloc[0])
-    told = sheets.quantity(grains)
+        return card_of_grain(grains.iloc[0])
+    told = sheets.quantity_of_rows(grains)
     usable = grains[valid(grains)]
     shown = usable if len(usable) else grains
     shown = shown.sort_values("ustar0_m_s", kind="stable")
@@ -525,7 +538,7 @@ def _of_grains(grains: pd.DataFrame) -> Card:
     )
 
 
-def of_grain(row: pd.Series) -> Card:
+def card_of_grain(row: pd.Series) -> Card:
     """Make the card of one grain: speed, friction velocity and stress.
 
     Parameters
@@ -538,7 +551,7 @@ def of_grain(row: pd.Series) -> Card:
     Card
         The card.
     """
-    return single.card(row)
+    return single.single_card(row)
 
 
 def by_law(row: pd.Series) -> dict[str, tuple[float, bool]]:
@@ -585,7 +598,7 @@ def _of_laws(results: Results, best: Sequence[theory.Line]) -> Card:
             decimals=2,
         ),
     ]
-    grains = sheets.single_grains(results)
+    grains = sheets.single_grains_sheet(results)
     piles = results.joined("pile_threshold")
     count = int(grains["usable"].sum()) if len(grains) else 0
     of = len(grains)
@@ -593,7 +606,7 @@ def _of_laws(results: Results, best: Sequence[theory.Line]) -> Card:
         count += int(piles["usable"].sum())
         of += len(piles)
     law = labels.value("force_law", first.law)
-    said = " ".join(each.sentence for each in theory.nearest(results)[1:])
+    said = " ".join(each.sentence for each in theory.nearest_lines(results)[1:])
     word = "usable" if count == of else f"usable, with gaps: {count} of {of} thresholds"
     mark: Mark = "good" if count == of else "care"
     return Card(
@@ -628,9 +641,9 @@ def _behind(aspect: float, rows: pd.DataFrame) -> Number:
     row = rows.iloc[0]
     model = labels.value("turbulence_model", row["turbulence_model"])
     ends = rows["reattachment_over_h"].fillna(0.0)
-    measured = single.known(row["measured_reattachment_over_h"])
+    measured = single.known_number(row["measured_reattachment_over_h"])
     return Number(
-        single.known(row["reattachment_over_h"]) if ends.iloc[0] else 0.0,
+        single.known_number(row["reattachment_over_h"]) if ends.iloc[0] else 0.0,
         "heights",
         f"behind the crest the flow runs back, of a hill of half length {aspect:g} h",
         f"by {model}; 0: it runs back nowhere",

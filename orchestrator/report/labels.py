@@ -26,7 +26,7 @@ OF_METHODS = {"DEM", "DEM of piles", "DEM and peeling", "DEM and peeling of pile
 """Scopes of fields that have no effect by other methods."""
 
 
-def words(column: str) -> Info:
+def info_of(column: str) -> Info:
     """Look up the words of a column.
 
     Parameters
@@ -44,7 +44,7 @@ def words(column: str) -> Info:
     return fields.COLUMNS[column].info
 
 
-def plain(column: str, value: Any) -> str:
+def value_text(column: str, value: Any) -> str:
     """Write a value with its symbol or its label.
 
     Parameters
@@ -64,7 +64,7 @@ def plain(column: str, value: Any) -> str:
     >>> plain("d_m", 7e-4)
     'd = 0.7 mm'
     """
-    info = words(column)
+    info = info_of(column)
     if isinstance(value, str):
         return info.choices.get(value, f"{info.label} {value}")
     if pd.isna(value):
@@ -93,7 +93,7 @@ def value(column: str, value: Any) -> str:
     >>> value("alpha_deg", 15.0)
     '15°'
     """
-    info = words(column)
+    info = info_of(column)
     if isinstance(value, str):
         return info.choices.get(value, value)
     if pd.isna(value):
@@ -119,7 +119,7 @@ def cells(rows: pd.DataFrame, columns: Sequence[str]) -> dict[str, list[str]]:
     written = {}
     for column in columns:
         texts = [value(column, item) for item in rows[column]]
-        written[words(column).label] = texts
+        written[info_of(column).label] = texts
     return written
 
 
@@ -142,7 +142,7 @@ def told(row: pd.Series, columns: Sequence[str]) -> list[str]:
     for column in columns:
         is_list = column == "obstacles"
         if is_list or pd.notna(row[column]):
-            texts.append(plain(column, row[column]))
+            texts.append(value_text(column, row[column]))
     return texts
 
 
@@ -186,7 +186,7 @@ def amount(value: float, unit: str) -> str:
     ('74.64 mm', '30 %', 'd/30')
     """
     if unit in ("d", "h"):
-        return ratio_of(value, unit)
+        return ratio_in_words(value, unit)
     if unit == "m":
         return f"{value:.4g} m" if abs(value) >= 1 else f"{1e3 * value:.4g} mm"
     if unit == "%":
@@ -226,7 +226,7 @@ def interval(low: float, high: float, digits: int = 3, form: str = "#g") -> str:
     return "—"
 
 
-def ratio_of(ratio: float, length: str) -> str:
+def ratio_in_words(ratio: float, length: str) -> str:
     """Write a length over another.
 
     Parameters
@@ -251,7 +251,7 @@ def ratio_of(ratio: float, length: str) -> str:
     return f"{length}/{whole}" if is_part else f"{ratio:.3g} {length}"
 
 
-def methods(rows: pd.DataFrame) -> str:
+def method_names(rows: pd.DataFrame) -> str:
     """Name the methods that answered rows of a table.
 
     Parameters

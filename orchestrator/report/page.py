@@ -92,7 +92,7 @@ def caption(name: str, /, **values: Any) -> str:
     return " ".join(str(macro(**values)).split())
 
 
-def written(text: str, /, **values: Any) -> str:
+def filled(text: str, /, **values: Any) -> str:
     """Fill the text of a caption.
 
     Parameters
@@ -111,7 +111,7 @@ def written(text: str, /, **values: Any) -> str:
     return " ".join(template.render(**values).split())
 
 
-def said(name: str, /, **values: Any) -> Markup:
+def page_text(name: str, /, **values: Any) -> Markup:
     """Write what the page of a study says somewhere.
 
     Parameters
@@ -450,7 +450,7 @@ def versions(solvers: Mapping[str, str]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["program", "version"])
 
 
-def write(
+def write_page(
     folder: Folder,
     name: str,
     title: str,
@@ -524,5 +524,5 @@ def write_experiment(
         listed.append(replace(section, content=content))
     files: list[Element] = [Table(versions(solvers))]
     if any(section.figures for section in sections):
-        files.insert(0, Text(said("files_of_figures")))
-    write(folder, name, title, [*listed, Section("Files", files)])
+        files.insert(0, Text(page_text("files_of_figures")))
+    write_page(folder, name, title, [*listed, Section("Files", files)])

@@ -73,7 +73,7 @@ def remarks(results: Results) -> list[Remark]:
         study.
     """
     piles = results.joined("pile_threshold")
-    table = piles if len(piles) else sheets.single_grains(results)
+    table = piles if len(piles) else sheets.single_grains_sheet(results)
     if table.empty:
         return [*_questions(results)]
     said = [*_of_laws(results), *_correction(results, table), *_questions(results)]
@@ -85,7 +85,7 @@ def remarks(results: Results) -> list[Remark]:
     usual = [FIRST_MOTION]
     if table["rho_f_kg_m3"].map(is_gas).any():
         usual = [DRY_GRAINS, FIRST_MOTION]
-        if sheets.quantity(table) is WIND:
+        if sheets.quantity_of_rows(table) is WIND:
             usual.insert(0, over_ground(table))
     return said + usual[: max(0, MOST - len(said))]
 
@@ -133,7 +133,7 @@ def _of_laws(results: Results) -> Iterator[Remark]:
     best = theory.best(theory.ranked(results))
     if len(best) <= theory.MANY:
         return
-    for found in theory.nearest(results):
+    for found in theory.nearest_lines(results):
         head = f"{found.of}:" if found.of else "Where no law is as measured."
         yield Remark(head, found.text)
 

@@ -200,7 +200,7 @@ def measured_hills(results: Results) -> Iterator[tuple[float, pd.DataFrame]]:
         yield hill.aspect, rows
 
 
-def split(
+def split_by(
     table: pd.DataFrame, *by: str
 ) -> Iterator[tuple[tuple[Hashable, ...], pd.DataFrame]]:
     """List the parts of a table that agree in some columns.

@@ -14,7 +14,7 @@ from orchestrator.report.page import (
     Section,
     Table,
     Text,
-    said,
+    page_text,
     versions,
 )
 from orchestrator.report.results import Results, valid
@@ -63,7 +63,7 @@ def of_study(
     undrawn = [figure for figure in figures if not figure.image]
     found.append(_figures(others, undrawn, faults, bool(head)))
     if failures:
-        text = said("failures", causes=failures, links=links(results))
+        text = page_text("failures", causes=failures, links=links(results))
         found.append(Section("Cases that failed", [Text(text)], "failed", "Failures"))
     found.append(_methods(results))
     found.append(_files(results))
@@ -102,10 +102,10 @@ def _answer(
     results: Results, failures: Mapping[str, str], guests: Sequence[Guest]
 ) -> Section:
     """The card, and how many cases failed."""
-    content: list[Element] = [words.card(results, guests)]
+    content: list[Element] = [words.answer_card(results, guests)]
     if failures:
         of = len(results.plan.cases)
-        text = said("failures_at_the_head", count=len(failures), of=of)
+        text = page_text("failures_at_the_head", count=len(failures), of=of)
         content.append(Text(text))
     return Section("", content, "answer")
 
@@ -117,7 +117,7 @@ def _thresholds(results: Results) -> Iterator[Section]:
     if sheet is None:
         return
     content: list[Element] = [sheet]
-    every = sheets.piles(results)
+    every = sheets.piles_sheet(results)
     if every is not None and len(every) > len(sheet.frame):
         fold = f"All {len(every)} thresholds with their cases"
         content.append(Table(every, "tables/pile_threshold.csv", fold=fold))
@@ -130,8 +130,8 @@ def _thresholds(results: Results) -> Iterator[Section]:
 def _limits(results: Results) -> Section:
     """The caveats of the answer."""
     content: list[Element] = [
-        Text(said("remarks", remarks=remarks.remarks(results))),
-        Text(said("counted", counts=counts(results), scenes=len(results.scenes))),
+        Text(page_text("remarks", remarks=remarks.remarks(results))),
+        Text(page_text("counted", counts=counts(results), scenes=len(results.scenes))),
     ]
     return Section("Caveats", content, "limits", "Caveats")
 
@@ -150,7 +150,7 @@ def _figures(
         )
     content += drawn
     if undrawn:
-        content.append(Text(said("on_demand", figures=undrawn)))
+        content.append(Text(page_text("on_demand", figures=undrawn)))
     title = "More figures" if are_further else "Figures"
     return Section(title, content, "figures", "Figures", in_grid=True)
 
@@ -161,17 +161,17 @@ def _methods(results: Results) -> Section:
     fidelities = sheets.fidelities(results)
     if fidelities is not None:
         content += [
-            Text(said("fidelities", tolerance=results.study.tolerance)),
+            Text(page_text("fidelities", tolerance=results.study.tolerance)),
             Table(fidelities, "tables/pile_threshold.csv", 3),
-            Text(said("intervals")),
+            Text(page_text("intervals")),
         ]
         if "check" in results.tables:
-            content.append(Text(said("checked", checks=results.tables["check"])))
+            content.append(Text(page_text("checked", checks=results.tables["check"])))
     content += _beside_measurements(results)
     content.append(Text(_left_out(results)))
     programs = versions(case.programs(results.cases, results.plan.cases))
     content += [
-        Text(said("force_laws")),
+        Text(page_text("force_laws")),
         Table(sheets.force_laws(results)),
         Table(sheets.parameters(results), fold="All parameters"),
         Table(programs, fold="Versions of the programs"),
@@ -181,11 +181,11 @@ def _methods(results: Results) -> Section:
 
 def _beside_measurements(results: Results) -> Iterator[Element]:
     """What single grains in water are compared with; nothing where that is nothing."""
-    measured = theory.section(results)
+    measured = theory.theory_section(results)
     if measured is None:
         return
     file = "tables/single_grain.csv"
-    yield Text(said("measured", measured=measured))
+    yield Text(page_text("measured", measured=measured))
     best, every = measured["best"], measured["every"]
     if len(best) <= theory.MANY:
         yield Table(best, file)
@@ -200,7 +200,7 @@ def _left_out(results: Results) -> Any:
     eq10 = None
     if results.flows:
         eq10 = solved.eq10_over_wall(results, tuple(results.flows))
-    return said(
+    return page_text(
         "left_out",
         paper_pair=scenes["force_law"].isin(theory.PAIR).any(),
         eq10=eq10,
@@ -214,8 +214,8 @@ def _files(results: Results) -> Section:
     """The files beside the page, and how a case is run by hand."""
     last = ["NAME", *links(results)][-1]
     content: list[Element] = [
-        Text(said("files", results=results, case=last)),
-        Text(said("study_file", text=results.study.text), "Study file"),
+        Text(page_text("files", results=results, case=last)),
+        Text(page_text("study_file", text=results.study.text), "Study file"),
     ]
     return Section("Files", content, "files", "Files")
 

@@ -13,8 +13,15 @@ from orchestrator.grains.threshold import STEP
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import LAWS
 from orchestrator.report import counted, labels, single
-from orchestrator.report.results import Results, measured_hills, split
-from orchestrator.report.subjects import MEAN, STRESS, TERMS, WIND, Quantity, has_wind
+from orchestrator.report.results import Results, measured_hills, split_by
+from orchestrator.report.subjects import (
+    MEAN,
+    STRESS,
+    TERMS,
+    WIND,
+    ReportedQuantity,
+    has_wind,
+)
 from orchestrator.study import fields
 from orchestrator.tables.facts import needs_run
 
@@ -62,7 +69,7 @@ class Sheet:
     file: str = ""
 
 
-def quantity(rows: pd.DataFrame) -> Quantity:
+def quantity_of_rows(rows: pd.DataFrame) -> ReportedQuantity:
     """Choose what the flows of some rows are told by.
 
     Parameters
@@ -101,7 +108,7 @@ def short(results: Results) -> Sheet | None:
     every = results.joined("pile_threshold")
     if len(every):
         return _of_piles(results, every)
-    grains = single_grains(results)
+    grains = single_grains_sheet(results)
     if grains.empty:
         return None
     keys = [*EACH, *labels.varying(grains, *EACH), "by"]
@@ -156,7 +163,7 @@ def _first_grains(
 
 def _heads_of(keys: Sequence[str], frame: pd.DataFrame) -> list[str]:
     """The heads in a table of the columns that name its beds."""
-    heads = [labels.words(column).label for column in keys]
+    heads = [labels.info_of(column).label for column in keys]
     return [head for head in heads if head in frame]
 
 
@@ -169,7 +176,7 @@ def _first_grain(
     """
     if not row["first_ustar0_m_s"] > 0:
         return frame
-    told = single.quantity(row)
+    told = single.quantity_of_row(row)
     values = {**dict.fromkeys(frame.columns, "—"), **named}
     heads = _heads(told)
     values[heads[0]] = f"{row[f'first_{told.column()}']:#.3g}"
@@ -190,7 +197,7 @@ def _fits(rows: pd.DataFrame, keys: Sequence[str]) -> bool:
     return len(rows[list(keys)].drop_duplicates()) <= MOST_LISTED
 
 
-def piles(results: Results) -> pd.DataFrame | None:
+def piles_sheet(results: Results) -> pd.DataFrame | None:
     """List the thresholds of the piles at every fraction.
 
     Parameters
@@ -214,7 +221,7 @@ def piles(results: Results) -> pd.DataFrame | None:
     return _thresholds(rows, keys, more=("case", "count"))
 
 
-def single_grains(results: Results) -> pd.DataFrame:
+def single_grains_sheet(results: Results) -> pd.DataFrame:
     """List single grains with their thresholds: by DEM, or else by the closed form.
 
     Parameters
@@ -242,11 +249,11 @@ def single_grains(results: Results) -> pd.DataFrame:
 def _sheet(rows: pd.DataFrame, keys: Sequence[str], name: str) -> Sheet:
     """A table of thresholds, without the columns in which all rows agree."""
     frame = _thresholds(rows, keys)
-    told_by = quantity(rows)
+    told_by = quantity_of_rows(rows)
     shared = []
     is_single = len(frame) == 1
     for column in keys:
-        head = labels.words(column).label
+        head = labels.info_of(column).label
         if column in ("fraction", "by") and not is_single:
             continue
         if head in frame and frame[head].nunique() == 1:
@@ -264,7 +271,7 @@ def _sheet(rows: pd.DataFrame, keys: Sequence[str], name: str) -> Sheet:
     return Sheet(title, frame, tuple(shared), terms, f"tables/{name}.csv")
 
 
-def _heads(told: Quantity) -> tuple[str, str, str]:
+def _heads(told: ReportedQuantity) -> tuple[str, str, str]:
     """The heads of a quantity, of its interval and of what was measured."""
     name = HEADS[told]
     return (
@@ -302,7 +309,7 @@ def _thresholds(
         rows = rows.sort_values([*keys], kind="stable")
     else:
         rows = rows.sort_values(["alpha_deg", "d_m"], kind="stable")
-    told = quantity(rows)
+    told = quantity_of_rows(rows)
     rows = _open_ended(rows, "shields_low", "shields_high")
     rows = _open_ended(rows, told.column("_low"), told.column("_high"))
     number = rows.groupby(list(keys), dropna=False, sort=False).ngroup()
@@ -331,7 +338,7 @@ def _different(rows: pd.DataFrame, *columns: str) -> list[str]:
 
 
 def _columns(
-    told: Quantity, known: Collection[str], is_range: bool, with_models: bool
+    told: ReportedQuantity, known: Collection[str], is_range: bool, with_models: bool
 ) -> dict[str, list[str]]:
     """The columns of a table of thresholds that have values, by their heads."""
     value, interval, measured = _heads(told)
@@ -397,7 +404,7 @@ def _or_nowhere(distance: float) -> str:
     return f"{distance:.1f}" if distance > 0 else "nowhere"
 
 
-def sizes(results: Results) -> Sheet | None:
+def sizes_sheet(results: Results) -> Sheet | None:
     """List the thresholds of the sizes of mixtures at one fraction.
 
     Parameters
@@ -604,7 +611,7 @@ def fidelities(results: Results) -> pd.DataFrame | None:
     meanings = {one.name: one.meaning for one in (*FIDELITIES, LOCAL, OWN_NUMBERS)}
     table = results.joined("pile_threshold")
     rows = []
-    for (name, why), group in split(table, "fidelity", "why"):
+    for (name, why), group in split_by(table, "fidelity", "why"):
         error = 100 * group["error_estimate"].max()
         beds = group["scene_id"].nunique()
         rows.append((name, meanings[str(name)], why, beds, error))

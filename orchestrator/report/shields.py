@@ -16,7 +16,7 @@ from orchestrator.physics.fluids import ALIKE, NUMBERS_OF_PAPER
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import MEASURED_SOURCE
 from orchestrator.report import labels, style, theory
-from orchestrator.report.results import Results, held, split, valid
+from orchestrator.report.results import Results, held, split_by, valid
 from orchestrator.report.style import Look
 from orchestrator.report.theory import BINS, Going, Line
 from orchestrator.study import fields
@@ -113,7 +113,7 @@ def by_stress(piles: pd.DataFrame) -> Iterator[OfStress]:
         yield OfStress("", title, ", by the wall stress", others)
 
 
-class Sheet(NamedTuple):
+class DiagramSheet(NamedTuple):
     """Panels of one figure, and the rows that they show.
 
     Attributes
@@ -137,7 +137,7 @@ class Sheet(NamedTuple):
 
 def sheets(
     rows: pd.DataFrame, keys: list[str], height: float, x: str, y: str, **layout: Any
-) -> Iterator[Sheet]:
+) -> Iterator[DiagramSheet]:
     """Figures of panels by some columns, those of the most scenes first.
 
     Parameters
@@ -158,7 +158,7 @@ def sheets(
     Sheet
         One for each figure.
     """
-    panels = [part for _, part in split(rows, *keys)]
+    panels = [part for _, part in split_by(rows, *keys)]
 
     def most_scenes_first(number: int) -> tuple[int, int]:
         return -panels[number]["scene_id"].nunique(), number
@@ -170,7 +170,7 @@ def sheets(
         tall = 1.3 * height if is_alone else height
         titles = [labels.panel(part.iloc[0], keys) for part in parts]
         made = cache(partial(style.grid, titles, tall, x, y, **layout))
-        yield Sheet(name, title, parts, pd.concat(parts), made)
+        yield DiagramSheet(name, title, parts, pd.concat(parts), made)
 
 
 def parted(table: pd.DataFrame, *shown: str) -> tuple[list[str], pd.DataFrame]:
@@ -208,7 +208,7 @@ def parted(table: pd.DataFrame, *shown: str) -> tuple[list[str], pd.DataFrame]:
     names = {}
     for number, group in table.groupby(shape):
         law = labels.value("force_law", group["force_law"].iloc[0])
-        told = [labels.methods(group), law, *labels.told(group.iloc[0], looks)]
+        told = [labels.method_names(group), law, *labels.told(group.iloc[0], looks)]
         told += [f"several {_name_of(one)}" for one in together if _differs(group[one])]
         names[number] = ", ".join(dict.fromkeys(told))
     markers = dict(enumerate(SHAPES))
@@ -223,7 +223,7 @@ def _differs(column: pd.Series) -> bool:
 
 def _name_of(column: str) -> str:
     """The symbol of a column, or its label where it has none."""
-    info = labels.words(column)
+    info = labels.info_of(column)
     return info.symbol or info.label
 
 
@@ -253,15 +253,15 @@ def about(rows: pd.DataFrame) -> dict[str, Any]:
         values = rows.loc[is_run, column] * scale
         return ", ".join(f"{value:.6g}" for value in sorted(set(values)))
 
-    drawn = theory.drawn(rows["force_law"])
+    drawn = theory.drawn_laws(rows["force_law"])
     is_sloped = bool((rows["alpha_deg"] > 0).any())
     of_the_points = {
         "laws": "; ".join(labels.value("force_law", name) for name in drawn),
         "pair": theory.PAIR[0] in drawn,
         "is_open": not valid(rows).all(),
         "viscosities": rows["nu_m2_s"].nunique(),
-        "methods": labels.methods(rows),
-        "others": labels.methods(rows[~is_run]),
+        "methods": labels.method_names(rows),
+        "others": labels.method_names(rows[~is_run]),
         "dem": is_run.any(),
         "stress": _stresses(rows),
         "increment": used("load_increment", 100.0),
@@ -305,7 +305,7 @@ def ends(scenes: pd.DataFrame, *drawn: pd.DataFrame) -> tuple[float, float]:
     return float(reach.min()) / 2, float(reach.max()) * 2
 
 
-def prepare(sheet: Sheet, xlim: tuple[float, float]) -> None:
+def log_axes(sheet: DiagramSheet, xlim: tuple[float, float]) -> None:
     """Set logarithmic axes over all lines in a range of Re*, when all is drawn.
 
     Parameters
@@ -361,7 +361,7 @@ def shade_transition(ax: Axes, rows: pd.DataFrame) -> None:
     ax.set_xlim(low, high)
 
 
-class Curve(NamedTuple):
+class DrawnCurve(NamedTuple):
     """A closed form as it is drawn.
 
     Attributes
@@ -441,7 +441,7 @@ def diagram(
     ax: Axes,
     scenes: pd.DataFrame,
     xlim: tuple[float, float],
-    curves: Iterable[Curve],
+    curves: Iterable[DrawnCurve],
     points: Iterable[Points],
     slopes: Mapping[Any, str] | None = None,
 ) -> list[tuple[Line2D, pd.DataFrame]]:
@@ -480,7 +480,7 @@ def curves_of(
     criteria: Iterable[str],
     name: Callable[[Line | Going], str],
     look: Callable[[Line | Going], tuple[str, theory.Dash, float]],
-) -> Iterator[Curve]:
+) -> Iterator[DrawnCurve]:
     """Make the curves of what is answered, by its criteria.
 
     Where no curve of sustained motion is known, that of entrainment stands there.
@@ -508,7 +508,9 @@ def curves_of(
         colour, _, width = look(curve)
         points = np.array([curve.reynolds, curve.tau])
         label = f"{name(curve)}, {theory.GOING}"
-        yield Curve(label, colour, GOING_DASH, width, points, curve.holds, ~curve.holds)
+        yield DrawnCurve(
+            label, colour, GOING_DASH, width, points, curve.holds, ~curve.holds
+        )
     if going and asked == {SUSTAINED}:
         return
     for line in lines:
@@ -518,7 +520,7 @@ def curves_of(
         holds = line.holds(REYNOLDS)
         dotted = line.near(REYNOLDS) & ~holds
         points = np.array([REYNOLDS, line.tau(REYNOLDS)])
-        yield Curve(label, *look(line), points, holds, dotted)
+        yield DrawnCurve(label, *look(line), points, holds, dotted)
 
 
 def _draw_points(
@@ -635,7 +637,7 @@ def _draw_water(ax: Axes, xlim: tuple[float, float]) -> None:
 
 def panels(
     rows: pd.DataFrame, by: str, colours: Mapping[Any, str], height: float = 2.5
-) -> Iterator[tuple[Sheet, pd.DataFrame, Callable[[], Canvas]]]:
+) -> Iterator[tuple[DiagramSheet, pd.DataFrame, Callable[[], Canvas]]]:
     """Shields diagrams of single grains or of piles, with closed forms, in panels.
 
     Parameters
@@ -672,7 +674,7 @@ def panels(
 
 
 def _draw_panels(
-    sheet: Sheet, shown: pd.DataFrame, by: str, colours: Mapping[Any, str]
+    sheet: DiagramSheet, shown: pd.DataFrame, by: str, colours: Mapping[Any, str]
 ) -> Canvas:
     """The panels of a figure."""
     xlim = ends(sheet.rows, shown)
@@ -681,13 +683,13 @@ def _draw_panels(
     for ax, part in zip(sheet.panels()[1], sheet.parts, strict=True):
         here = shown[shown["scene_id"].isin(part["scene_id"])]
         points = []
-        for (value,), group in split(here, by):
+        for (value,), group in split_by(here, by):
             columns = PILE if by == "fraction" else DEM
             is_joined = by == "fraction"
             points.append(Points(group, colours[value], columns, are_joined=is_joined))
         curves = _curves_of_part(part, by, colours, dashes)
         diagram(ax, part, xlim, curves, points, slopes)
-    prepare(sheet, xlim)
+    log_axes(sheet, xlim)
     return legends(sheet, by, {} if by == "force_law" else colours)
 
 
@@ -696,7 +698,7 @@ def _curves_of_part(
     by: str,
     colours: Mapping[Any, str],
     dashes: Mapping[str, theory.Dash],
-) -> Iterator[Curve]:
+) -> Iterator[DrawnCurve]:
     """The closed forms of a panel, in the colours of the laws or of the column `by`."""
     criteria = set(part["criterion"].dropna())
     going = theory.sustained_curves(part) if SUSTAINED in criteria else []
@@ -714,13 +716,13 @@ def _curves_of_part(
         bed = dict(zip(theory.BED, each.bed, strict=True))
         return colours.get(bed.get(by), "0.2"), dashes.get(each.law), width
 
-    return curves_of(theory.lines(part), going, criteria, name, look)
+    return curves_of(theory.measured_lines(part), going, criteria, name, look)
 
 
 def _join_piles(ax: Axes, group: pd.DataFrame, colour: str) -> None:
     """Lines through piles that differ in the diameter alone; others are a scatter."""
     joined = []
-    for _, series in split(group, *SERIES):
+    for _, series in split_by(group, *SERIES):
         if series["d_m"].is_unique:
             points = series.sort_values("reynolds")[["reynolds", "shields"]]
             joined.append(np.vstack([points, GAP]))
@@ -728,7 +730,7 @@ def _join_piles(ax: Axes, group: pd.DataFrame, colour: str) -> None:
         ax.plot(*np.concatenate(joined).T, color=colour, lw=0.6, zorder=2)
 
 
-def legends(sheet: Sheet, column: str, colours: Mapping[Any, str]) -> Canvas:
+def legends(sheet: DiagramSheet, column: str, colours: Mapping[Any, str]) -> Canvas:
     """Write legends: of colours above the panels, of all labels below them.
 
     Parameters
@@ -750,12 +752,12 @@ def legends(sheet: Sheet, column: str, colours: Mapping[Any, str]) -> Canvas:
     top = []
     for value, colour in colours.items():
         if value in used:
-            top.append(style.entry(labels.plain(column, value), colour))
-    style.legends(canvas, top, style.samples(axes))
+            top.append(style.entry(labels.value_text(column, value), colour))
+    style.legends_below(canvas, top, style.samples(axes))
     return canvas
 
 
-def single_grains(results: Results) -> pd.DataFrame:
+def diagram_rows(results: Results) -> pd.DataFrame:
     """List the single grains under a held flow.
 
     Grains under a ramp of the flow are left out: a ramp gives no threshold.

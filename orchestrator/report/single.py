@@ -19,7 +19,7 @@ from orchestrator.report.subjects import (
     STRESS,
     USTAR,
     WIND,
-    Quantity,
+    ReportedQuantity,
     fluid,
     has_wind,
     length,
@@ -35,7 +35,7 @@ LOAD_STEP = "the load step"
 """What the numerical interval of a single grain is of."""
 
 
-def card(row: Row) -> Card:
+def single_card(row: Row) -> Card:
     """Make the card of one grain.
 
     Parameters
@@ -48,7 +48,7 @@ def card(row: Row) -> Card:
     Card
         With speed, friction velocity and stress.
     """
-    told = quantity(row)
+    told = quantity_of_row(row)
     size = length(float(row["d_m"]))
     # rows of `threshold` have no column for the criterion, and this one for
     # sustained motion alone
@@ -66,7 +66,7 @@ def card(row: Row) -> Card:
     )
 
 
-def known(value: Any) -> float:
+def known_number(value: Any) -> float:
     """Read a number of a row.
 
     Parameters
@@ -82,7 +82,7 @@ def known(value: Any) -> float:
     return math.nan if value is None else float(value)
 
 
-def quantity(row: Row) -> Quantity:
+def quantity_of_row(row: Row) -> ReportedQuantity:
     """Choose what the flow of a row is told by.
 
     Parameters
@@ -96,9 +96,9 @@ def quantity(row: Row) -> Quantity:
         Of a wind its speed, of other flows with a depth the mean velocity, else the
         stress.
     """
-    if has_wind(float(row["rho_f_kg_m3"]), known(row.get("depth_m"))):
+    if has_wind(float(row["rho_f_kg_m3"]), known_number(row.get("depth_m"))):
         return WIND
-    if known(row.get(MEAN.column())) > 0:
+    if known_number(row.get(MEAN.column())) > 0:
         return MEAN
     return STRESS
 
@@ -122,7 +122,7 @@ def is_level(row: Row) -> bool:
     return shape.is_level
 
 
-def place_of(quantity_: Quantity, row: Row) -> str:
+def place_of_quantity(quantity_: ReportedQuantity, row: Row) -> str:
     """Say where a quantity of a row's flow is measured.
 
     Parameters
@@ -138,7 +138,7 @@ def place_of(quantity_: Quantity, row: Row) -> str:
         The place, in words.
     """
     if quantity_ is MEAN:
-        if known(row.get("bed_slope")) > 0:
+        if known_number(row.get("bed_slope")) > 0:
             return f"of a wide channel that falls by {row['bed_slope']:g}"
         return f"over a depth of {row['depth_m']:g} m"
     if quantity_ is WIND and not is_level(row) and row["bed"] == "pile":
@@ -159,7 +159,7 @@ def _scene_of_grain(row: Row) -> str:
     return f"One grain of {grain} on {bed}, in {within}."
 
 
-def numbers_of_grain(row: Row, told: Quantity) -> tuple[Number, ...]:
+def numbers_of_grain(row: Row, told: ReportedQuantity) -> tuple[Number, ...]:
     """Make the figures of one grain.
 
     Parameters
@@ -177,27 +177,29 @@ def numbers_of_grain(row: Row, told: Quantity) -> tuple[Number, ...]:
     theta = float(row["shields"])
     notes = {
         WIND: "10 m above bare, level ground",
-        MEAN: place_of(MEAN, row) if told is MEAN else "",
+        MEAN: place_of_quantity(MEAN, row) if told is MEAN else "",
         DEPTH: "of the uniform flow whose weight along the slope is that stress",
         USTAR: "√(τ_b/ρ), the bed shear stress as a speed",
         STRESS: f"τ_b, of the undisturbed flow; critical Shields number "
         f"θ_c = τ_b/((ρ_s − ρ) g d): {theta:.3g}",
     }
-    second = DEPTH if known(row.get("bed_slope")) > 0 else USTAR
+    second = DEPTH if known_number(row.get("bed_slope")) > 0 else USTAR
     shown = [each for each in (told, second, STRESS) if each is not STRESS]
     of_what = interval_of(row, LOAD_STEP)
     numbers = []
     for each in (*dict.fromkeys(shown), STRESS):
         name = each.name if each is not STRESS else "bed shear stress"
         is_first = each is (*shown, STRESS)[0]
-        number = reported(row, each, name, notes[each], of_what if is_first else "")
+        number = reported_number(
+            row, each, name, notes[each], of_what if is_first else ""
+        )
         numbers.append(number)
     return tuple(numbers)
 
 
-def reported(
+def reported_number(
     row: Row,
-    told: Quantity,
+    told: ReportedQuantity,
     meaning: str,
     note: str = "",
     of_what: str = "",
@@ -224,14 +226,14 @@ def reported(
         With its interval and the measured value.
     """
     return Number(
-        known(row.get(f"{which}{told.column()}")),
+        known_number(row.get(f"{which}{told.column()}")),
         told.unit,
         meaning,
         note,
-        low=known(row.get(f"{which}{told.column('_low')}")),
-        high=known(row.get(f"{which}{told.column('_high')}")),
+        low=known_number(row.get(f"{which}{told.column('_low')}")),
+        high=known_number(row.get(f"{which}{told.column('_high')}")),
         interval_of=of_what,
-        measured=known(row.get(f"measured_{which}{told.column()}")),
+        measured=known_number(row.get(f"measured_{which}{told.column()}")),
     )
 
 
@@ -285,7 +287,7 @@ def tested_on(row: Row) -> str:
     return held
 
 
-def source(row: Row, told: Quantity, which: str = "") -> str:
+def source(row: Row, told: ReportedQuantity, which: str = "") -> str:
     """Say where the measured values of a card are from.
 
     Parameters
@@ -302,7 +304,7 @@ def source(row: Row, told: Quantity, which: str = "") -> str:
     str
         The sentences.
     """
-    if math.isnan(known(row["measured_level_ustar_m_s"])):
+    if math.isnan(known_number(row["measured_level_ustar_m_s"])):
         return "No measurement is near."
     size = length(float(row["d_m"]))
     alike = "this bed with "
@@ -328,7 +330,7 @@ def source(row: Row, told: Quantity, which: str = "") -> str:
     )
 
 
-def _field(row: Row, told: Quantity, which: str) -> str:
+def _field(row: Row, told: ReportedQuantity, which: str) -> str:
     """What the field sites would give, or why none is near."""
     if not row["measured_rows"] > 0:
         return "No field site is near: those have sand of 0.40 to 0.53 mm in air."

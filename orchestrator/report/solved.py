@@ -77,7 +77,7 @@ def title(results: Results, pile: Pile) -> str:
     return f"{title}, {zero} towards {profile.towards}"
 
 
-def kinds(results: Results) -> list[list[Pile]]:
+def piles_by_kind(results: Results) -> list[list[Pile]]:
     """List piles with flows by slope, height and fields that vary.
 
     Parameters
@@ -104,7 +104,7 @@ def kinds(results: Results) -> list[list[Pile]]:
     return [list(alike) for _, alike in groupby(piles, kind)]
 
 
-def drawn(results: Results) -> list[Pile]:
+def piles_with_files(results: Results) -> list[Pile]:
     """A pile for each kind of flow whose files are kept.
 
     Parameters
@@ -118,7 +118,7 @@ def drawn(results: Results) -> list[Pile]:
         The piles.
     """
     found = []
-    for kind in kinds(results):
+    for kind in piles_by_kind(results):
         kept = [pile for pile in kind if is_whole(pile.flow, results.cases)]
         found += kept[:1]
     return found

@@ -333,7 +333,9 @@ def pages(panels: Sequence[Panel]) -> Iterator[tuple[str, str, Sequence[Panel]]]
             yield f"-{number + 1}", f", more panels ({number})", shown
 
 
-def legends(figure: Canvas, colours: Sequence[Artist], looks: Sequence[Artist]) -> None:
+def legends_below(
+    figure: Canvas, colours: Sequence[Artist], looks: Sequence[Artist]
+) -> None:
     """Place the legend of colours above the panels and all other samples below them.
 
     Parameters

@@ -29,7 +29,7 @@ TERMS = {
 """Terms in plain words."""
 
 
-class Quantity(NamedTuple):
+class ReportedQuantity(NamedTuple):
     """What a flow is told by.
 
     Attributes
@@ -71,11 +71,15 @@ class Quantity(NamedTuple):
 
 WIND_HEIGHT_M = 10.0
 """Height above the ground at which a wind is told, m."""
-WIND = Quantity("wind_10m", "m/s", "wind", "wind", "10 m above the ground")
-MEAN = Quantity("mean_velocity", "m/s", "flow", "mean velocity", "over the depth")
-STRESS = Quantity("stress", "Pa", "flow", "stress", "of the flow on the bed")
-DEPTH = Quantity("depth", "m", "flow", "depth", "of the flow")
-USTAR = Quantity("ustar0", "m/s", "flow", "friction velocity", "of the flow upstream")
+WIND = ReportedQuantity("wind_10m", "m/s", "wind", "wind", "10 m above the ground")
+MEAN = ReportedQuantity(
+    "mean_velocity", "m/s", "flow", "mean velocity", "over the depth"
+)
+STRESS = ReportedQuantity("stress", "Pa", "flow", "stress", "of the flow on the bed")
+DEPTH = ReportedQuantity("depth", "m", "flow", "depth", "of the flow")
+USTAR = ReportedQuantity(
+    "ustar0", "m/s", "flow", "friction velocity", "of the flow upstream"
+)
 
 
 def has_wind(density: float, depth: float) -> bool:

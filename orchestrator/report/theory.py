@@ -25,7 +25,7 @@ from orchestrator.physics.threshold import (
 )
 from orchestrator.report import labels
 from orchestrator.report.page import caption
-from orchestrator.report.results import Results, split
+from orchestrator.report.results import Results, split_by
 from orchestrator.report.subjects import fluid
 from orchestrator.study.criterion import SUSTAINED
 from orchestrator.types import BoolArray, FloatArray
@@ -72,7 +72,8 @@ SWEEP_M = (5e-5, 1e-3)
 POINTS = 240
 """Diameters of a curve for air."""
 BED = ["alpha_deg", "beta_deg", "z0_over_d", "alpha_s"]
-"""Columns of all that a line depends on beside its law, in the order of `Bed`."""
+"""Columns of all that a line depends on beside its law, in the order of
+`LineConditions`."""
 OF_GOING_ON = (
     *BED,
     "force_law",
@@ -139,7 +140,7 @@ def look(name: str) -> tuple[str, Dash]:
     return LOOKS[list(LAWS).index(name) % len(LOOKS)]
 
 
-def drawn(names: Iterable[str]) -> list[str]:
+def drawn_laws(names: Iterable[str]) -> list[str]:
     """List the laws that are drawn for some scenes.
 
     Parameters
@@ -174,7 +175,7 @@ def dashes(names: Iterable[str]) -> dict[str, Dash]:
     """
     found: dict[str, Dash] = {}
     free = iter(DASHES)
-    for name in drawn(names):
+    for name in drawn_laws(names):
         if name in found:
             continue
         dash = next(free, None)
@@ -185,7 +186,7 @@ def dashes(names: Iterable[str]) -> dict[str, Dash]:
     return found
 
 
-class Bed(NamedTuple):
+class LineConditions(NamedTuple):
     """All that a line depends on beside its law.
 
     Attributes
@@ -220,7 +221,7 @@ class Line:
     """
 
     law: str
-    bed: Bed
+    bed: LineConditions
     first: float
     last: float
 
@@ -228,7 +229,7 @@ class Line:
     def words(self) -> tuple[str, str, str]:
         """Law and bed in words."""
         law = labels.value("force_law", self.law)
-        ratio = labels.ratio_of(self.bed.roughness_ratio, "d")
+        ratio = labels.ratio_in_words(self.bed.roughness_ratio, "d")
         return law, f"β = {self.bed.entrainment_angle_deg:g}°", f"z₀ = {ratio}"
 
     @property
@@ -352,7 +353,7 @@ class Going(NamedTuple):
     """
 
     law: str
-    bed: Bed
+    bed: LineConditions
     name: str
     reynolds: FloatArray
     tau: FloatArray
@@ -379,7 +380,7 @@ def sustained_curves(rows: pd.DataFrame) -> list[Going]:
     found = []
     rows = rows[rows["criterion"] == SUSTAINED]
     fluids = rows[["rho_f_kg_m3", "nu_m2_s"]].drop_duplicates()
-    for _, group in split(rows, *OF_GOING_ON):
+    for _, group in split_by(rows, *OF_GOING_ON):
         first = group.iloc[0]
         ends = group["d_m"].min() / BESIDE, group["d_m"].max() * BESIDE
         d = np.geomspace(*ends, SIZES)
@@ -389,7 +390,7 @@ def sustained_curves(rows: pd.DataFrame) -> list[Going]:
             continue
         grains = Grain.of_table(here)
         at = of_grains(grains, str(first["force_law"]), SUSTAINED, first["gust"])
-        bed = Bed._make(first[BED].tolist())
+        bed = LineConditions._make(first[BED].tolist())
         line = Line(str(first["force_law"]), bed, np.inf, 0.0)
         within = ""
         if len(fluids) > MOST_FLUIDS:
@@ -402,7 +403,7 @@ def sustained_curves(rows: pd.DataFrame) -> list[Going]:
     return found
 
 
-def lines(scenes: pd.DataFrame) -> list[Line]:
+def measured_lines(scenes: pd.DataFrame) -> list[Line]:
     """Make the lines through the single grains of some scenes.
 
     Parameters
@@ -416,13 +417,13 @@ def lines(scenes: pd.DataFrame) -> list[Line]:
         The lines, by rising slope, entrainment angle, roughness and lift coefficient.
     """
     listed = []
-    for key, group in split(
+    for key, group in split_by(
         scenes[[*GRAIN_COLUMNS.values(), "z0_over_d", "force_law"]], *BED
     ):
-        for law in drawn(group["force_law"]):
+        for law in drawn_laws(group["force_law"]):
             of_law = group[group["force_law"] == law]
             first, last = span(of_law)
-            listed.append(Line(law, Bed._make(key), first, last))
+            listed.append(Line(law, LineConditions._make(key), first, last))
     return listed
 
 
@@ -542,7 +543,7 @@ def ranked(results: Results) -> list[Line]:
         ones are in the order of their factor from the medians.
     """
     grains = results.beds("grain")
-    every = lines(grains[grains["alpha_deg"] == 0])
+    every = measured_lines(grains[grains["alpha_deg"] == 0])
     listed = [line for line in every if line.last]
     return sorted(
         listed, key=lambda line: (-round(line.decades, 2), line.median_factor)
@@ -612,7 +613,7 @@ def _ranges(chosen: BoolArray) -> str:
     return ", ".join(written)
 
 
-def section(results: Results) -> dict[str, Any] | None:
+def theory_section(results: Results) -> dict[str, Any] | None:
     """Make what the page's section on measurements shows.
 
     Parameters
@@ -633,13 +634,13 @@ def section(results: Results) -> dict[str, Any] | None:
     return {
         "source": MEASURED_SOURCE,
         "start": FACTORS_FROM,
-        "sentences": [each.sentence for each in nearest(results)],
-        "best": sheet(best(listed)),
-        "every": sheet(listed),
+        "sentences": [each.sentence for each in nearest_lines(results)],
+        "best": theory_sheet(best(listed)),
+        "every": theory_sheet(listed),
     }
 
 
-def sheet(listed: Iterable[Line]) -> pd.DataFrame:
+def theory_sheet(listed: Iterable[Line]) -> pd.DataFrame:
     """Make the table that compares lines with measurements.
 
     Parameters
@@ -665,7 +666,7 @@ def sheet(listed: Iterable[Line]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=list(HEAD))
 
 
-class Finding(NamedTuple):
+class LineFinding(NamedTuple):
     """What measurements say of the lines of a study.
 
     Attributes
@@ -685,7 +686,7 @@ class Finding(NamedTuple):
         return f"{self.of} is {self.text}" if self.of else self.text
 
 
-def nearest(results: Results) -> list[Finding]:
+def nearest_lines(results: Results) -> list[LineFinding]:
     """Write which line is nearest to measurements.
 
     Parameters
@@ -704,7 +705,7 @@ def nearest(results: Results) -> list[Finding]:
     return [*_nearest_in_water(listed), *_unmet(listed), *in_air]
 
 
-def _nearest_in_water(listed: Sequence[Line]) -> list[Finding]:
+def _nearest_in_water(listed: Sequence[Line]) -> list[LineFinding]:
     """The sentence on the line that is within measured ranges over most decades."""
     first = listed[0]
     _, at = first.worst
@@ -718,20 +719,20 @@ def _nearest_in_water(listed: Sequence[Line]) -> list[Finding]:
         decades=DECADES,
         start=FACTORS_FROM,
     )
-    return [Finding("Nearest to the measurements in water", sentence)]
+    return [LineFinding("Nearest to the measurements in water", sentence)]
 
 
-def _unmet(listed: Sequence[Line]) -> list[Finding]:
+def _unmet(listed: Sequence[Line]) -> list[LineFinding]:
     """The sentence on the Re* at which lines answer, none within measured ranges."""
     is_answered = np.any([np.isfinite(line.answers(GRID)) for line in listed], axis=0)
     is_met = np.any([line.met for line in listed], axis=0)
     unmet = is_answered & ~is_met
     if not unmet.any():
         return []
-    return [Finding("", caption("unmet", ranges=_ranges(unmet)))]
+    return [LineFinding("", caption("unmet", ranges=_ranges(unmet)))]
 
 
-def _nearest_in_air(results: Results, listed: Sequence[Line]) -> list[Finding]:
+def _nearest_in_air(results: Results, listed: Sequence[Line]) -> list[LineFinding]:
     """The sentence on the line that is nearest to the mean of the curves for air."""
     logs = np.log(MIDDLES)
     read = []
@@ -757,8 +758,8 @@ def _nearest_in_air(results: Results, listed: Sequence[Line]) -> list[Finding]:
     if np.isinf(min(off)):
         most = f"{max(answered)} of {len(x)}"
         said = caption("none_in_air", count=len(listed), ends=ends, most=most)
-        return [Finding("", said)]
+        return [LineFinding("", said)]
     of_first = None if np.isinf(off[0]) else off[0]
     fit = listed[int(np.argmin(off))]
     said = caption("best_in_air", fit=fit, off=min(off), of_first=of_first, ends=ends)
-    return [Finding("Nearest to the published curves for air", said)]
+    return [LineFinding("Nearest to the published curves for air", said)]

@@ -5,11 +5,11 @@ from typing import Any
 import pandas as pd
 
 from orchestrator.physics.reported import in_units
-from orchestrator.report.subjects import Quantity
+from orchestrator.report.subjects import ReportedQuantity
 from orchestrator.types import FloatArray
 
 
-def told_by(rows: Any, ustar: Any, told: Quantity) -> FloatArray:
+def told_by(rows: Any, ustar: Any, told: ReportedQuantity) -> FloatArray:
     """Take friction velocities in the unit of a quantity.
 
     Parameters

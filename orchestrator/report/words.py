@@ -17,7 +17,7 @@ MOST_LETTERS = 46
 """Letters of a column in a terminal; longer cells stand on several lines."""
 
 
-def text(results: Results, guests: Sequence[Guest] = ()) -> str:
+def answer_text(results: Results, guests: Sequence[Guest] = ()) -> str:
     """Write the answer card, its table and its caveats, for a terminal.
 
     Parameters
@@ -44,7 +44,7 @@ def text(results: Results, guests: Sequence[Guest] = ()) -> str:
         where = str(results.cases.parent)
         remedy = "`orchestrator study` of the same file runs it again"
         raise OrchestratorError(what, where, remedy)
-    answered = card(results, guests)
+    answered = answer_card(results, guests)
     table = sheet(results, guests)
     caveats = remarks.remarks(results)
     said = [*card_lines(answered)]
@@ -55,7 +55,7 @@ def text(results: Results, guests: Sequence[Guest] = ()) -> str:
     return "\n".join(said)
 
 
-def card(results: Results, guests: Sequence[Guest] = ()) -> Card:
+def answer_card(results: Results, guests: Sequence[Guest] = ()) -> Card:
     """Choose the card of a study: that of a guest, or its own.
 
     Parameters
@@ -98,10 +98,10 @@ def sheet(results: Results, guests: Sequence[Guest] = ()) -> Sheet | None:
         return sheets.hills(results)
     best = theory.best(theory.ranked(results))
     if len(best) > theory.MANY:
-        frame = theory.sheet(best)
+        frame = theory.theory_sheet(best)
         title = "The best entrainment angle and z₀ of each force law"
         return Sheet(title, frame, file="tables/single_grain.csv")
-    return sheets.sizes(results) or sheets.short(results)
+    return sheets.sizes_sheet(results) or sheets.short(results)
 
 
 def sheet_lines(table: Sheet) -> Iterator[str]:

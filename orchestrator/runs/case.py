@@ -58,7 +58,7 @@ def templates() -> Path:
     Path
         It lies beside the package, or inside it in a wheel.
     """
-    return files.beside("templates")
+    return files.beside_package("templates")
 
 
 @cache
@@ -159,7 +159,7 @@ class Case(ABC):
     """Glob patterns of the tables that `collect` makes of the results."""
     bulky: ClassVar[tuple[str, ...]] = ()
     """Large files that the run leaves, and that nothing reads once the tables are made:
-    `prune` drops them.
+    `prune_case` drops them.
 
     Those that are no results may differ in their last digits from processor to
     processor.
@@ -471,7 +471,7 @@ def marker_of(directory: Path, identity: str) -> dict[str, Any] | None:
 def run_of(directory: Path, identity: str) -> dict[str, Any] | None:
     """The marker of the case of an id whose solver has ended, whatever its tables are.
 
-    A bulky file may be missing: `prune` drops it when the tables are made.
+    A bulky file may be missing: `prune_case` drops it when the tables are made.
 
     Parameters
     ----------
@@ -556,7 +556,7 @@ def is_whole(case: Case, cases: Path) -> bool:
     return all((directory / name).is_file() for name in names)
 
 
-def prune(case: Case, cases: Path) -> None:
+def prune_case(case: Case, cases: Path) -> None:
     """Drop the bulky files that the run of a finished case left, no others.
 
     Their digests stay in the marker and in `CHECKSUMS`: a rerun by hand is still
@@ -574,7 +574,7 @@ def prune(case: Case, cases: Path) -> None:
 
 
 def prune_of(directory: Path, identity: str) -> bool:
-    """Drop the bulky files of the finished case of an id, see `prune`.
+    """Drop the bulky files of the finished case of an id, see `prune_case`.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ PACKAGE = Path(__file__).absolute().parents[1]
 """The folder of the package."""
 
 
-def beside(name: str) -> Path:
+def beside_package(name: str) -> Path:
     """Find a folder that lies beside the package, or inside it in a wheel.
 
     Parameters

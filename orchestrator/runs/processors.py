@@ -16,7 +16,7 @@ V1 = ("cpu,cpuacct", "cpu")
 groups."""
 
 
-def count(root: Path = Path("/")) -> int:
+def usable_count(root: Path = Path("/")) -> int:
     """Count the processors that this process may use.
 
     Parameters

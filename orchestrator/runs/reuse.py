@@ -56,7 +56,7 @@ def done(
     dict of str to dict
         Their markers, by name. A case is not done if one that it needs is outdated.
     """
-    with ThreadPoolExecutor(processors.count()) as pool:
+    with ThreadPoolExecutor(processors.usable_count()) as pool:
         # gigabytes of results are read
         found = [*pool.map(partial(_look, directory=directory), cases.values())]
     states: dict[str, dict[str, Any]] = {}

@@ -56,7 +56,7 @@ def _interrupt(number: int, frame: object) -> NoReturn:
     raise KeyboardInterrupt
 
 
-def check() -> None:
+def check_signals() -> None:
     """Raise KeyboardInterrupt again if a signal of `ENDING` has come since `listen`.
 
     Python drops an exception that is raised in a callback of compiled code, such as
@@ -71,7 +71,7 @@ def check() -> None:
         raise KeyboardInterrupt
 
 
-class Stream(io.FileIO):
+class StandardStream(io.FileIO):
     """A standard stream that keeps its first failure instead of raising it.
 
     The study goes on when its answer cannot be printed.
@@ -113,7 +113,9 @@ def take() -> None:
         given: TextIO | None = getattr(sys, name)
         is_replaced = given is not getattr(sys, f"__{name}__")
         if not is_replaced:
-            setattr(sys, name, _as_text(Stream(number, "w", closefd=False), given))
+            setattr(
+                sys, name, _as_text(StandardStream(number, "w", closefd=False), given)
+            )
 
 
 def _open_closed_streams() -> None:
@@ -125,7 +127,7 @@ def _open_closed_streams() -> None:
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
 
 
-def _as_text(stream: Stream, given: TextIO | None) -> TextIO:
+def _as_text(stream: StandardStream, given: TextIO | None) -> TextIO:
     """A text stream in the encoding of the one that it replaces."""
     return io.TextIOWrapper(
         io.BufferedWriter(stream),
@@ -146,4 +148,4 @@ def lost() -> OSError | None:
     sys.stdout.flush()
     buffer = getattr(sys.stdout, "buffer", None)
     raw = getattr(buffer, "raw", None)
-    return raw.failure if isinstance(raw, Stream) else None
+    return raw.failure if isinstance(raw, StandardStream) else None

@@ -28,7 +28,7 @@ from orchestrator.runs.files import (
 LOCK = ".lock"
 
 
-class Kind(NamedTuple):
+class DirectoryKind(NamedTuple):
     """A kind of contents of a directory.
 
     Attributes
@@ -43,18 +43,20 @@ class Kind(NamedTuple):
     marker: str
 
 
-STUDY = Kind("study", "study.json")
-EXPERIMENT = Kind("experiment", STUDY.marker)
-RESULTS = Kind("benchmark of the solver", "benchmark.json")
-COMPARISON = Kind("comparison with the pack", RESULTS.marker)
-PACK = Kind("benchmark pack", "manifest.json")
+STUDY = DirectoryKind("study", "study.json")
+EXPERIMENT = DirectoryKind("experiment", STUDY.marker)
+RESULTS = DirectoryKind("benchmark of the solver", "benchmark.json")
+COMPARISON = DirectoryKind("comparison with the pack", RESULTS.marker)
+PACK = DirectoryKind("benchmark pack", "manifest.json")
 KINDS = (STUDY, EXPERIMENT, RESULTS, COMPARISON, PACK)
 STATE = "report.json"
 """Marker that what is drawn was finished, and of which cases."""
 
 
 @contextlib.contextmanager
-def claimed(root: Path, kind: Kind, name: str, *, new: bool = True) -> Iterator[Folder]:
+def claimed(
+    root: Path, kind: DirectoryKind, name: str, *, new: bool = True
+) -> Iterator[Folder]:
     """Make a directory for contents of a kind and a name, and hold it for a block.
 
     It may also be empty, or hold these contents already.
@@ -115,7 +117,7 @@ def claimed(root: Path, kind: Kind, name: str, *, new: bool = True) -> Iterator[
         lock.release()
 
 
-def read_marker(root: Path, kind: Kind) -> dict[str, Any]:
+def read_marker(root: Path, kind: DirectoryKind) -> dict[str, Any]:
     """Read the marker of a kind.
 
     Parameters
@@ -134,7 +136,7 @@ def read_marker(root: Path, kind: Kind) -> dict[str, Any]:
     return value if {"kind", "name"} <= value.keys() else {}
 
 
-def _check(folder: Folder, kind: Kind, name: str) -> None:
+def _check(folder: Folder, kind: DirectoryKind, name: str) -> None:
     """See that a directory holds nothing but what is claimed, and no links."""
     root = folder.root
     remedy = "choose an empty or a new one: --out"
@@ -195,7 +197,9 @@ class Workspace(Folder):
             return isinstance(error, BlockingIOError)
         return False
 
-    def check(self, kind: Kind, name: str, source: Mapping[str, object]) -> None:
+    def check(
+        self, kind: DirectoryKind, name: str, source: Mapping[str, object]
+    ) -> None:
         """Refuse a directory that `claimed` or `describe` refuse; write nothing.
 
         Parameters
@@ -216,7 +220,7 @@ class Workspace(Folder):
 
     def describe(
         self,
-        kind: Kind,
+        kind: DirectoryKind,
         name: str,
         cases: Iterable[str],
         source: Mapping[str, object],
@@ -265,7 +269,7 @@ class Workspace(Folder):
             self.note(kind.marker, files.text_of(value))
         return changed
 
-    def _check_file(self, kind: Kind, name: str, file: object) -> None:
+    def _check_file(self, kind: DirectoryKind, name: str, file: object) -> None:
         """Refuse a directory of another study file, which is still there."""
         other = self._file_of_another(read_marker(self.root, kind), file)
         if other:
@@ -390,7 +394,7 @@ class Workspace(Folder):
             raise OrchestratorError(what, str(self.root), remedy)
 
 
-def beside(root: Path, *parents: Path) -> tuple[Path, ...]:
+def other_results(root: Path, *parents: Path) -> tuple[Path, ...]:
     """List the other directories of studies and experiments beside one.
 
     Parameters
@@ -522,7 +526,9 @@ def status(directory: Path) -> tuple[str, bool]:
     return "\n".join(map(printable, lines)), bool(causes)
 
 
-def prune(space: Workspace, done: Mapping[str, str], shown: Container[str]) -> str:
+def prune_cases(
+    space: Workspace, done: Mapping[str, str], shown: Container[str]
+) -> str:
     """Drop the bulky files of the finished cases, but for those that the page shows.
 
     The inputs, and all that tables and page are made of, stay.

@@ -19,7 +19,7 @@ _TELLING = "(?i)using:|error|cannot|fail"
 """Pattern of the lines that say best what a program is, or why it failed."""
 
 
-def find(name: str, remedy: str) -> str:
+def find_program(name: str, remedy: str) -> str:
     """Find a program.
 
     Parameters
@@ -84,7 +84,7 @@ def version(
         that fits.
     """
     program, *arguments = command.split()
-    path = find(program, remedy)
+    path = find_program(program, remedy)
     ended, text = _answer([path, *arguments], env)
     match = re.search(pattern, text)
     if match is None:

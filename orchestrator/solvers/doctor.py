@@ -115,7 +115,7 @@ def _tool(name: str) -> Finding:
     return Finding(name, True, path)
 
 
-def text(findings: Sequence[Finding]) -> str:
+def findings_text(findings: Sequence[Finding]) -> str:
     """Write findings for people.
 
     Parameters

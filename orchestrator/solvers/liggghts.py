@@ -139,7 +139,7 @@ def programs(ranks: int) -> dict[str, str]:
         If a program is missing.
     """
     if ranks > 1:
-        solvers.find("mpirun", "install it: apt-get install openmpi-bin")
+        solvers.find_program("mpirun", "install it: apt-get install openmpi-bin")
     return {PROGRAM: version()}
 
 

@@ -14,14 +14,14 @@ def _options(command: Parser) -> None:
 
 def _run(options: Namespace) -> int:
     """Run the experiment on a section, or that of a guest on its own beds."""
-    study = guests.load(options.source, options.tolerance)
+    study = guests.load_study(options.source, options.tolerance)
     code = guests.taken_over(study, options)
     if code is not None:
         return code
-    from orchestrator.stockpile.erosion import Erosion
+    from orchestrator.stockpile.erosion import PileErosion
 
     out = options.out or Path("results") / options.command
-    return Erosion(study).command(options, out)
+    return PileErosion(study).command(options, out)
 
 
 OFFER = guests.Offer(

@@ -21,7 +21,13 @@ from numpy.typing import ArrayLike
 from orchestrator import plan
 from orchestrator.bed.line import BedLine
 from orchestrator.errors import InputError
-from orchestrator.experiment import Experiment, Results, Runs, page_texts, piles
+from orchestrator.experiment import (
+    Experiment,
+    ExperimentResults,
+    Runs,
+    page_texts,
+    piles,
+)
 from orchestrator.fidelity import limits
 from orchestrator.flow.model import of_scene
 from orchestrator.flow.stress import WallStress
@@ -346,7 +352,7 @@ def _base(x: Sequence[float], z: Sequence[float], height: float) -> float:
     return float(np.ptp(above)) if len(above) else 0.0
 
 
-class Erosion(Experiment):
+class PileErosion(Experiment):
     """The erosion potential of the piles of a study.
 
     Parameters
@@ -380,7 +386,7 @@ class Erosion(Experiment):
         runs = (run for flow in self.flows.values() for run in flow.cases)
         super().__init__(plan.of_cases(runs), study)
 
-    def results(self, runs: Runs) -> Results | None:
+    def results(self, runs: Runs) -> ExperimentResults | None:
         """List the losses of the piles whose flows are done."""
         done = []
         for scene, flow in self.flows.items():
@@ -455,7 +461,7 @@ def check_winds(fluids: Iterable[Fluid], where: str) -> None:
 
 def _results(
     found: Sequence[Stockpile], winds: Sequence[float], source: str
-) -> Results:
+) -> ExperimentResults:
     """The table and the page of some piles."""
     table = erosion_rows(found, winds)
     caption = TEXTS["figure"]
@@ -473,7 +479,7 @@ def _results(
         Section("Parts", [parts, limits, Table.of(table)]),
         Section("The tables of AP-42", [sources, *map(Table.of, (AREAS, MATERIALS))]),
     ]
-    return Results({"erosion": table}, sections)
+    return ExperimentResults({"erosion": table}, sections)
 
 
 def erosion_rows(found: Sequence[Stockpile], winds: ArrayLike) -> pd.DataFrame:
@@ -659,7 +665,7 @@ def picture(found: Sequence[Stockpile], winds: Sequence[float]) -> Canvas:
     grid = canvas.subplots(len(found), 3, squeeze=False, width_ratios=[1.3, 1, 1])
     for axes, pile in zip(grid, found, strict=True):
         _draw(axes, pile, winds)
-    style.legends(canvas, [], style.samples(grid[:, 1].tolist()))
+    style.legends_below(canvas, [], style.samples(grid[:, 1].tolist()))
     return canvas
 
 

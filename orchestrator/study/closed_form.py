@@ -90,7 +90,7 @@ def closed_form(scene: Scene, name: str | None = None) -> Threshold:
     return replace(at, **mean, shields=at.shields / scene.gust)
 
 
-def outer_roughness(scene: Scene) -> float | None:
+def flow_roughness(scene: Scene) -> float | None:
     """Find the roughness length of the flow over the bed of a pile.
 
     Where the bed is not rough viscosity adds to its own, by the friction velocity at

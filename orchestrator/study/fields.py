@@ -18,11 +18,11 @@ from orchestrator.study.parts import (
     Flow,
     Fluid,
     Forces,
-    Grain,
+    GrainPart,
     Gusts,
     LogNormal,
     PileBed,
-    Threshold,
+    ThresholdPart,
 )
 from orchestrator.study.profile import Profile
 from orchestrator.study.scene import Scene
@@ -30,12 +30,12 @@ from orchestrator.study.scopes import APPLIES
 
 QUESTION: Mapping[str, type[Part]] = {
     "fluid": Fluid,
-    "grain": Grain,
+    "grain": GrainPart,
     # a bed of one grain has no field that a pile has not
     "bed": PileBed,
     "flow": Flow,
     "forces": Forces,
-    "threshold": Threshold,
+    "threshold": ThresholdPart,
 }
 """The tables of a study file that ask."""
 METHOD: Mapping[str, type[Part]] = {

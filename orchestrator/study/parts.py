@@ -177,7 +177,7 @@ class Sphere(Part):
     """density of the grains"""
 
 
-class Grain(Sphere):
+class GrainPart(Sphere):
     """Spheres: their size, their weight, their friction and cohesion."""
 
     friction_angle_deg: float = field(
@@ -548,7 +548,7 @@ class PileBed(Bed):
         return self.packing in ("aligned", "horizontal") and self.seed > 0
 
 
-class Threshold(Part):
+class ThresholdPart(Part):
     """What is counted as motion, and at which parts of the grains."""
 
     displacement: float = field(

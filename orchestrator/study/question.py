@@ -20,13 +20,13 @@ from orchestrator.study.parts import (
     Flow,
     Fluid,
     Forces,
-    Grain,
     GrainBed,
+    GrainPart,
     Obstacle,
     PileBed,
     Range,
     Sizes,
-    Threshold,
+    ThresholdPart,
     extremes,
     percentile,
 )
@@ -63,11 +63,11 @@ class Question(Part):
     """
 
     fluid: Fluid = Fluid()
-    grain: Grain
+    grain: GrainPart
     bed: Annotated[GrainBed | PileBed, Field(discriminator="kind")]
     flow: Flow = Flow()
     forces: Forces = Forces()
-    threshold: Threshold = Threshold()
+    threshold: ThresholdPart = ThresholdPart()
 
     @model_validator(mode="after")
     def _parts_fit(self) -> Self:

@@ -315,7 +315,7 @@ class Numbers:
         return [*filter(_is_number, firsts)]
 
     @property
-    def asked(self) -> list[units.Remark]:
+    def asked(self) -> list[units.NumberRemark]:
         """What is said of the numbers."""
         values: dict[str, list[float]] = {}
         for name in ASKED:

@@ -181,7 +181,7 @@ class Kind(Generic[S]):
 
     tables: Mapping[str, type[Part]]
     make: Callable[..., S]
-    check: "Callable[[File, Sequence[Group[S]], str], list[units.Remark]]"
+    check: "Callable[[File, Sequence[Group[S]], str], list[units.NumberRemark]]"
     hint: Hint
     fields: Sequence[Quantity] = ()
     resolved: Callable[[Sequence[S]], Iterator[Sequence[S]]] = _alone
@@ -274,7 +274,7 @@ class Study(Generic[S]):
     """The file itself, and the texts of the files that it names."""
     source: Source | None = None
     """None if the text came from elsewhere."""
-    asked: tuple[units.Remark, ...] = ()
+    asked: tuple[units.NumberRemark, ...] = ()
     """What is said of numbers that are usual in another unit; of a preset nothing."""
     kind: Kind[S] = field(kw_only=True, compare=False, repr=False)
 
@@ -688,7 +688,7 @@ def changed(scene: Scene, fields: Mapping[str, Any]) -> Scene:
 
 def _check_profiles(
     file: File, groups: Sequence[Group], where: str
-) -> list[units.Remark]:
+) -> list[units.NumberRemark]:
     """Refuse profiles that are likelier in millimetres."""
     del where
     for group in () if file.units_confirmed else groups:
@@ -696,7 +696,7 @@ def _check_profiles(
             bed = scene.bed
             if not isinstance(bed, PileBed) or not bed.profile:
                 continue
-            asked = units.of_bed(bed.profile.name, bed.profile.x[-1], bed.height)
+            asked = units.ask_about_bed(bed.profile.name, bed.profile.x[-1], bed.height)
             if asked:
                 remedy = f"divide x_m and z_m by 1000, or {CONFIRMED} if it is so large"
                 raise InputError(asked, f"{group.where}: bed.profile", remedy)

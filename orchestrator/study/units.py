@@ -63,7 +63,7 @@ class Unit(NamedTuple):
     factor: float  # to the unit of the field
 
 
-class Remark(NamedTuple):
+class NumberRemark(NamedTuple):
     """What is said of a number that may not be meant as it stands.
 
     Attributes
@@ -140,7 +140,7 @@ largest dunes are 500 m high."""
 WIDEST = 0.5  # diameter in a sieve table from which it is likelier in millimetres, m
 
 
-def number(text: str) -> float:
+def number_of(text: str) -> float:
     """The number that a text is, in the digits 0 to 9 with a decimal point.
 
     Python takes more for a number: digits of other scripts, and 1_0 for 10.
@@ -238,7 +238,7 @@ def questions(
     values: Mapping[str, Sequence[float]],
     names: Mapping[str, str],
     form: str = "{} = {:.4g}",
-) -> list[Remark]:
+) -> list[NumberRemark]:
     """Questions on numbers that are usual in another unit, or that no fluid has.
 
     Parameters
@@ -272,7 +272,7 @@ def questions(
                 stone = f"{largest:g} m is a stone of {1e3 * largest:g} mm"
                 question = f"{stone}: or did you mean {largest:g} mm"
             right = form.format(name, largest * unit.factor)
-            asked.append(Remark(f"{question}, {right}?"))
+            asked.append(NumberRemark(f"{question}, {right}?"))
     return asked + _of_cohesion(values) + _of_fluid(values, names)
 
 
@@ -292,7 +292,7 @@ def _may_be_stone(values: Mapping[str, Sequence[float]]) -> bool:
     )
 
 
-def _of_cohesion(values: Mapping[str, Sequence[float]]) -> list[Remark]:
+def _of_cohesion(values: Mapping[str, Sequence[float]]) -> list[NumberRemark]:
     """A remark on the smallest grain that its cohesion holds, if there is one."""
     names = ("grain.diameter", "fluid.density", "grain.cohesion")
     grains = {*zip(*(values.get(name, ()) for name in names), strict=False)}
@@ -305,12 +305,12 @@ def _of_cohesion(values: Mapping[str, Sequence[float]]) -> list[Remark]:
         return []
     what = "cohesion, which the force laws leave out, holds grains this small"
     text = f"{min(held):g} m: {what}; they need a stronger flow"
-    return [Remark(text, is_question=False)]
+    return [NumberRemark(text, is_question=False)]
 
 
 def _of_fluid(
     values: Mapping[str, Sequence[float]], names: Mapping[str, str]
-) -> list[Remark]:
+) -> list[NumberRemark]:
     """A question on the first fluid with a viscosity that none of its density has."""
     densities = values.get("fluid.density", ())
     pairs = zip(densities, values.get("fluid.viscosity", ()), strict=False)
@@ -324,11 +324,11 @@ def _of_fluid(
             name = names.get("fluid.kind", "fluid.kind")
             what = f"{dynamic}, is unusual for {density:g} kg/m3"
             advice = f"{name} names water, seawater, air"
-            return [Remark(f"{what}: is it right?", advice)]
+            return [NumberRemark(f"{what}: is it right?", advice)]
     return []
 
 
-def of_bed(name: str, length: float, height: float) -> str:
+def ask_about_bed(name: str, length: float, height: float) -> str:
     """Ask about a bed line or a surface of a length and a height that no bed has.
 
     Parameters
@@ -352,7 +352,7 @@ def of_bed(name: str, length: float, height: float) -> str:
     return f"{name} is {what}: did you mean mm, {meant}?"
 
 
-def of_sieve(diameters: Sequence[float]) -> list[Remark]:
+def of_sieve(diameters: Sequence[float]) -> list[NumberRemark]:
     """Ask about a sieve table with diameters that no sieve has.
 
     Parameters
@@ -369,10 +369,10 @@ def of_sieve(diameters: Sequence[float]) -> list[Remark]:
         return []
     sizes = f"{min(diameters):g} to {max(diameters):g}"
     text = f"grain.sizes are {sizes} m: did you mean mm?"
-    return [Remark(text, "Divide the diameters by 1000")]
+    return [NumberRemark(text, "Divide the diameters by 1000")]
 
 
-def hinted(refusal: InputError, asked: Sequence[Remark]) -> InputError:
+def hinted(refusal: InputError, asked: Sequence[NumberRemark]) -> InputError:
     """Add to a refusal the questions on the numbers that it may come from.
 
     Parameters

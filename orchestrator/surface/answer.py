@@ -13,7 +13,7 @@ from orchestrator.physics.grain import Grain
 from orchestrator.physics.threshold import check_known
 from orchestrator.surface import onset
 from orchestrator.surface.heights import Plane, Surface
-from orchestrator.surface.maps import Grid
+from orchestrator.surface.maps import MapGrid
 from orchestrator.surface.mesh import wind_axes
 from orchestrator.surface.onset import Shares
 from orchestrator.surface.stress import SurfaceStress
@@ -344,7 +344,7 @@ class Direction:
 
 
 @dataclass(frozen=True)
-class Answer:
+class SurfaceAnswer:
     """A surface with what lies on it under the winds of some directions.
 
     Attributes
@@ -376,7 +376,7 @@ class Answer:
         return self.surface.smoothed(self.cell_m)
 
     @cached_property
-    def grid(self) -> Grid:
+    def grid(self) -> MapGrid:
         """The raster of the maps: nodes of the file, as near as the flow has detail."""
         axes = []
         steps = self.surface.steps
@@ -386,7 +386,7 @@ class Answer:
         x, y = axes
         height = self.smooth.at(x, y[:, None])
         east, north = np.broadcast_arrays(x, y[:, None])
-        return Grid(x, y, height, self.surface.heap_at(east, north) > 0)
+        return MapGrid(x, y, height, self.surface.heap_at(east, north) > 0)
 
     @cached_property
     def easiest(self) -> Direction:

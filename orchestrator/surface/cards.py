@@ -11,7 +11,7 @@ from orchestrator.digits import number
 from orchestrator.report.card import Card, Number, Worth
 from orchestrator.report.subjects import length
 from orchestrator.surface import onset
-from orchestrator.surface.answer import Answer, Direction
+from orchestrator.surface.answer import Direction, SurfaceAnswer
 
 SURFACES = Path(__file__).with_name("measured") / "surfaces.csv"
 """Flows over surfaces beside others: `orchestrator validate --surfaces all`."""
@@ -42,7 +42,7 @@ WORTH = Worth(
 )
 
 
-def card(found: Sequence[Answer], source: str) -> Card:
+def surface_card(found: Sequence[SurfaceAnswer], source: str) -> Card:
     """Make the answer card of surfaces: that of the one which moves first.
 
     Parameters
@@ -75,7 +75,7 @@ def card(found: Sequence[Answer], source: str) -> Card:
     )
 
 
-def heaps(answer: Answer) -> str:
+def heaps(answer: SurfaceAnswer) -> str:
     """Say how many heaps a surface has, and their area, in words.
 
     Parameters
@@ -92,7 +92,7 @@ def heaps(answer: Answer) -> str:
     return f"{counted} of {answer.easiest.area:.3g} m²"
 
 
-def _grain(answer: Answer, source: str) -> str:
+def _grain(answer: SurfaceAnswer, source: str) -> str:
     """What lies on the surface, in words."""
     ground = answer.ground
     if ground.threshold is not None:
@@ -100,7 +100,7 @@ def _grain(answer: Answer, source: str) -> str:
     return f"grains of {length(float(ground.grain.diameter))}"
 
 
-def _numbers(answer: Answer) -> Iterator[Number]:
+def _numbers(answer: SurfaceAnswer) -> Iterator[Number]:
     """The figures of the card."""
     first = answer.easiest
     flat = answer.ground.flat
@@ -215,7 +215,7 @@ def _ends_at_masts() -> tuple[float, float]:
     return float(rms.min()), float(rms.max())
 
 
-def _place(answer: Answer) -> str:
+def _place(answer: SurfaceAnswer) -> str:
     """Where motion starts, in the axes of the file."""
     row = answer.easiest.first
     x, y = (in_axes(float(row[name]), answer.cell_m) for name in ("x_m", "y_m"))
@@ -240,7 +240,7 @@ def in_axes(place: float, cell_m: float) -> str:
     return f"{place:.{max(0, ceil(1 - log10(cell_m)))}f}"
 
 
-def sentences(answer: Answer, source: str) -> Iterator[str]:
+def surface_sentences(answer: SurfaceAnswer, source: str) -> Iterator[str]:
     """Say the caveats of an answer.
 
     Parameters

@@ -51,7 +51,7 @@ def form_places(surface: Surface) -> FloatArray:
     return np.asarray(places - np.array(surface.centre))
 
 
-def sizes(places: FloatArray, from_deg: float) -> Sizes:
+def mesh_sizes(places: FloatArray, from_deg: float) -> Sizes:
     """Find the ends of a form along and across a wind.
 
     Parameters
@@ -92,7 +92,7 @@ def cell_length(surface: Surface, level: Level) -> float:
     radius = np.sqrt(len(places) * step_x * step_y / np.pi)
     height = surface.relief
     length = min(float(radius) / level.per_radius, height / level.per_height)
-    forms = [sizes(places, float(angle)) for angle in DIRECTIONS_DEG]
+    forms = [mesh_sizes(places, float(angle)) for angle in DIRECTIONS_DEG]
     up = mesh.rows(height, mesh.FIRST_CELL * height, level)
     while max(_cells(form, height, length, level) for form in forms) * up > (
         level.most_cells
@@ -310,7 +310,7 @@ class SurfaceFlowCase(OpenFoamCase[SurfaceStress]):
 @lru_cache(maxsize=2)
 def _mesh_of(one: SurfaceFlowCase) -> Columns:
     """The mesh of a case."""
-    form = sizes(form_places(one.surface), one.from_deg)
+    form = mesh_sizes(form_places(one.surface), one.from_deg)
     x, y = mesh.grid_lines(form, one.height_m, one.cell_m, one.level)
     return Columns.over(
         one.heights,

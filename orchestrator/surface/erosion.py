@@ -8,14 +8,14 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.digits import number
-from orchestrator.experiment import Results, page_texts
+from orchestrator.experiment import ExperimentResults, page_texts
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.report.card import Card, Number, Worth
 from orchestrator.report.page import IN_SENTENCES, Limits, Paragraphs, Section, Table
 from orchestrator.report.style import Figure
 from orchestrator.stockpile import erosion
 from orchestrator.surface import cards, onset
-from orchestrator.surface.answer import HEAP, RATIO, Answer, Direction
+from orchestrator.surface.answer import HEAP, RATIO, Direction, SurfaceAnswer
 from orchestrator.surface.heights import Heap
 from orchestrator.surface.mesh import wind_axes
 from orchestrator.surface.pipeline import OverSurfaces
@@ -46,7 +46,7 @@ class Wind:
     heaps: Sequence[erosion.PileSurface]
 
     @classmethod
-    def of(cls, answer: Answer, direction: Direction) -> "Wind":
+    def of(cls, answer: SurfaceAnswer, direction: Direction) -> "Wind":
         """Divide the faces of the heaps of a surface.
 
         Parameters
@@ -111,7 +111,7 @@ class Heaps:
     rose: pd.DataFrame | None = None
 
     @classmethod
-    def of(cls, answer: Answer, speeds: Sequence[float]) -> "Heaps":
+    def of(cls, answer: SurfaceAnswer, speeds: Sequence[float]) -> "Heaps":
         """Put the heaps of a surface under winds.
 
         Parameters
@@ -197,7 +197,7 @@ class Heaps:
 
 
 def _surface_of(
-    answer: Answer, from_deg: float, faces: pd.DataFrame, heap: Heap
+    answer: SurfaceAnswer, from_deg: float, faces: pd.DataFrame, heap: Heap
 ) -> erosion.PileSurface:
     """The surface of a pile by its faces, whose shares are areas.
 
@@ -248,13 +248,15 @@ class HeapErosion(OverSurfaces):
         self.winds = study.erosion.fastest_mile
         super().__init__(study)
 
-    def results_of(self, found: Sequence[Answer]) -> Results:
+    def results_of(self, found: Sequence[SurfaceAnswer]) -> ExperimentResults:
         """List the losses of the heaps of each surface."""
         heaps = [Heaps.of(each, self.winds) for each in found]
-        return Results({"erosion": rows(heaps)}, sections(heaps, self.threshold_from))
+        return ExperimentResults(
+            {"erosion": heaps_rows(heaps)}, erosion_sections(heaps, self.threshold_from)
+        )
 
 
-def rows(found: Sequence[Heaps]) -> pd.DataFrame:
+def heaps_rows(found: Sequence[Heaps]) -> pd.DataFrame:
     """List the parts of each heap, as `erosion_rows` does, with areas and masses.
 
     Parameters
@@ -282,7 +284,7 @@ def rows(found: Sequence[Heaps]) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def sections(found: Sequence[Heaps], source: str) -> list[Section]:
+def erosion_sections(found: Sequence[Heaps], source: str) -> list[Section]:
     """The page: the answer with its figure, the parts, and the tables of AP-42.
 
     Parameters
@@ -302,7 +304,7 @@ def sections(found: Sequence[Heaps], source: str) -> list[Section]:
     piles = [pile for heaps in found for pile in heaps.piles]
     drawing = erosion.picture(piles[: erosion.DRAWN], found[0].speeds)
     figure = Figure("erosion", "Stress and loss", own["erosion"], (), drawing)
-    said = [line for heaps in found for line in sentences(heaps, source)]
+    said = [line for heaps in found for line in heaps_sentences(heaps, source)]
     told = "\n\n".join([*said, own["erosion_sure"]])
     in_sentences = Paragraphs(told, fold=IN_SENTENCES)
     parts = Paragraphs(texts["rows"], "lead")
@@ -310,13 +312,13 @@ def sections(found: Sequence[Heaps], source: str) -> list[Section]:
     sources = Paragraphs(texts["sources"], "lead")
     tables = [erosion.AREAS, erosion.MATERIALS]
     return [
-        Section("", [card(found, source), figure, in_sentences]),
-        Section("Parts", [parts, limits, Table.of(rows(found))]),
+        Section("", [heaps_card(found, source), figure, in_sentences]),
+        Section("Parts", [parts, limits, Table.of(heaps_rows(found))]),
         Section("The tables of AP-42", [sources, *map(Table.of, tables)]),
     ]
 
 
-def sentences(heaps: Heaps, source: str) -> Iterator[str]:
+def heaps_sentences(heaps: Heaps, source: str) -> Iterator[str]:
     """Say what wind takes from each heap, by both, and from which directions less.
 
     Parameters
@@ -370,7 +372,7 @@ def _of_rose(heaps: Heaps) -> str:
     )
 
 
-def card(found: Sequence[Heaps], source: str) -> Card:
+def heaps_card(found: Sequence[Heaps], source: str) -> Card:
     """Make the answer card: what the wind from the worst direction takes.
 
     Parameters

@@ -29,7 +29,7 @@ NICE = (1.0, 2.0, 5.0)
 
 
 @dataclass(frozen=True)
-class Grid:
+class MapGrid:
     """The raster of the maps of a bed, in the axes of its file.
 
     Attributes
@@ -107,7 +107,7 @@ class Map:
 
 
 def figure(
-    grid: Grid,
+    grid: MapGrid,
     maps: Sequence[Map],
     label: str,
     *,
@@ -167,7 +167,7 @@ def figure(
     return canvas
 
 
-def _canvas(grid: Grid, columns: int, lines: int) -> Canvas:
+def _canvas(grid: MapGrid, columns: int, lines: int) -> Canvas:
     """A canvas as wide and high as its maps are."""
     (left, right), (bottom, top) = _limits(grid)
     aspect = (right - left) / (top - bottom)
@@ -188,7 +188,7 @@ def _norm(values: Sequence[FloatArray], middle: float | None) -> Normalize:
     return TwoSlopeNorm(middle, low, high)
 
 
-def _ground(ax: Axes, grid: Grid) -> None:
+def _ground(ax: Axes, grid: MapGrid) -> None:
     """Contours of height, of round numbers."""
     highest = float(grid.height.max())
     step = nice(highest / CONTOURS)
@@ -242,7 +242,7 @@ def _arrow(ax: Axes, start: tuple[float, ...], end: tuple[float, ...]) -> None:
     )
 
 
-def _limits(grid: Grid) -> tuple[tuple[float, float], tuple[float, float]]:
+def _limits(grid: MapGrid) -> tuple[tuple[float, float], tuple[float, float]]:
     """Ends of a map along x and along y, m: the form, and room for arrows above it."""
     rows, places = np.nonzero(grid.is_form)
     east, north = grid.x[places], grid.y[rows]
@@ -251,7 +251,7 @@ def _limits(grid: Grid) -> tuple[tuple[float, float], tuple[float, float]]:
     return along_x, (float(north.min()) - room, float(north.max()) + 2 * room)
 
 
-def _frame(axes: Sequence[Axes], columns: int, grid: Grid) -> None:
+def _frame(axes: Sequence[Axes], columns: int, grid: MapGrid) -> None:
     """Limits and labels of the maps; a scale and the north on the first of them."""
     first = axes[0]
     along_x, along_y = _limits(grid)
@@ -318,5 +318,5 @@ def shares(
             ax.plot(winds, 100 * leaving, color=colour, ls="--", label=words)
         colours.append(style.entry(label, colour))
     ax.set(xlim=(0, float(winds[-1])), ylim=(0, 100))
-    style.legends(canvas, colours, style.samples([ax]))
+    style.legends_below(canvas, colours, style.samples([ax]))
     return canvas

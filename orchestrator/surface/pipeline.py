@@ -17,7 +17,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure as Canvas
 
 from orchestrator import plan
-from orchestrator.experiment import Experiment, Results, Runs, page_texts
+from orchestrator.experiment import Experiment, ExperimentResults, Runs, page_texts
 from orchestrator.flow.run import SPEED_HEIGHT, WALL_STRESS
 from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.velocity import log_law_ustar
@@ -36,10 +36,10 @@ from orchestrator.surface.answer import (
     LEAST,
     MOVES,
     RATIO,
-    Answer,
     Direction,
     Ground,
     Stream,
+    SurfaceAnswer,
 )
 from orchestrator.surface.case import SurfaceFlowCase
 from orchestrator.surface.mesh import LEVELS
@@ -85,7 +85,7 @@ class OverSurfaces(Experiment):
         self.roses = roses_of(study, self.members)
         super().__init__(plan.of_cases(self.flows.values()), study)
 
-    def results(self, runs: Runs) -> Results | None:
+    def results(self, runs: Runs) -> ExperimentResults | None:
         """Answer the surfaces of which a flow is done."""
         found = []
         for bare, scenes in self.members.items():
@@ -97,7 +97,7 @@ class OverSurfaces(Experiment):
         return self.results_of(found) if found else None
 
     @abstractmethod
-    def results_of(self, found: Sequence[Answer]) -> Results:
+    def results_of(self, found: Sequence[SurfaceAnswer]) -> ExperimentResults:
         """Make tables and page of some surfaces.
 
         Parameters
@@ -117,10 +117,10 @@ class SurfaceMotion(OverSurfaces):
 
     name = "surface"
 
-    def results_of(self, found: Sequence[Answer]) -> Results:
+    def results_of(self, found: Sequence[SurfaceAnswer]) -> ExperimentResults:
         """List directions, shares and faces, and draw the maps."""
-        return Results(
-            tables(found), sections(found, self.threshold_from), files(found)
+        return ExperimentResults(
+            tables(found), surface_sections(found, self.threshold_from), files(found)
         )
 
 
@@ -245,7 +245,7 @@ def _answer(
     threshold: float | None,
     cases: Path,
     rose: pd.DataFrame | None,
-) -> Answer:
+) -> SurfaceAnswer:
     """The answer of scenes that are alike but for the direction of the wind."""
     first = scenes[0]
     ground = ground_of(first, threshold)
@@ -256,10 +256,10 @@ def _answer(
             Direction.of(ground, stress, scene.flow.from_deg, first.heights)
         )
     cell = flows[first].cell_m
-    return Answer(first.name, first.heights, ground, directions, cell, rose)
+    return SurfaceAnswer(first.name, first.heights, ground, directions, cell, rose)
 
 
-def tables(found: Sequence[Answer]) -> dict[str, pd.DataFrame]:
+def tables(found: Sequence[SurfaceAnswer]) -> dict[str, pd.DataFrame]:
     """The tables: directions, shares against the wind, and all faces.
 
     Parameters
@@ -292,14 +292,14 @@ def tables(found: Sequence[Answer]) -> dict[str, pd.DataFrame]:
     }
 
 
-def _winds(answer: Answer) -> FloatArray:
+def _winds(answer: SurfaceAnswer) -> FloatArray:
     """Winds over which shares are drawn and listed, m/s."""
     most = max(each.shares().wind_for(MOST_SHARE) for each in answer.directions)
     last = most if np.isfinite(most) else 3 * answer.ground.flat
     return np.linspace(0.0, 1.1 * last, 111)
 
 
-def files(found: Sequence[Answer]) -> dict[str, bytes]:
+def files(found: Sequence[SurfaceAnswer]) -> dict[str, bytes]:
     """GeoTIFFs of the maps for a GIS, and files of VTK for ParaView, by their paths.
 
     Parameters
@@ -322,13 +322,13 @@ def files(found: Sequence[Answer]) -> dict[str, bytes]:
     return made
 
 
-def _in_files(name: str, answer: Answer) -> str:
+def _in_files(name: str, answer: SurfaceAnswer) -> str:
     """What files call a map, which has the name of a column and maybe a direction."""
     column, dash, direction = name.partition("-")
     return answer.ground.stream.columns.get(column, column) + dash + direction
 
 
-def _vtk(answer: Answer) -> bytes:
+def _vtk(answer: SurfaceAnswer) -> bytes:
     """The maps on the surface as a file of VTK; coordinates are those of the file."""
     import pyvista
 
@@ -345,7 +345,7 @@ def _vtk(answer: Answer) -> bytes:
         return path.read_bytes()
 
 
-def sections(found: Sequence[Answer], source: str) -> list[Section]:
+def surface_sections(found: Sequence[SurfaceAnswer], source: str) -> list[Section]:
     """The page: the answer with the map of the least wind, then all else.
 
     Parameters
@@ -367,7 +367,7 @@ def sections(found: Sequence[Answer], source: str) -> list[Section]:
     table = pd.concat(map(_directions, found))
     if len(found) == 1:
         table = table.drop(columns="surface")  # the card names it
-    card = cards.card(found, source)
+    card = cards.surface_card(found, source)
     first, *others = listed
     figure, told = first.content
     sure = Section("How sure it is", [Paragraphs(words["sure"], "lead")])
@@ -383,7 +383,7 @@ def _texts(stream: Stream) -> dict[str, str]:
     }
 
 
-def _directions(answer: Answer) -> pd.DataFrame:
+def _directions(answer: SurfaceAnswer) -> pd.DataFrame:
     """The table of directions for people: a place has the digits that its axes need."""
     rows = []
     for each in answer.directions:
@@ -395,11 +395,11 @@ def _directions(answer: Answer) -> pd.DataFrame:
     return pd.DataFrame(rows).rename(columns={"from_deg": from_deg, **HEADINGS})
 
 
-def _sections(answer: Answer, end: str, source: str) -> Iterator[Section]:
+def _sections(answer: SurfaceAnswer, end: str, source: str) -> Iterator[Section]:
     """The sections of one surface; the names of its figures have the ending."""
     stream = answer.ground.stream
     words = _texts(stream)
-    told = "\n\n".join(cards.sentences(answer, source))
+    told = "\n\n".join(cards.surface_sentences(answer, source))
     first = answer.easiest.first
     mark = (float(first["x_m"]), float(first["y_m"]))
     several = len(answer.directions) > 1
@@ -428,7 +428,9 @@ def _sections(answer: Answer, end: str, source: str) -> Iterator[Section]:
     yield Section(answer.name, figures)
 
 
-def _figure(answer: Answer, column: str, name: str, title: str, text: str) -> Figure:
+def _figure(
+    answer: SurfaceAnswer, column: str, name: str, title: str, text: str
+) -> Figure:
     """A figure with the map of a column for each direction."""
     drawn = []
     for each in answer.directions:
@@ -444,7 +446,7 @@ def _figure(answer: Answer, column: str, name: str, title: str, text: str) -> Fi
     return Figure(name, title, text, (), drawing)
 
 
-def _curves(answer: Answer) -> Canvas:
+def _curves(answer: SurfaceAnswer) -> Canvas:
     """The shares that move against the wind, a colour for each direction."""
     winds = _winds(answer)
     drawn = []

@@ -90,7 +90,7 @@ def _scene(tables: Mapping[str, Table], where: str, files: Files) -> SurfaceScen
 
 def _check(
     file: File, groups: Sequence[Group[SurfaceScene]], where: str
-) -> list[units.Remark]:
+) -> list[units.NumberRemark]:
     """Refuse surfaces that are likelier in millimetres, and roses over liquids.
 
     Returned are questions on the wind rose.
@@ -104,7 +104,7 @@ def _check(
             if rose and scene.fluid.density >= GAS_BELOW:
                 what = "the fluid is a liquid, and a wind rose is of air"
                 raise InputError(what, f"{where}: erosion.wind", "leave it out")
-    return [units.Remark(rose.question)] if rose and rose.question else []
+    return [units.NumberRemark(rose.question)] if rose and rose.question else []
 
 
 def _hint(names: Sequence[str], branch: str) -> tuple[str, str] | None:
@@ -164,7 +164,7 @@ def _named(name: str) -> Callable[[Path, str], Surface]:
 def _check_size(bed: SurfaceBed, where: str) -> None:
     """Refuse a surface that is likelier in millimetres."""
     heights = bed.heights
-    asked = units.of_bed(heights.name, max(heights.extent), heights.relief)
+    asked = units.ask_about_bed(heights.name, max(heights.extent), heights.relief)
     if asked:
         field = "surface" if bed.surface else "height"
         remedy = f"write lengths in m, or {CONFIRMED} if it is so large"

@@ -22,7 +22,7 @@ import pandas as pd
 
 from orchestrator import plan
 from orchestrator.errors import Stalled
-from orchestrator.experiment import Experiment, Results, Runs, page_texts
+from orchestrator.experiment import Experiment, ExperimentResults, Runs, page_texts
 from orchestrator.flow.case import FlowCase
 from orchestrator.flow.foam import BED_FLOW
 from orchestrator.flow.run import WALL_STRESS
@@ -438,7 +438,7 @@ def _towards(bearing_deg: float) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Part:
+class TruthPart:
     """A comparison.
 
     Attributes
@@ -454,11 +454,11 @@ class Part:
 
 
 PARTS = {
-    "ridge": Part(_ridge_flows, _ridge),
-    "turn": Part(_turn_flows, _turn),
-    "interval": Part(interval_flows, _interval),
-    "piles": Part(_piles_flows, _piles),
-    "askervein": Part(_askervein_flows, _askervein),
+    "ridge": TruthPart(_ridge_flows, _ridge),
+    "turn": TruthPart(_turn_flows, _turn),
+    "interval": TruthPart(interval_flows, _interval),
+    "piles": TruthPart(_piles_flows, _piles),
+    "askervein": TruthPart(_askervein_flows, _askervein),
 }
 """The comparisons by their names."""
 
@@ -484,7 +484,7 @@ class Truth(Experiment):
         ridges = {one.name for one in self.runs.get("ridge", ())}
         self.failing = self.planned.cases.keys() - ridges
 
-    def results(self, runs: Runs) -> Results | None:
+    def results(self, runs: Runs) -> ExperimentResults | None:
         """Make the table of the comparisons whose runs have ended."""
         listed: list[Row] = []
         for name, asked in self.runs.items():
@@ -497,10 +497,10 @@ class Truth(Experiment):
         if not listed:
             return None
         table = pd.DataFrame(listed)
-        return Results({"surfaces": table}, [section(table)])
+        return ExperimentResults({"surfaces": table}, [truth_section(table)])
 
 
-def section(table: pd.DataFrame) -> Section:
+def truth_section(table: pd.DataFrame) -> Section:
     """Make the section of a page that has the comparisons.
 
     Parameters

@@ -131,7 +131,7 @@ NAMES = ("scene_id", "group", "profile", "case", "flow_case", "why_not")
 """Columns of texts that may look like numbers, or be empty."""
 
 
-def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
+def make_tables(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
     """Make the tables of a study from the cases that are done.
 
     Parameters
@@ -164,9 +164,11 @@ def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
     methods = pd.DataFrame(rows.methods(plan))
     asked = with_methods(scenes, methods)
     cells = [cell for cell in plan.cells if cell.name in done]
-    grains = pd.DataFrame(rows.single_grain(plan, cells, cases))
+    grains = pd.DataFrame(rows.single_grain_rows(plan, cells, cases))
     thresholds = with_scatter(_listed(rows.pile_threshold, answers), asked)
-    checks = with_agreement(pd.DataFrame(rows.check(plan, cases, done)), thresholds)
+    checks = with_agreement(
+        pd.DataFrame(rows.check_rows(plan, cases, done)), thresholds
+    )
     against = contradictions(checks)
     beds = with_usable(thresholds, asked, study.tolerance, against)
     lone = with_usable(grains, asked, study.tolerance)
@@ -396,7 +398,9 @@ def _as_it_was(text: Any) -> Any:
     return text
 
 
-def write(tables: Mapping[str, pd.DataFrame], folder: Folder, place: str) -> None:
+def write_tables(
+    tables: Mapping[str, pd.DataFrame], folder: Folder, place: str
+) -> None:
     """Write tables, and the meanings of their columns.
 
     Parameters
@@ -419,8 +423,8 @@ def write(tables: Mapping[str, pd.DataFrame], folder: Folder, place: str) -> Non
     folder.put(f"{place}/columns.csv", csv(table))
 
 
-def read(folder: Folder, place: str) -> Tables:
-    """Read the tables that `write` wrote.
+def read_tables(folder: Folder, place: str) -> Tables:
+    """Read the tables that `write_tables` wrote.
 
     Parameters
     ----------

@@ -234,10 +234,10 @@ SINGLE_GRAIN: Mapping[str, str] = {
     ),
     **several("decides", "case"),
 }
-"""Columns of `single_grain`, beside those of speeds."""
+"""Columns of `single_grain_rows`, beside those of speeds."""
 
 
-def single_grain(
+def single_grain_rows(
     plan: Plan, cells: Iterable[SingleGrainCase], cases: Path
 ) -> Iterator[Row]:
     """List the single grains that a finished case or the closed form answers.
@@ -1291,10 +1291,10 @@ CHECK: Mapping[str, str] = {
     "difference": "shields over shields_dem, less 1",
     **several("case"),
 }
-"""Columns of `check`."""
+"""Columns of `check_rows`."""
 
 
-def check(plan: Plan, cases: Path, done: Container[str]) -> Iterator[Row]:
+def check_rows(plan: Plan, cases: Path, done: Container[str]) -> Iterator[Row]:
     """Compare piles with DEM of the same, where both are run.
 
     Parameters

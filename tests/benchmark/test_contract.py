@@ -316,7 +316,7 @@ def _deck(bed: Bed, folder: Path) -> None:
     )
     steps = range(len(bed.load_steps))
     force = [[bed.force(number, step, None) for number in bed.grains] for step in steps]
-    deck.write(
+    deck.write_deck(
         folder, table, values, np.array(bed.load_steps), np.array(force), margin=3 * D
     )
 
@@ -359,7 +359,7 @@ def test_our_own_reading_of_the_run_agrees(tmp_path: Path) -> None:
     places = np.array([(grain.x, 0.0, grain.z) for grain in bed.grains.values()])
     along = np.array([grain.along for grain in bed.grains.values()])
     table = GrainTable(places, kind, along, np.ones(len(kind)), D, 2500.0)
-    read = motion.read(tmp_path / "case", table, 0.3, falls_out=False)
+    read = motion.read_motion(tmp_path / "case", table, 0.3, falls_out=False)
     moved_in = dict(zip(bed.counted, read.load_step.tolist(), strict=True))
     assert {one: step for one, step in moved_in.items() if step} == count.moved_in
     carried = {one for one, gone in zip(bed.counted, read.carried, strict=True) if gone}

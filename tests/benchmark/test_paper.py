@@ -60,7 +60,9 @@ def test_fresh_piles_are_as_expected(
     for one in planned.cases.values():
         engine.execute(one, tmp_path, HANGS_S, threading.Event())
         assert case.done_state(one, tmp_path)
-    results = tables.make(asked, planned, tmp_path, reuse.done(planned.cases, tmp_path))
+    results = tables.make_tables(
+        asked, planned, tmp_path, reuse.done(planned.cases, tmp_path)
+    )
     names = scene_names(plan.make(paper), paper)
     assert len(planned.piles) >= 2
     for pile in planned.piles.values():

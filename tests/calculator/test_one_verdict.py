@@ -142,7 +142,7 @@ def by_threshold(asked: list[dict[str, Any]]) -> list[dict[str, Any] | None]:
         laws = rows[start : start + len(LAWS)]
         (row,) = (row for row in laws if row["answer"])
         holds = any(each["valid"] for each in laws)
-        found.append({**row, "card": answer.card(laws)} if holds else None)
+        found.append({**row, "card": answer.grain_card(laws)} if holds else None)
     return found
 
 
@@ -165,16 +165,16 @@ roughness = "{grain["roughness"]}"
 """
     parsed = study.parse(text, name="t", where="t")
     planned = plan.make(parsed)
-    made = tables.make(parsed, planned, out, ())
+    made = tables.make_tables(parsed, planned, out, ())
     results = Results(parsed, planned, made, out)
     order = {group.name: group.scenes[0].id for group in parsed.groups}
-    found = sheets.single_grains(results)
+    found = sheets.single_grains_sheet(results)
     rows = []
     for number in range(len(asked)):
         (place,) = np.flatnonzero(found["scene_id"] == order[str(number)])
         row = found.iloc[place]
         cells = {str(name): value for name, value in row.items()}
-        rows.append({**cells, "card": answers.of_grain(row)})
+        rows.append({**cells, "card": answers.card_of_grain(row)})
     return rows
 
 

@@ -150,7 +150,7 @@ def test_a_law_widens_the_interval_of_a_grain_only_where_it_says_so(
         table = thresholds({"diameter": [5e-4], "roughness": [5e-5]}, "bridged")
         cells = zip(*(column.tolist() for column in table.values()), strict=True)
         rows = [dict(zip(table, row, strict=True)) for row in cells]
-        number = answer.card(rows).numbers[0]
+        number = answer.grain_card(rows).numbers[0]
         assert number.low is not None
         assert number.high is not None
         return number.high / number.low

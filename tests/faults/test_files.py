@@ -188,7 +188,7 @@ def test_links_in_a_case_are_not_followed(pile: Bench, outside: Path) -> None:
     shutil.move(mesh, outside / "mesh")
     mesh.symlink_to(outside / "mesh")
     before = _contents(outside)
-    case.prune(
+    case.prune_case(
         plan.make(study.load(str(pile.source))).cases[flow.name], pile.out / "cases"
     )
     assert _contents(outside) == before

@@ -14,7 +14,7 @@ import pytest
 
 import orchestrator as face
 from orchestrator import cli, plan
-from orchestrator.commands.study import finished
+from orchestrator.commands.study import answer_finished
 from orchestrator.errors import InputError
 from orchestrator.report.figures import shields
 from orchestrator.report.results import Results
@@ -80,14 +80,14 @@ def test_every_case_can_be_pruned_and_run_again_by_hand(pile: Bench) -> None:
     shutil.copytree(pile.undisturbed, pile.out)
     cases = pile.out / "cases"
     for run in plan.make(study.load(str(pile.source))).cases.values():
-        case.prune(run, cases)
+        case.prune_case(run, cases)
         assert case.done_state(run, cases)
         assert not case.is_whole(run, cases)
         subprocess.run(["./Allrun"], cwd=cases / run.name, check=True)
         assert case.is_whole(run, cases)
         assert case.done_state(run, cases)
         (cases / run.name / case.DONE).unlink()
-        case.prune(run, cases)  # it is not done: nothing is dropped
+        case.prune_case(run, cases)  # it is not done: nothing is dropped
         assert list((cases / run.name).glob("*.dump")) or run.kind == "flow"
 
 
@@ -173,7 +173,7 @@ LINES = EDITED.splitlines(keepends=True)
 
 def _is_finished(file: Path, out: Path, tolerance: float | None = None) -> bool:
     options = Namespace(source=str(file), out=out, tolerance=tolerance)
-    return bool(finished(options))
+    return bool(answer_finished(options))
 
 
 @pytest.fixture(scope="module")

@@ -41,7 +41,7 @@ def test_half_and_twice_the_smoothing_are_those_of_their_own_studies(
     for used, compared in ((0.0, 0.8), (0.4, 0.8), (2.0, 2.0)):
         results = small_study.run(tmp_path / f"{used}", text(used))
         row = results.tables["pile_threshold"].iloc[0]
-        said = words.text(results)
+        said = words.answer_text(results)
         said = " ".join(said.split())
         assert row["smoothing_needed_m"] == pytest.approx(0.8, abs=0.02)
         assert row["smoothing_compared_m"] == pytest.approx(compared, abs=0.02)
@@ -60,7 +60,7 @@ def test_half_and_twice_the_smoothing_are_those_of_their_own_studies(
 def test_a_profile_without_noise_is_compared_with_nothing(tmp_path: Path) -> None:
     results = small_study.run(tmp_path, text(noise=0.0))
     assert "smoothing_needed_m" not in results.tables["pile_threshold"]
-    assert "smooth" not in words.text(results)
+    assert "smooth" not in words.answer_text(results)
 
 
 def test_the_flows_of_other_smoothing_are_planned(tmp_path: Path) -> None:

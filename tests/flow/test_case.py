@@ -261,7 +261,7 @@ def test_a_pruned_flow_runs_again_for_a_finer_one(tmp_path: Path, pruned: bool) 
     pipeline.run(coarse, tmp_path, workers=1)
     if pruned:
         (flow,) = plan.make(coarse).cases.values()
-        case.prune(flow, tmp_path / "cases")
+        case.prune_case(flow, tmp_path / "cases")
     finished = pipeline.run(fine, tmp_path, workers=1)
     assert (finished.started, finished.failures) == (1 + pruned, {})
 

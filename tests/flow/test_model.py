@@ -102,7 +102,7 @@ def test_a_slow_solve_keeps_its_first_cells() -> None:
 def test_tables_have_the_discharge(tmp_path: Path) -> None:
     asked = study.parse(TEXT + WATER, name="t", where="t")
     planned = plan.make(asked)
-    rows = tables.make(asked, planned, tmp_path, ())["pile_threshold"]
+    rows = tables.make_tables(asked, planned, tmp_path, ())["pile_threshold"]
     speed = float(depth_mean_speed(1.0, 0.3, 1e-3 / 30)) * rows["ustar0_m_s"]
     np.testing.assert_allclose(rows["mean_velocity_m_s"], speed)
     np.testing.assert_allclose(rows["discharge_m2_s"], 0.3 * speed)

@@ -184,7 +184,7 @@ def test_displacement_is_one_in_the_grains_own_diameter(tmp_path: Path) -> None:
     )
     flows = np.array([0.1, 0.2, 0.3])
     force = np.arange(24.0).reshape(3, 4, 2)
-    deck.write(tmp_path, grains, {"diameter": D}, flows, force, margin=D)
+    deck.write_deck(tmp_path, grains, {"diameter": D}, flows, force, margin=D)
     for place, axis in enumerate("xz"):
         (way,) = sets(tmp_path / f"along.{axis}.txt")
         assert way == {

@@ -144,7 +144,7 @@ def test_rest_and_lines_left_out_change_no_grain(
     for folder in runs.values():
         subprocess.run(["./Allrun"], cwd=folder, check=True)
     rest, *others = (
-        motion.read(run, grains, 0.3, falls_out=False) for run in runs.values()
+        motion.read_motion(run, grains, 0.3, falls_out=False) for run in runs.values()
     )
     assert rest.moved[-1] > 0
     for other in others:

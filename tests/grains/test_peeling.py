@@ -19,7 +19,7 @@ from orchestrator.grains import motion, peeling, threshold
 from orchestrator.grains.peeling import Force, ForceTable, Loading
 from orchestrator.runs.case import templates
 from orchestrator.study.method import GrainMethod
-from orchestrator.study.parts import Grain, Gusts
+from orchestrator.study.parts import GrainPart, Gusts
 from orchestrator.types import BoolArray, FloatArray
 
 
@@ -193,7 +193,7 @@ def _moved_by_dem(
     numbers = {
         **{"diameter": d, "smallest": 1.0, "density": 2500.0, "gravity": 9.81},
         **deck.protocol(
-            Grain(diameter=d),
+            GrainPart(diameter=d),
             GrainMethod(stiffness=3e4, waiting_time=waiting_time),
             displacement,
             gusts=given.pop("asked", None),
@@ -201,11 +201,11 @@ def _moved_by_dem(
         **{"slope": 0.0, "ceiling_x": 0.0, "ceiling_z": 5 * d, "behind": 30 * d},
     }
     shutil.copytree(templates() / "liggghts" / "bed", copy)
-    deck.write(
+    deck.write_deck(
         copy, grains, numbers, given.pop("rising"), force * weight, 3 * d, **given
     )
     subprocess.run(["./Allrun"], cwd=copy, check=True)
-    return motion.read(copy, grains, displacement, falls_out=False)
+    return motion.read_motion(copy, grains, displacement, falls_out=False)
 
 
 def _around(elevation_deg: float, turned_deg: float) -> FloatArray:

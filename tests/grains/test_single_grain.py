@@ -12,7 +12,7 @@ from orchestrator.grains.cells import SingleGrainCase, batches
 from orchestrator.grains.motion import MODES, Motion
 from orchestrator.runs import case, engine
 from orchestrator.study import study
-from orchestrator.study.parts import Grain
+from orchestrator.study.parts import GrainPart
 from tests.faults.bench import endless, wrapper
 from tests.waiting import HANGS_S
 
@@ -92,7 +92,7 @@ def test_grains_of_two_contact_laws_share_no_deck() -> None:
     (scene,) = study.parse(
         "grain = { diameter = 1e-3 }", name="cells", where="test"
     ).scenes
-    for name in set(Grain.model_fields) - {"sizes"}:
+    for name in set(GrainPart.model_fields) - {"sizes"}:
         value = 1.1 * getattr(scene.grain, name) + 0.1
         other = scene.model_copy(
             update={"grain": scene.grain.model_copy(update={name: value})}

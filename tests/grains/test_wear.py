@@ -12,7 +12,7 @@ from orchestrator.grains.loads import Geometry
 from orchestrator.grains.pile import Pile
 from orchestrator.report.figures import bed
 from orchestrator.report.results import Results
-from orchestrator.study.parts import Grain
+from orchestrator.study.parts import GrainPart
 from orchestrator.study.profile import Profile
 from orchestrator.study.scene import Scene
 from tests import small_study
@@ -69,7 +69,7 @@ def test_the_line_of_any_bed_sinks_with_the_counted_grains_alone(
     name: str, packing: str
 ) -> None:
     bed = Geometry(
-        Scene(grain=Grain(diameter=1e-3), bed=bed_of(packing=packing, **WORN[name]))
+        Scene(grain=GrainPart(diameter=1e-3), bed=bed_of(packing=packing, **WORN[name]))
     )
     whole, counted = BedState.whole(bed.packing), bed.packing.windward
     x = np.linspace(bed.line.x[0], bed.line.x[-1], 2000)
@@ -111,7 +111,7 @@ def test_a_bed_changes_after_each_part_of_its_grains(
     assert np.all(np.diff(motion.flow) >= 0)
     # the picture has the line as it sinks
     steps, frozen = (
-        bed.read(_pile(results, method, frozen=f), cases) for f in (False, True)
+        bed.read_steps(_pile(results, method, frozen=f), cases) for f in (False, True)
     )
     starts = [step for step, _ in steps.lines]
     assert (starts[0], len(starts)) == (0, 3)

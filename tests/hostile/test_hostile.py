@@ -16,7 +16,14 @@ from orchestrator import cli
 from orchestrator.runs import case
 from orchestrator.study import study
 from orchestrator.study.method import FlowMethod, GrainMethod
-from orchestrator.study.parts import Flow, Fluid, Forces, Grain, PileBed, Threshold
+from orchestrator.study.parts import (
+    Flow,
+    Fluid,
+    Forces,
+    GrainPart,
+    PileBed,
+    ThresholdPart,
+)
 from tests.conftest import Command
 
 
@@ -68,8 +75,8 @@ def shell(
 
 
 PARTS: dict[str, type[BaseModel]] = {
-    **{"fluid": Fluid, "grain": Grain, "bed": PileBed},
-    **{"flow": Flow, "forces": Forces, "threshold": Threshold},
+    **{"fluid": Fluid, "grain": GrainPart, "bed": PileBed},
+    **{"flow": Flow, "forces": Forces, "threshold": ThresholdPart},
     **{"method.flow": FlowMethod, "method.grains": GrainMethod},
 }
 HUGE = "1" + "0" * 400

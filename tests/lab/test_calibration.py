@@ -103,7 +103,7 @@ def test_what_was_not_run_is_empty() -> None:
         for i in range(12)
     ]
     again = [{**row, "rung": "again"} for row in rows if row["part"] == GRAINS]
-    table = calibration.table(
+    table = calibration.half_widths(
         pd.DataFrame([*rows, *again]), {FLOW: "again", GRAINS: "again"}
     )
     quick = table[table["rung"] == "quick"].set_index("part")

@@ -74,7 +74,7 @@ def test_what_has_not_run_has_no_point_and_what_needs_no_run_no_error(
     pairs = ladder.decisions(study.parse(text, name="one", where="one"))
     points = ladder.points(pairs, Runs(plan.of(pairs), tmp_path, {}))
     assert set(points["grain_rung"]) == {"static"}
-    assert ladder.errors(points).empty
+    assert ladder.rung_errors(points).empty
 
 
 def test_the_cost_of_a_pile_does_not_depend_on_what_was_asked_before(
@@ -132,7 +132,7 @@ def _table(*more: dict[str, Any]) -> pd.DataFrame:
 
 
 def test_errors_are_relative_to_the_reference() -> None:
-    table = ladder.errors(_table(_point(("quick", FAST), **{"tau_0.5": math.nan})))
+    table = ladder.rung_errors(_table(_point(("quick", FAST), **{"tau_0.5": math.nan})))
     rows = table.set_index(["flow_rung", "grain_rung"])
     assert rows["error_10"][REFERENCE] == pytest.approx(0.0)
     assert rows["error_50"][FLOW_REFERENCE] == pytest.approx(-0.02)

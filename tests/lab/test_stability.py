@@ -118,7 +118,7 @@ def test_a_study_tells_every_stored_answer_that_is_wrong_unless_its_map_says_why
 ):
     table = pd.read_csv(measured.FOLDER / "maps.csv")
     maps = [read_map(path) for path in sorted(FOLDER.glob("*.toml"))]
-    found = told.told(maps, table)
+    found = told.told_answers(maps, table)
     silent = (table["verdict"] == "wrong") & ~table["caught"]
     assert len(found) == silent.sum() > 90
     assert set(found["told"]) <= set(told.HOW) - {told.NOTHING}
@@ -134,10 +134,12 @@ def test_an_answer_of_which_a_study_says_nothing_is_counted_as_such() -> None:
     maps = [read_map(FOLDER / "layers-horizontal.toml")]
     row = {"map": "layers-horizontal", "x": 0.5, "y": 2, "verdict": "wrong"}
     table = pd.DataFrame([{**row, "caught": False, "error": 0.9, "note": ""}])
-    assert told.told(maps, table)["told"].tolist() == [told.NOTHING]
+    assert told.told_answers(maps, table)["told"].tolist() == [told.NOTHING]
     (count,) = told.counted(maps, table).to_dict("records")
     assert (count["wrong"], count[told.NOTHING], count[told.WITHIN]) == (1, 1, 0)
     # within the numerical error of horizontal rows
-    assert told.told(maps, table.assign(error=0.05))["told"].tolist() == [told.WITHIN]
+    assert told.told_answers(maps, table.assign(error=0.05))["told"].tolist() == [
+        told.WITHIN
+    ]
     # a run that noticed it is no such answer
-    assert told.told(maps, table.assign(caught=True)).empty
+    assert told.told_answers(maps, table.assign(caught=True)).empty

@@ -242,7 +242,7 @@ def test_the_rows_of_the_wind_tunnel_are_on_their_curve() -> None:
 @pytest.mark.long
 def test_grains_that_go_on_are_as_near_as_the_documents_say() -> None:
     beds = pd.read_csv(validate.FOLDER / "beds.csv")
-    shields = validate.sustained(beds, validate.GUST, is_entrained=True)
+    shields = validate.sustained_shields(beds, validate.GUST, is_entrained=True)
     rows = beds.assign(model="m", ratio=shields / beds["shields"], sure="read")
     factors = validate.scores(rows).set_index("set")["factor"]
     said = {
@@ -256,7 +256,7 @@ def test_grains_that_go_on_are_as_near_as_the_documents_say() -> None:
     }
     assert factors.to_dict() == pytest.approx(said, rel=0.01)
     # in water a grain that leaves stops with its gust; in air one that leaves goes on
-    alone = validate.sustained(beds, validate.GUST, is_entrained=False)
+    alone = validate.sustained_shields(beds, validate.GUST, is_entrained=False)
     in_water = beds["rho_f_kg_m3"] > 100
     can_hop = saltation.hops(validate.measured_grains(beds))
     assert (alone[in_water & can_hop] == shields[in_water & can_hop]).mean() > 0.95

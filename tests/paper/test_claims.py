@@ -10,7 +10,7 @@ import pytest
 
 from orchestrator import paper, report
 from orchestrator.paper import PRESETS, claims
-from orchestrator.paper.claims import CLAIMS, Judged
+from orchestrator.paper.claims import CLAIMS, JudgedClaim
 from orchestrator.paper.evidence import (
     BRIDGED,
     Comparison,
@@ -36,7 +36,7 @@ NAMES = [
 ]
 
 
-def judge(tables: Tables, **changed: pd.DataFrame) -> dict[str, Judged]:
+def judge(tables: Tables, **changed: pd.DataFrame) -> dict[str, JudgedClaim]:
     """The verdicts by the name of the measure, some tables of the study being replaced."""
     return dict(zip(NAMES, claims.judge_claims({**tables, **changed}), strict=True))
 
@@ -123,7 +123,7 @@ def test_a_claim_is_judged_by_each_flow_and_by_both() -> None:
         line(2, 2, flow="wall"),
         Comparison("", [7.0], flow="wall"),
     )
-    one = Judged(CLAIMS[0], lines)
+    one = JudgedClaim(CLAIMS[0], lines)
     assert one.findings == (
         Finding("", "mostly", 7, 9),
         Finding("eq10", "reproduced", 4, 4),

@@ -18,7 +18,7 @@ from orchestrator.physics.saltation import (
     STOPS,
     Gust,
     Rebound,
-    Thresholds,
+    SustainedThresholds,
     fate,
     hops,
     least,
@@ -399,7 +399,7 @@ def test_unlike_grains_go_on_at_stresses_nearer_to_each_other_than_their_weights
 
 
 def test_initiation_is_the_larger_of_two() -> None:
-    found = Thresholds(
+    found = SustainedThresholds(
         steady=np.array([0.03, 0.03, np.inf]), cessation=np.array([0.02, 0.001, 0.01])
     )
     assert found.initiation(2.0).tolist() == [0.02, 0.015, np.inf]
@@ -456,10 +456,10 @@ def test_alike_grains_beyond_the_table_are_followed_once(
 ) -> None:
     counts = []
 
-    def followed(grains: Grain) -> saltation.Thresholds:
+    def followed(grains: Grain) -> saltation.SustainedThresholds:
         counts.append(len(grains))
         size = np.asarray(grains.galileo)
-        return saltation.Thresholds(size, 2 * size)
+        return saltation.SustainedThresholds(size, 2 * size)
 
     monkeypatch.setattr(saltation, "thresholds", followed)
     rough = Grain.of_numbers([40.0, 50.0, 40.0, 40.0], 2208.0, ratio=0.0917)

@@ -145,7 +145,7 @@ def test_the_growth_of_motion_passes_through_the_answer(results: Results) -> Non
     computed, measured, card = ax.lines
     row = heap.exemplars.iloc[0]
     curve = heap.tables["pile_curve"]
-    told = single.quantity(row)
+    told = single.quantity_of_row(row)
     assert np.asarray(computed.get_xdata()) == pytest.approx(
         units.told_by(row, curve["ustar0_m_s"], told)
     )
@@ -242,7 +242,7 @@ def test_labels_of_the_picture_of_a_grain_lie_on_no_points(
     columns = in_units(ustar, grain)
     columns |= in_units(measured * ustar, grain, before="measured_")
     grain = pd.Series({**grain, **columns})
-    canvas = of_one.of_grain(grain)
+    canvas = of_one.grain_panels(grain)
     canvas.draw_without_rendering()
     for ax in canvas.axes:
         labels = [text for text in ax.texts if text.get_text()]

@@ -52,7 +52,7 @@ def test_the_curve_of_grains_that_go_on_passes_through_their_answers(
         np.log(answers["reynolds_closed_form"]), np.log(x), np.log(y)
     ) - np.log(answers["shields_closed_form"])
     assert np.abs(over).max() < 0.01
-    assert theory.section(made) is None
+    assert theory.theory_section(made) is None
 
 
 def test_each_criterion_has_a_curve_of_its_own_with_its_name(tmp_path: Path) -> None:
@@ -64,7 +64,7 @@ def test_each_criterion_has_a_curve_of_its_own_with_its_name(tmp_path: Path) -> 
         theory.LEAVING,
         theory.GOING,
     ]
-    assert theory.section(made) is not None
+    assert theory.theory_section(made) is not None
 
 
 @pytest.mark.long

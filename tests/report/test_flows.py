@@ -35,6 +35,6 @@ def test_a_table_of_one_fraction_has_a_row_for_it_alone(tmp_path: Path) -> None:
 
 def test_a_page_of_no_cases_tells_of_none(tmp_path: Path) -> None:
     results = small_study.run(tmp_path, TEXT)
-    told = str(page.said("files", results=results, case=""))
+    told = str(page.page_text("files", results=results, case=""))
     assert "columns.csv" in told
     assert "Allrun" not in told

@@ -14,9 +14,9 @@ from orchestrator.physics.threshold import shields_at
 from orchestrator.report import shields, theory
 from orchestrator.report.figures import shields as overview
 from orchestrator.report.results import Results
-from orchestrator.report.theory import Bed, Line
+from orchestrator.report.theory import Line, LineConditions
 
-BED = Bed(0.0, 50.0, 1 / 30, 1.615)
+BED = LineConditions(0.0, 50.0, 1 / 30, 1.615)
 MIDDLES = np.array([one.middle for one in BUFFINGTON_MONTGOMERY])
 
 
@@ -62,15 +62,25 @@ def test_only_where_the_study_has_grains_is_a_law_judged() -> None:
     assert np.isfinite(narrow.factors).sum() == 1
     nowhere = bridged(400.0, 500.0)
     assert theory.ranges(nowhere.met) == []
-    assert theory.sheet([nowhere]).iloc[0].tolist()[3:] == ["nowhere", "0.0", "—", "—"]
+    assert theory.theory_sheet([nowhere]).iloc[0].tolist()[3:] == [
+        "nowhere",
+        "0.0",
+        "—",
+        "—",
+    ]
 
 
 def test_a_grain_that_lies_loose_is_no_answer_of_a_line() -> None:
-    steep = Line("bridged", Bed(0.0, 100.0, 1 / 30, 1.615), 0.01, 1e3)
+    steep = Line("bridged", LineConditions(0.0, 100.0, 1 / 30, 1.615), 0.01, 1e3)
     assert (steep.tau(MIDDLES) <= 0).any()
     assert np.isnan(steep.answers(MIDDLES)).all()
     assert np.isnan(steep.factors).all()
-    assert theory.sheet([steep]).iloc[0].tolist()[3:] == ["nowhere", "0.0", "—", "—"]
+    assert theory.theory_sheet([steep]).iloc[0].tolist()[3:] == [
+        "nowhere",
+        "0.0",
+        "—",
+        "—",
+    ]
 
 
 def test_laws_that_answer_at_few_re_are_not_compared_with_the_curves_for_air(
@@ -101,7 +111,7 @@ def test_closed_form_lines_are_solid_where_their_equation_holds(
     bed: pd.DataFrame,
 ) -> None:
     reynolds = np.geomspace(1e-3, 1e4, 800)
-    low, high = theory.lines(bed)
+    low, high = theory.measured_lines(bed)
     assert (low.law, high.law) == ("low", "high")
     assert (low.holds(reynolds) == (reynolds < LAWS["low"].reynolds[1])).all()
     ends = reynolds[high.holds(reynolds)]
@@ -114,7 +124,7 @@ def test_closed_form_lines_are_solid_where_their_equation_holds(
 @pytest.mark.parametrize("law", LAWS)
 def test_grains_of_every_law_lie_on_its_line(law: str, bed: pd.DataFrame) -> None:
     scenes = bed.assign(force_law=law)
-    (line,) = [one for one in theory.lines(scenes) if one.law == law]
+    (line,) = [one for one in theory.measured_lines(scenes) if one.law == law]
     exact = of_grains(Grain.of_table(scenes), law)
     assert line.tau(exact.reynolds) == pytest.approx(exact.shields, rel=1e-6)
     assert (line.holds(exact.reynolds) == exact.valid).all()

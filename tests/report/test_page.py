@@ -182,7 +182,7 @@ def test_a_figure_that_fails_costs_that_figure_and_a_line(
     def fail(*_: object) -> None:
         raise MemoryError("26.5 GiB for <an array>")
 
-    monkeypatch.setattr(bed, "read", fail)
+    monkeypatch.setattr(bed, "read_steps", fail)
     (tmp_path / "cases").symlink_to(results.cases)
     html = write(only(results, "pile"), tmp_path, {}).read_text(encoding="utf-8")
     assert 'id="shields"' in html
@@ -247,23 +247,23 @@ def studies(tmp_path: Path) -> Path:
 def test_gallery_of_studies_is_written_anew(studies: Path) -> None:
     (studies / gallery.NAME).write_text("an earlier one")
     (studies / "mine.html").write_text("mine")
-    gallery.write(studies)
+    gallery.write_gallery(studies)
     assert (studies / "mine.html").read_text() == "mine"
     html = (studies / gallery.NAME).read_text("utf-8")
     assert '<a href="two%20%26%20more/report.html">two &amp; more</a>' in html
-    gallery.write(studies)
+    gallery.write_gallery(studies)
     assert (studies / gallery.NAME).read_text("utf-8") == html
     with pytest.raises(InputError, match="no study with a page"):
-        gallery.write(studies / "one")
+        gallery.write_gallery(studies / "one")
 
 
 def test_a_study_of_another_version_costs_its_own_sentences(studies: Path) -> None:
     older = dict(orchestrator.open(studies / "one").tables)
     older["single_grain"] = older["single_grain"].drop(columns="usable")
-    tables.write(older, Folder(studies / "one"), "tables")
+    tables.write_tables(older, Folder(studies / "one"), "tables")
     with pytest.raises(OrchestratorError, match="another version of this program"):
         _ = orchestrator.open(studies / "one").answer
-    html = gallery.write(studies).read_text(encoding="utf-8")
+    html = gallery.write_gallery(studies).read_text(encoding="utf-8")
     assert html.count("another version of this program wrote them") == 1
     assert html.count("At which wind does a grain of 1 mm start to move?") == 1
 

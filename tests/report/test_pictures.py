@@ -103,7 +103,7 @@ def peeled(pile: Pile) -> Pile:
 
 @pytest.fixture(scope="module")
 def steps(results: Results, pile: Pile) -> Steps:
-    return bed.read(pile, results.cases)
+    return bed.read_steps(pile, results.cases)
 
 
 def test_field_is_that_of_the_flow(results: Results, pile: Pile) -> None:
@@ -179,7 +179,7 @@ def test_grains_that_go_on_by_dem_are_drawn_at_the_flows_at_which_they_have_gone
     results = small_study.run(tmp_path, LEVEL_BY_DEM)
     pile = next(iter(results.plan.piles.values()))
     assert pile.is_sustained
-    steps = bed.read(pile, results.cases)
+    steps = bed.read_steps(pile, results.cases)
     assert len(steps.places) == len(steps.flow) == len(steps.totals)
     assert steps.flow.tolist() == pile.motion(results.cases).flow.tolist()
     assert steps.totals[-1] == pile.packing.count
@@ -190,9 +190,9 @@ def test_grains_that_go_on_by_dem_are_drawn_at_the_flows_at_which_they_have_gone
 def test_a_bed_without_dem_has_a_picture_of_few_stops(
     results: Results, peeled: Pile, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    every = bed.read(peeled, results.cases)
+    every = bed.read_steps(peeled, results.cases)
     monkeypatch.setattr(bed, "STOPS", 5)
-    few = bed.read(peeled, results.cases)
+    few = bed.read_steps(peeled, results.cases)
     assert (few.places == peeled.packing.centres[few.grains]).all()
     assert len(few.places) <= 6 < len(every.places)
     assert few.totals[-1] == every.totals[-1] > 0.7 * peeled.packing.count
@@ -202,7 +202,7 @@ def test_a_bed_without_dem_has_a_picture_of_few_stops(
     found = bed.data(few, at, few.flow, "m/s")
     assert not any(found["frames"])
     assert found["step"] == "flow"
-    assert "load step" not in bed.words(results, peeled)
+    assert "load step" not in bed.bed_caption(results, peeled)
 
 
 def test_motion_starts_on_a_natural_dune_where_stress_and_slope_say(
@@ -273,7 +273,7 @@ def test_the_map_shows_every_grain_at_its_place(train: Results) -> None:
     known = np.isfinite(x)
     np.testing.assert_allclose(x[known], goes["x_m"])
     row = train.joined("pile_threshold").iloc[0]
-    at = units.told_by(row, goes["ustar0_m_s"], single.quantity(row))
+    at = units.told_by(row, goes["ustar0_m_s"], single.quantity_of_row(row))
     np.testing.assert_allclose(told[known], at)
 
 

@@ -13,13 +13,13 @@ from orchestrator.study import study
 
 FILE = """
 from orchestrator.report import style
-from orchestrator.report.figures import Kind
+from orchestrator.report.figures import FigureKind
 from orchestrator.report.style import Figure
 
 def draw(results):
     yield Figure("mine", "Mine", "A caption.", (), style.canvas(1.0))
 
-FIGURE = Kind(order=-1, draws=draw, needs=("of_a_guest",))
+FIGURE = FigureKind(order=-1, draws=draw, needs=("of_a_guest",))
 """
 
 

@@ -174,7 +174,7 @@ def test_a_study_of_single_grains_has_an_answer_too(results: Results) -> None:
     assert card.question.startswith("At which wind does one grain start to move")
     least, most, usable = card.numbers
     assert least.value < most.value
-    rows = sheets.single_grains(grains)
+    rows = sheets.single_grains_sheet(grains)
     assert (usable.value, usable.unit) == (rows["usable"].sum(), f"of {len(rows)}")
     without = grains.tables["single_grain"].assign(method="pivot", ustar_m_s=np.nan)
     exact = changed(grains, single_grain=without)

@@ -220,7 +220,7 @@ def test_the_doctor_names_a_solver_that_is_broken(
     (bad,) = [finding for finding in findings if not finding.good]
     assert bad.what == solver
     assert str(path) in bad.text
-    lines = doctor.text(findings).splitlines()
+    lines = doctor.findings_text(findings).splitlines()
     assert [line for line in lines if line.startswith("NOT")] == [
         f"NOT  {solver:<12} {bad.text}"
     ]

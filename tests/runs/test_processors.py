@@ -70,7 +70,7 @@ DOCKER = {f"{V1}/cpu.cfs_quota_us": "300000\n", f"{V1}/cpu.cfs_period_us": "1000
 def test_the_quota_of_a_control_group_counts(
     tmp_path: Path, files: dict[str, str], expected: int
 ) -> None:
-    assert processors.count(_written(tmp_path, files)) == expected
+    assert processors.usable_count(_written(tmp_path, files)) == expected
 
 
 @pytest.mark.parametrize(
@@ -87,7 +87,7 @@ def test_the_processors_of_a_job_of_slurm_count(
 ) -> None:
     for name, value in job.items():
         monkeypatch.setenv(name, value)
-    assert processors.count(tmp_path) == expected
+    assert processors.usable_count(tmp_path) == expected
 
 
 def test_a_system_that_binds_no_process_has_all_processors(
@@ -95,7 +95,7 @@ def test_a_system_that_binds_no_process_has_all_processors(
 ) -> None:
     monkeypatch.delattr(os, "sched_getaffinity")
     monkeypatch.setattr(os, "cpu_count", lambda: 5)
-    assert processors.count(tmp_path) == 5
+    assert processors.usable_count(tmp_path) == 5
 
 
 COMMAND = """

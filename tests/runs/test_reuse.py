@@ -165,7 +165,7 @@ def test_other_inputs_of_the_same_question_run_again(
     solved = _solved_at(cases)
     before = run(cases.parent, TEXT)
     # a drag twice as large is in no name of a case, and in the inputs of the piles
-    law = laws.Profile
+    law = laws.ProfileLaw
     drag = law.drag
     monkeypatch.setattr(law, "drag", lambda *given: np.multiply(2, drag(*given)))
     _called(monkeypatch, "a law")
@@ -188,18 +188,18 @@ def test_tables_of_a_pruned_case_are_never_taken_for_those_of_other_code(
 ) -> None:
     planned = plan.make(study.parse(TEXT, name="small", where="test"), cases=cases)
     for case in planned.cases.values():
-        case_states.prune(case, cases)
+        case_states.prune_case(case, cases)
     before, solved = _markers(cases), _solved_at(cases)
     assert _kinds_done(cases) == EVERYTHING
 
     # a reader that finds other motions: the tables of before are not its own
-    read = motion.read
+    read = motion.read_motion
 
     def mended(*given: Any, **named: Any) -> motion.Motion:
         found = read(*given, **named)
         return replace(found, fallen=found.fallen + 1)
 
-    monkeypatch.setattr(motion, "read", mended)
+    monkeypatch.setattr(motion, "read_motion", mended)
     _called(monkeypatch, "a mended reader")
     said = "3 cases made by other code of this program; 3 of them were pruned and"
     with pytest.warns(UserWarning, match=said):

@@ -37,7 +37,7 @@ def test_a_flat_bed_loses_what_the_log_law_takes(tmp_path: Path) -> None:
         'method.flow.roughness = 0.005\nbed.kind = "flat"\ngrain.diameter = 1e-3\n'
         + WINDS
     )
-    erosion.Erosion(study.parse(text, name="", where="")).run(tmp_path, workers=1)
+    erosion.PileErosion(study.parse(text, name="", where="")).run(tmp_path, workers=1)
     table = pd.read_csv(tmp_path / "tables/erosion.csv")
     assert (table["u*/u*₀"] == 1).all()
     ustar = np.array(
@@ -49,7 +49,7 @@ def test_a_flat_bed_loses_what_the_log_law_takes(tmp_path: Path) -> None:
 
 
 def test_the_preset_is_run(tmp_path: Path) -> None:
-    ended = erosion.Erosion(study.load("stockpile")).run(tmp_path, workers=2)
+    ended = erosion.PileErosion(study.load("stockpile")).run(tmp_path, workers=2)
     table = pd.read_csv(tmp_path / "tables/erosion.csv")
     lost = table[table["part"] == "all"].groupby("pile", sort=False)["P, g/m²"]
     (flat_top, fenced, *by_epa), (ridge, behind, *by_epa_again) = (
@@ -77,7 +77,7 @@ def test_what_is_wrong_is_said_in_one_message(tmp_path: Path) -> None:
     ):
         text = "grain.diameter = 1e-3\n" + PILE * ("erosion" in asked) + asked
         with pytest.raises(InputError, match=words):
-            erosion.Erosion(study.parse(text, name="a", where="a"))
+            erosion.PileErosion(study.parse(text, name="a", where="a"))
 
 
 BARE, FENCE = "[]", '[{ kind = "fence", x = -4.0, height = 4.0 }]'
@@ -100,7 +100,7 @@ method.flow = {{ roughness = 0.005, {flow} }}
 def _run(text: str, folder: Path) -> tuple[list[str], pd.DataFrame]:
     """The sentences of an answer, one for each pile, and the table of parts."""
     asked = study.parse(text, name="", where="")
-    ended = erosion.Erosion(asked).run(folder, workers=2)
+    ended = erosion.PileErosion(asked).run(folder, workers=2)
     table = pd.read_csv(folder / "tables/erosion.csv")
     told = [line for line in ended.answer.split("\n") if line.startswith("Wind")]
     return told, table[table["part"] == "all"].drop(columns="part")
@@ -193,7 +193,7 @@ def test_another_file_has_another_directory(tmp_path: Path) -> None:
     first.write_text(_text('"bed.length" = [4.0]', 'model = "flat"'))
     second.write_text(_text('"bed.length" = [5.0]', 'model = "flat"'))
     out = tmp_path / "results" / "erosion"
-    run = [erosion.Erosion(study.load(file)).run for file in (first, second)]
+    run = [erosion.PileErosion(study.load(file)).run for file in (first, second)]
     page = run[0](out, workers=1).page
     before = page.read_bytes()
     with pytest.raises(
@@ -203,7 +203,7 @@ def test_another_file_has_another_directory(tmp_path: Path) -> None:
     assert page.read_bytes() == before
     # the file itself may change, or go
     first.write_text(first.read_text().replace("4.0", "6.0"))
-    erosion.Erosion(study.load(first)).run(out, workers=1)
+    erosion.PileErosion(study.load(first)).run(out, workers=1)
     first.unlink()
     run[1](out, workers=1)
     assert page.read_bytes() != before

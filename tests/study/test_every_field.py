@@ -177,7 +177,7 @@ def _found(asked: study.Study) -> Found:
     if planned.cases:
         return sorted(planned.cases)
     none = Path("no case")
-    tables = [pd.DataFrame(rows.single_grain(planned, (), none))]
+    tables = [pd.DataFrame(rows.single_grain_rows(planned, (), none))]
     for scene_id, pile in planned.piles.items():
         answer = rows.Answer(planned.decisions[scene_id], pile, none)
         tables += [

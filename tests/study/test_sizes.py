@@ -58,7 +58,7 @@ def test_roughness_is_a_part_of_the_percentile_that_it_names() -> None:
 def test_the_grains_that_are_drawn_have_the_mixtures_mass(
     mixture: Sizes, dimensions: int
 ) -> None:
-    drawn = poured.drawn(mixture, 1e-3, 100_000, 3, dimensions) * 1e-3
+    drawn = poured.drawn_sizes(mixture, 1e-3, 100_000, 3, dimensions) * 1e-3
     mass = drawn**dimensions / (drawn**dimensions).sum()
     for part in (0.2, 0.45, 0.7):
         exact = parts.percentile(mixture, 1e-3, part)

@@ -15,7 +15,7 @@ from orchestrator.fidelity import limits
 from orchestrator.grains.loads import Geometry
 from orchestrator.runs.files import canonical_json
 from orchestrator.study import closed_form, fields, methods, parts, study
-from orchestrator.study.parts import Forces, Grain, GrainBed
+from orchestrator.study.parts import Forces, GrainBed, GrainPart
 from orchestrator.study.scene import Scene
 
 OFFERED = [*guests.offers()]
@@ -69,10 +69,12 @@ def test_the_papers_rule_takes_the_laws_that_hold() -> None:
 
 def test_the_id_follows_the_content_alone() -> None:
     law = Forces(law="bridged")  # which the default comes to
-    one = Scene(grain=Grain(diameter=1e-3), bed=GrainBed(roughness=1e-4), forces=law)
-    dense = Grain(diameter=1e-3, density=2500.0)
+    one = Scene(
+        grain=GrainPart(diameter=1e-3), bed=GrainBed(roughness=1e-4), forces=law
+    )
+    dense = GrainPart(diameter=1e-3, density=2500.0)
     same = Scene(grain=dense, bed=GrainBed(roughness=1e-4), forces=law)
-    other = Scene(grain=Grain(diameter=1e-3), bed=GrainBed(roughness=1.1e-4))
+    other = Scene(grain=GrainPart(diameter=1e-3), bed=GrainBed(roughness=1.1e-4))
     assert one.id == same.id != other.id
     copy = Scene.model_validate_json(
         canonical_json(one.model_dump(mode="json")), strict=False
@@ -305,7 +307,7 @@ import sys
 from orchestrator import guests
 from orchestrator.study import study
 for name in study.presets():
-    assert guests.load(name, None).scenes
+    assert guests.load_study(name, None).scenes
 print(*set(sys.modules) & {"orchestrator.flow", "orchestrator.solvers", "gmsh", "pyvista"})
 """
 

@@ -23,7 +23,7 @@ PILE = "bed = { kind = 'pile', slope_deg = 15.0 }\n"
 
 @pytest.mark.parametrize("text", ["1", "-1.5", ".5", "5.", "1e-3", " 2E5 ", "+3"])
 def test_numbers_are_those_of_python(text: str) -> None:
-    assert units.number(text) == float(text)
+    assert units.number_of(text) == float(text)
 
 
 NUMBERS = {
@@ -45,7 +45,7 @@ NUMBERS = {
 @pytest.mark.parametrize("text", NUMBERS)
 def test_other_texts_are_no_numbers(text: str) -> None:
     with pytest.raises(ValueError, match=NUMBERS[text]):
-        units.number(text)
+        units.number_of(text)
     with pytest.raises(ValueError, match=r"whole number|no number"):
         units.whole_number(text)
 
@@ -123,7 +123,7 @@ def test_a_study_asks_about_numbers_that_are_usual_in_another_unit(
 
 @pytest.mark.parametrize("name", presets())
 def test_presets_are_asked_nothing(name: str) -> None:
-    assert guests.load(name, None).questions == ()
+    assert guests.load_study(name, None).questions == ()
 
 
 def test_a_study_and_the_command_ask_alike() -> None:

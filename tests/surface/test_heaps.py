@@ -11,7 +11,7 @@ import pytest
 
 from orchestrator import guests
 from orchestrator.errors import InputError
-from orchestrator.experiment import Experiment, Results, Runs
+from orchestrator.experiment import Experiment, ExperimentResults, Runs
 from orchestrator.flow.run import WALL_STRESS
 from orchestrator.report.card import Card
 from orchestrator.report.page import Paragraphs, Section, Table
@@ -63,7 +63,7 @@ def study_of(
     (folder / "heaps.tif").write_bytes(geotiff(EAST + x, NORTH + y, z, ""))
     path = folder / "heaps.toml"
     path.write_text(FILE.format([*directions]) + more)
-    found: SurfaceStudy = guests.load(path, None)
+    found: SurfaceStudy = guests.load_study(path, None)
     return found
 
 
@@ -72,7 +72,7 @@ def answered(
     experiment: Experiment,
     folder: Path,
     strength: Callable[[float], float] = lambda from_deg: 1.0,
-) -> Results:
+) -> ExperimentResults:
     """The results of an experiment over flows of which u*/u*_0 rises with the height."""
     for scene in study.scenes:
         flow = pipeline.flow_of(scene)
@@ -243,7 +243,7 @@ def test_a_low_heap_alone_is_flat_ground_to_ap42(tmp_path: Path) -> None:
     study_of(tmp_path, more=COAL)
     heights = np.maximum(np.maximum(high, low), 0.0)
     (tmp_path / "heaps.tif").write_bytes(geotiff(EAST + x, NORTH + y, heights, ""))
-    study = guests.load(tmp_path / "heaps.toml", None)
+    study = guests.load_study(tmp_path / "heaps.toml", None)
     experiment = erosion.HeapErosion(study)
     results = answered(study, experiment, tmp_path / "cases")
     made, sections = results.tables, results.page
@@ -332,6 +332,6 @@ def test_a_current_takes_no_dust(tmp_path: Path) -> None:
     study_of(tmp_path)
     path = tmp_path / "heaps.toml"
     path.write_text(path.read_text().replace('"air"', '"water"'))
-    study = guests.load(path, None)
+    study = guests.load_study(path, None)
     with pytest.raises(InputError, match=r"fluid.density: a fluid of .* is no wind"):
         erosion.HeapErosion(study)

@@ -7,18 +7,18 @@ from matplotlib.text import Annotation, Text
 
 from orchestrator.report import style
 from orchestrator.surface import maps
-from orchestrator.surface.maps import Grid, Map
+from orchestrator.surface.maps import Map, MapGrid
 
 EAST, NORTH = 512_000.0, 5_640_000.0
 
 
-def grid() -> Grid:
+def grid() -> MapGrid:
     """A hill of 6 m on a raster of 2 m."""
     x = np.linspace(EAST - 20, EAST + 20, 21)
     y = np.linspace(NORTH - 20, NORTH + 20, 21)
     from_middle = np.hypot(x - EAST, y[:, None] - NORTH)
     height = np.maximum(6 - 0.4 * from_middle, 0.0)
-    return Grid(x, y, height, height > 0)
+    return MapGrid(x, y, height, height > 0)
 
 
 def faces() -> pd.DataFrame:
@@ -83,7 +83,7 @@ def test_a_figure_is_no_wider_and_no_higher_than_its_map(
 ) -> None:
     of = grid()
     x = EAST + stretched * (of.x - EAST)
-    wide = Grid(x, of.y, of.height, of.is_form)
+    wide = MapGrid(x, of.y, of.height, of.is_form)
     with style.settings():
         canvas = maps.figure(wide, [Map("", of.height)], "m")
         canvas.draw_without_rendering()

@@ -79,7 +79,7 @@ def test_the_stress_of_a_cone_is_that_of_flow_around_a_hill(
 
 
 def test_each_face_moves_by_the_closed_form(folder: Path, faces: pd.DataFrame) -> None:
-    study = guests.load(folder.parent / "cone.toml", None)
+    study = guests.load_study(folder.parent / "cone.toml", None)
     (scene,) = study.scenes
     row = faces.iloc[len(faces) // 3]
     slope, heading = np.array([row["slope_deg"]]), np.array([row["heading_deg"]])
@@ -217,7 +217,7 @@ def test_in_water_the_answer_is_a_current(
     every = pd.read_csv(out / "tables" / "faces-1-270.csv")
     shares = pd.read_csv(out / "tables" / "shares.csv")
     assert not [name for name in (*every, *shares) if "wind" in name]
-    study = guests.load(file, None)
+    study = guests.load_study(file, None)
     grain = study.scenes[0].grain_in_pocket
     row = every[every["z_m"] > 5].iloc[3]
     slope, heading = np.array([row["slope_deg"]]), np.array([row["heading_deg"]])

@@ -32,7 +32,7 @@ slope_deg = 30
 def load(folder: Path, text: str) -> SurfaceStudy:
     path = folder / "pile.toml"
     path.write_text(text)
-    found: SurfaceStudy = guests.load(path, None)
+    found: SurfaceStudy = guests.load_study(path, None)
     return found
 
 
@@ -122,14 +122,14 @@ def test_smoothing_of_more_cells_is_another_surface(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["cone", "oval", "barchan"])
 def test_the_presets_are_studies(name: str) -> None:
-    study = guests.load(name, None)
+    study = guests.load_study(name, None)
     assert study.scenes[0].bed.shape == name
     assert study.questions == ()
 
 
 @pytest.mark.parametrize("name", ["stockpile", "first-look"])
 def test_other_studies_are_none_of_surfaces(name: str) -> None:
-    assert guests.load(name, None).kind is PLANE
+    assert guests.load_study(name, None).kind is PLANE
 
 
 @pytest.mark.parametrize(

@@ -54,7 +54,7 @@ def test_a_column_more_is_one_file(
     assert curve[name].tolist() == (2 * curve["moved"]).tolist()
     folder = Folder(tmp_path)
     with folder.renewed():
-        tables.write(found, folder, "tables")
+        tables.write_tables(found, folder, "tables")
     written = pd.read_csv(tmp_path / "tables" / "columns.csv", index_col="column")
     assert written.loc[name, "meaning"] == meaning
     page = runpy.run_path(str(PAGE))["text"]()

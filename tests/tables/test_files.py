@@ -52,16 +52,16 @@ def test_tables_come_back(tmp_path: Path) -> None:
     )
     folder = Folder(tmp_path)
     with folder.renewed():
-        tables.write({"single_grain": table}, folder, "tables")
-    assert list(tables.read(folder, "tables")) == ["single_grain"]
-    again = tables.read(folder, "tables")["single_grain"]
+        tables.write_tables({"single_grain": table}, folder, "tables")
+    assert list(tables.read_tables(folder, "tables")) == ["single_grain"]
+    again = tables.read_tables(folder, "tables")["single_grain"]
     pd.testing.assert_frame_equal(again, table)
     written = pd.read_csv(tmp_path / "tables" / "columns.csv")
     known = tables.meanings()
     assert written["column"].tolist() == sorted(map(str, table))
     assert written["meaning"].tolist() == [known[each] for each in written["column"]]
     with pytest.raises(OrchestratorError, match="no tables"):
-        tables.read(folder, "elsewhere")
+        tables.read_tables(folder, "elsewhere")
 
 
 def test_a_column_can_be_added_to_a_wide_table(tmp_path: Path) -> None:
@@ -69,4 +69,7 @@ def test_a_column_can_be_added_to_a_wide_table(tmp_path: Path) -> None:
     folder = Folder(tmp_path)
     wide = pd.DataFrame({f"c{number}": [1.0] for number in range(150)})
     folder.put("tables/scenes.csv", tables.csv(wide))
-    assert tables.read(folder, "tables")["scenes"].assign(more=1.0).shape == (1, 151)
+    assert tables.read_tables(folder, "tables")["scenes"].assign(more=1.0).shape == (
+        1,
+        151,
+    )

@@ -144,7 +144,7 @@ axes = { "bed.seed" = [1, 2, 3] }
 def _ends(results: Results) -> tuple[float, float, float, float]:
     """The threshold and interval at 30 %, and those of the first grains, as told."""
     row = seeds_as_one(results.at_fraction).iloc[0]
-    told = single.quantity(row)
+    told = single.quantity_of_row(row)
     return (
         row[told.column("_low")],
         row[told.column("_high")],

@@ -160,7 +160,7 @@ def test_thresholds_beyond_the_model(
 ) -> None:
     text += 'grain.density = 2650.0\nmethod.kind = "pivot"\n'
     asked = study.parse(text, name="t", where="t")
-    made = tables.make(asked, plan.make(asked), tmp_path, ())
+    made = tables.make_tables(asked, plan.make(asked), tmp_path, ())
     why_not = made["pile_threshold" if text.startswith(PILE) else "single_grain"][
         "why_not"
     ]

@@ -1,7 +1,8 @@
 """The figures of the page of a study: each is a file of this folder.
 
-A file has a `FIGURE`, a `Kind` that says where it stands among the others, which tables
-it needs and how it is drawn. The folder is the list: a figure more is a file more.
+A file has a `FIGURE`, a `FigureKind` that says where it stands among the others, which
+tables it needs and how it is drawn. The folder is the list: a figure more is a file
+more.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -32,7 +33,7 @@ def no_files(results: Results) -> Sequence[Case]:
 
 
 @dataclass(frozen=True)
-class Kind:
+class FigureKind:
     """What a file of figures gives.
 
     Attributes
@@ -83,7 +84,7 @@ def _has_rows(results: Results, name: str) -> bool:
     return name in results.tables and not results.tables[name].empty
 
 
-def kinds(packages: Sequence[str] = ()) -> list[Kind]:
+def kinds(packages: Sequence[str] = ()) -> list[FigureKind]:
     """List the figures of this folder, and of those of guests.
 
     Parameters
@@ -99,7 +100,7 @@ def kinds(packages: Sequence[str] = ()) -> list[Kind]:
     found = []
     for package in (__name__, *packages):
         for module in iter_modules(import_module(package).__path__):
-            kind: Kind = import_module(f"{package}.{module.name}").FIGURE
+            kind: FigureKind = import_module(f"{package}.{module.name}").FIGURE
             found.append(replace(kind, name=module.name))
     return sorted(found, key=lambda kind: kind.order)
 

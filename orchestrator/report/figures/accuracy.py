@@ -9,10 +9,10 @@ import pandas as pd
 from matplotlib.figure import Figure as Canvas
 
 from orchestrator.report import labels, shields, style
-from orchestrator.report.figures import Kind
-from orchestrator.report.page import written
-from orchestrator.report.results import Results, case_names, split, valid
-from orchestrator.report.shields import SHOWN, Points, Sheet
+from orchestrator.report.figures import FigureKind
+from orchestrator.report.page import filled
+from orchestrator.report.results import Results, case_names, split_by, valid
+from orchestrator.report.shields import SHOWN, DiagramSheet, Points
 from orchestrator.report.style import Figure
 
 CAPTION = """\
@@ -38,7 +38,7 @@ def draw(results: Results) -> Iterator[Figure]:
     Figure
         A figure for each page of panels.
     """
-    dem = shields.single_grains(results)
+    dem = shields.diagram_rows(results)
     dem = dem[dem["ustar_m_s"].notna()]
     if dem.empty:
         return
@@ -56,7 +56,7 @@ def draw(results: Results) -> Iterator[Figure]:
     axes = labels.RE_AXIS, "u* of DEM over closed form"
     for sheet in shields.sheets(rows, keys, 2.1, *axes, columns=1, sharey=False):
         about = shields.about(sheet.rows)
-        text = written(CAPTION, about=about, deviations=_deviations(sheet.rows))
+        text = filled(CAPTION, about=about, deviations=_deviations(sheet.rows))
         yield Figure(
             f"accuracy{sheet.name}",
             f"DEM over closed form{sheet.title}",
@@ -80,13 +80,13 @@ def _deviations(rows: pd.DataFrame) -> str:
 
 
 def _draw_accuracy(
-    sheet: Sheet, rows: pd.DataFrame, colours: Mapping[Any, str]
+    sheet: DiagramSheet, rows: pd.DataFrame, colours: Mapping[Any, str]
 ) -> Canvas:
     """The panels of u* of DEM over that of the closed form."""
     _, axes = sheet.panels()
     for ax, part in zip(axes, sheet.parts, strict=True):
         ax.axhline(1, color="0.3", lw=0.8, zorder=1)
-        for (alpha,), group in split(part, "alpha_deg"):
+        for (alpha,), group in split_by(part, "alpha_deg"):
             Points(group, colours[alpha], OVER).draw(ax)
         farthest = float(np.nanmax(np.abs(part[["value", "low", "high"]] - 1)))
         ax.set(xscale="log", ylim=(1 - 1.6 * farthest, 1 + 1.6 * farthest))
@@ -96,4 +96,4 @@ def _draw_accuracy(
     return shields.legends(sheet, "alpha_deg", colours)
 
 
-FIGURE = Kind(order=150, draws=draw, needs=("single_grain",))
+FIGURE = FigureKind(order=150, draws=draw, needs=("single_grain",))

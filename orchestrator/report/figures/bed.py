@@ -18,9 +18,9 @@ from orchestrator.grains import motion, wear
 from orchestrator.grains.methods import Dem
 from orchestrator.grains.pile import Pile
 from orchestrator.report import labels, single, solved, units
-from orchestrator.report.figures import Kind
-from orchestrator.report.page import fill, written
-from orchestrator.report.results import FRACTION, Results, split
+from orchestrator.report.figures import FigureKind
+from orchestrator.report.page import fill, filled
+from orchestrator.report.results import FRACTION, Results, split_by
 from orchestrator.report.style import Figure
 from orchestrator.runs.case import Case
 from orchestrator.solvers.dem import ENGINE
@@ -103,7 +103,7 @@ class Steps:
         return int(np.argmax(enough)) if enough.any() else len(self.totals) - 1
 
 
-def read(pile: Pile, cases: Path) -> Steps:
+def read_steps(pile: Pile, cases: Path) -> Steps:
     """Read where the grains of a finished pile are; without DEM where they were packed.
 
     Only grains within the picture are read, at `STOPS` of the load steps if there are
@@ -224,7 +224,7 @@ def chosen(results: Results) -> Iterator[tuple[pd.Series, Pile]]:
         return
     is_poured = rows["packing"] == "poured"
     rows = rows.assign(by=rows["method"].where(is_poured, ""))
-    for _, alike in split(rows, "alpha_deg", "by"):
+    for _, alike in split_by(rows, "alpha_deg", "by"):
         for _, row in alike.iterrows():
             shown = results.shown(str(row["scene_id"]))
             if shown and shown[0].length:
@@ -248,11 +248,11 @@ def draw(results: Results) -> Iterator[Figure]:
     telling = labels.varying(results.exemplars, "alpha_deg", "d_m")
     seen: set[str] = set()
     for row, pile in chosen(results):
-        steps = read(pile, results.cases)
+        steps = read_steps(pile, results.cases)
         shown = steps.first(FRACTION)
         share = percent(steps.totals[shown] / pile.packing.count)
         told = ", ".join(labels.told(row, ["alpha_deg", "d_m", *telling]))
-        told_by = single.quantity(row)
+        told_by = single.quantity_of_row(row)
         flows = units.told_by(row, steps.flow, told_by)
         name = f"bed-alpha{pile.bed.slope_deg:g}"
         if name in seen:
@@ -260,7 +260,7 @@ def draw(results: Results) -> Iterator[Figure]:
         yield Figure(
             name=name,
             title=f"The bed when {share} of its grains have moved, {told}",
-            caption=words(results, pile),
+            caption=bed_caption(results, pile),
             cases=tuple(run.name for run in reversed(pile.runs)),
             drawing=None,
             image=_svg(steps, shown, results.cases).encode(),
@@ -287,7 +287,7 @@ def files(results: Results) -> Sequence[Case]:
     return [run for _, pile in chosen(results) for run in pile.runs]
 
 
-def words(results: Results, pile: Pile) -> str:
+def bed_caption(results: Results, pile: Pile) -> str:
     """Write the caption of a bed.
 
     Parameters
@@ -309,8 +309,8 @@ def words(results: Results, pile: Pile) -> str:
     for column in columns:
         used = fields.COLUMNS[column].used(pile.scene)
         if used is not None:
-            properties.append(labels.plain(column, used))
-    return written(
+            properties.append(labels.value_text(column, used))
+    return filled(
         CAPTION,
         width=pile.bed.width,
         by_dem=_follows_dem(pile),
@@ -445,7 +445,7 @@ def _svg(steps: Steps, shown: int, cases: Path) -> str:
         size=f"{(right - left) / 75:.3g}",
         d=labels.value("d_m", pile.scene.grain.diameter),
         case=pile.last_run or "",
-        title=labels.plain("alpha_deg", pile.bed.slope_deg),
+        title=labels.value_text("alpha_deg", pile.bed.slope_deg),
         **_grains(steps, shown),
     )
 
@@ -492,4 +492,4 @@ def _flow(pile: Pile, cases: Path, frame: solved.Window) -> str:
     return base64.b64encode(out.getvalue()).decode("ascii")
 
 
-FIGURE = Kind(order=50, draws=draw, needs=("pile_threshold",), files=files)
+FIGURE = FigureKind(order=50, draws=draw, needs=("pile_threshold",), files=files)

@@ -3,10 +3,10 @@
 from collections.abc import Iterator
 
 from orchestrator.report import labels, shields, style
-from orchestrator.report.figures import Kind
+from orchestrator.report.figures import FigureKind
 from orchestrator.report.figures.shields import FEW
-from orchestrator.report.page import written
-from orchestrator.report.results import Results, case_names, drawable, split
+from orchestrator.report.page import filled
+from orchestrator.report.results import Results, case_names, drawable, split_by
 from orchestrator.report.style import Figure
 
 CAPTION = """\
@@ -48,8 +48,8 @@ def draw(results: Results) -> Iterator[Figure]:
     # the one diagram shows all of few piles on one slope
     is_shown = has_one_slope and every["scene_id"].nunique() <= FEW
     smoothest = reached["z0_over_d"].min()
-    for (ratio,), of_ratio in split(reached, "z0_over_d"):
-        written_ = labels.ratio_of(float(str(ratio)), "d")
+    for (ratio,), of_ratio in split_by(reached, "z0_over_d"):
+        written_ = labels.ratio_in_words(float(str(ratio)), "d")
         stem = f"extended-shields-{written_}".replace("/", "").replace(" ", "")
         title = f"Thresholds of beds by slope, z₀ = {written_}"
         follows = FOLLOWED.get(written_, "")
@@ -62,7 +62,7 @@ def draw(results: Results) -> Iterator[Figure]:
                 yield Figure(
                     stem + part.name + sheet.name,
                     title + part.title + sheet.title,
-                    written(CAPTION, about=about, answers=shields.about(shown)),
+                    filled(CAPTION, about=about, answers=shields.about(shown)),
                     case_names(shown),
                     drawing,
                     place="folded" if is_folded else "",
@@ -70,4 +70,4 @@ def draw(results: Results) -> Iterator[Figure]:
                 )
 
 
-FIGURE = Kind(order=110, draws=draw, needs=("pile_threshold",))
+FIGURE = FigureKind(order=110, draws=draw, needs=("pile_threshold",))

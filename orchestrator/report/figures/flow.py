@@ -10,8 +10,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from orchestrator.grains.pile import Pile
 from orchestrator.report import labels, solved, style
-from orchestrator.report.figures import Kind
-from orchestrator.report.page import written
+from orchestrator.report.figures import FigureKind
+from orchestrator.report.page import filled
 from orchestrator.report.results import Results
 from orchestrator.report.style import Figure, Look
 from orchestrator.runs.case import Case
@@ -41,13 +41,13 @@ def draw(results: Results) -> Iterator[Figure]:
     Figure
         One figure, or none.
     """
-    for name, title, shown in style.pages(solved.drawn(results)):
+    for name, title, shown in style.pages(solved.piles_with_files(results)):
         settings = [pile.scene.method.flow for pile in shown]
         models = [
             labels.value("turbulence_model", each.turbulence_model) for each in settings
         ]
         speeds = [labels.value("solve_u_e_m_s", each.speed) for each in settings]
-        text = written(
+        text = filled(
             CAPTION,
             models=", ".join(dict.fromkeys(models)),
             speeds=", ".join(dict.fromkeys(speeds)),
@@ -141,7 +141,7 @@ def files(results: Results) -> Sequence[Case]:
     list of Case
         The cases.
     """
-    return [pile.flow for pile in solved.drawn(results)]
+    return [pile.flow for pile in solved.piles_with_files(results)]
 
 
-FIGURE = Kind(order=170, draws=draw, files=files)
+FIGURE = FigureKind(order=170, draws=draw, files=files)

@@ -21,9 +21,15 @@ from orchestrator.report import (
     theory,
     units,
 )
-from orchestrator.report.figures import Kind
-from orchestrator.report.page import written
-from orchestrator.report.results import Results, case_names, drawable, seeds_of, split
+from orchestrator.report.figures import FigureKind
+from orchestrator.report.page import filled
+from orchestrator.report.results import (
+    Results,
+    case_names,
+    drawable,
+    seeds_of,
+    split_by,
+)
 from orchestrator.report.style import ANSWER, INK, MEASURED, Figure, Look
 
 Along = Literal["shields", "reynolds"]
@@ -83,16 +89,16 @@ def _of_the_card(results: Results) -> Iterator[Figure]:
     """The curve of one bed against the flow that its card tells."""
     rows = results.exemplars
     is_other = theory.are_many(results) or answers.is_of_hills(results)
-    if rows.empty or is_other or sheets.sizes(results) is not None:
+    if rows.empty or is_other or sheets.sizes_sheet(results) is not None:
         return
     if answers.are_several_beds(results.at_fraction):
         return
     row = rows.iloc[0]
-    told = single.quantity(row).name
+    told = single.quantity_of_row(row).name
     others = seeds_of(row, results.at_fraction)
     has_measured = not single.is_level(row)
     title = f"The part of the grains that has moved, against the {told}"
-    text = written(OF_THE_CARD, told=told, seeds=others, measured=has_measured)
+    text = filled(OF_THE_CARD, told=told, seeds=others, measured=has_measured)
     cases = tuple(run.name for run in results.plan.piles[str(row["scene_id"])].runs)
     drawing = _draw_card(row, others, results.tables["pile_curve"])
     yield Figure("share", title, text, cases, drawing, place="under")
@@ -100,7 +106,7 @@ def _of_the_card(results: Results) -> Iterator[Figure]:
 
 def _draw_card(row: pd.Series, others: Sequence[str], table: pd.DataFrame) -> Canvas:
     """The curves of a bed and of its replicates, and its answer."""
-    told = single.quantity(row)
+    told = single.quantity_of_row(row)
     canvas = style.canvas(2.0, style.NARROW)
     ax = canvas.subplots()
     table = table[np.isfinite(table["ustar0_m_s"]) & (table["ustar0_m_s"] > 0)]
@@ -152,7 +158,7 @@ def _of_all(results: Results, along: Along) -> Iterator[Figure]:
     # of the piles alone: single grains have more diameters than there are colours
     colours = style.palette(by, sorted(set(piles[by])))
     least = scenes["alpha_deg"].min()
-    for (alpha,), of_slope in split(scenes, "alpha_deg"):
+    for (alpha,), of_slope in split_by(scenes, "alpha_deg"):
         for part in shields.by_stress(of_slope):
             for figure in _of_slope(part, curves, by, colours, along):
                 is_shown = figure.place == "" and alpha == least and along == "shields"
@@ -170,7 +176,7 @@ def _of_slope(
     scenes = part.rows
     choices, rows = shields.parted(scenes, "alpha_deg", "z0_over_d", "force_law", by)
     alpha = float(scenes["alpha_deg"].iloc[0])
-    slope = labels.plain("alpha_deg", alpha)
+    slope = labels.value_text("alpha_deg", alpha)
     name, title, follows = ENDINGS[along]
     is_of_paper = np.isclose(alpha, SLOPE_OF_PAPER)
     keys = ["z0_over_d", *choices]
@@ -178,7 +184,7 @@ def _of_slope(
         yield Figure(
             name=f"fractions{name}-alpha{alpha:g}{part.name}{sheet.name}",
             title=f"Fraction of moving grains{title}, {slope}{part.title}{sheet.title}",
-            caption=written(CAPTION, about=shields.about(sheet.rows), along=along),
+            caption=filled(CAPTION, about=shields.about(sheet.rows), along=along),
             cases=case_names(sheet.rows),
             drawing=partial(_draw_panels, sheet, curves, by, colours, along),
             place="folded" if sheet.name else "",
@@ -190,11 +196,11 @@ def _curves(results: Results) -> dict[str, pd.DataFrame]:
     """The points of each pile's curve that have a place on the axes, by scene."""
     table = results.tables["pile_curve"]
     points = table[(table["moved"] > 0) & drawable(table, "shields")]
-    return {str(scene_id): rows for (scene_id,), rows in split(points, "scene_id")}
+    return {str(scene_id): rows for (scene_id,), rows in split_by(points, "scene_id")}
 
 
 def _draw_panels(
-    sheet: shields.Sheet,
+    sheet: shields.DiagramSheet,
     curves: Mapping[str, pd.DataFrame],
     by: str,
     colours: Mapping[float, str],
@@ -235,4 +241,4 @@ def _draw_curve(ax: Axes, x: Any, moved: pd.Series, look: Look) -> None:
     ax.plot(x, moved, **{"ms": 3, "mew": 0.7, "markevery": some, **look})
 
 
-FIGURE = Kind(order=70, draws=draw, needs=("pile_curve", "pile_threshold"))
+FIGURE = FigureKind(order=70, draws=draw, needs=("pile_curve", "pile_threshold"))

@@ -13,7 +13,7 @@ from orchestrator.physics.curves import shao_lu, soulsby_whitehouse
 from orchestrator.physics.fluids import is_gas
 from orchestrator.physics.grain import Grain
 from orchestrator.report import answers, sheets, single, style, theory, units
-from orchestrator.report.figures import Kind
+from orchestrator.report.figures import FigureKind
 from orchestrator.report.results import Results, case_names
 from orchestrator.report.style import (
     ANSWER,
@@ -25,7 +25,7 @@ from orchestrator.report.style import (
     Figure,
     Look,
 )
-from orchestrator.report.subjects import Quantity
+from orchestrator.report.subjects import ReportedQuantity
 from orchestrator.study.criterion import SUSTAINED
 from orchestrator.tables.quoted import of_rows
 
@@ -51,17 +51,17 @@ def draw(results: Results) -> Iterator[Figure]:
     Figure
         One figure, of a study of one grain.
     """
-    grains = sheets.single_grains(results)
+    grains = sheets.single_grains_sheet(results)
     is_one = results.joined("pile_threshold").empty and answers.is_one_grain(grains)
     if is_one and not theory.are_many(results):
         row = grains.iloc[0]
-        told = single.quantity(row)
+        told = single.quantity_of_row(row)
         title = f"The {told.name} that moves the grain, by force law and by size"
         cases = case_names(grains)
-        yield Figure("grain", title, CAPTION, cases, of_grain(row), place="lead")
+        yield Figure("grain", title, CAPTION, cases, grain_panels(row), place="lead")
 
 
-def of_grain(row: pd.Series) -> Canvas:
+def grain_panels(row: pd.Series) -> Canvas:
     """Draw the two panels of a grain.
 
     Parameters
@@ -74,7 +74,7 @@ def of_grain(row: pd.Series) -> Canvas:
     matplotlib.figure.Figure
         The drawing.
     """
-    told = single.quantity(row)
+    told = single.quantity_of_row(row)
     here = _other_sizes(row, 61)
     is_tabulated = saltation.is_tabulated(Grain.of_table(here))
     if row["criterion"] == SUSTAINED and not is_tabulated.all():
@@ -101,7 +101,7 @@ def _other_sizes(row: pd.Series, count: int) -> pd.DataFrame:
     return rows.assign(d_m=d, z0_m=row["z0_m"] / size * d)
 
 
-def _by_law(ax: Axes, row: pd.Series, told: Quantity) -> None:
+def _by_law(ax: Axes, row: pd.Series, told: ReportedQuantity) -> None:
     """A line of dots: the threshold under each law."""
     found = []
     for name, (ustar, holds) in answers.by_law(row).items():
@@ -139,7 +139,7 @@ def _by_law(ax: Axes, row: pd.Series, told: Quantity) -> None:
     ax.set_xlabel(f"{told.name} by force law, {told.unit}")
 
 
-def _measured_lines(ax: Axes, row: pd.Series, told: Quantity) -> None:
+def _measured_lines(ax: Axes, row: pd.Series, told: ReportedQuantity) -> None:
     """A dashed line where the threshold was measured, and the field's range."""
     measured = float(row[f"measured_{told.column()}"])
     ax.axvline(measured, color=INK, lw=1.1, ls=MEASURED, zorder=1)
@@ -159,7 +159,9 @@ def _measured_lines(ax: Axes, row: pd.Series, told: Quantity) -> None:
     ax.annotate(sites, (low, 1.0), xytext=(-4, 0), ha="right", **look)
 
 
-def _by_size(ax: Axes, row: pd.Series, curves: pd.DataFrame, told: Quantity) -> None:
+def _by_size(
+    ax: Axes, row: pd.Series, curves: pd.DataFrame, told: ReportedQuantity
+) -> None:
     """The threshold by size: by the law where it holds, and by the published curve."""
     size = float(row["d_m"])
     mm, computed, measured = curves.to_numpy().T
@@ -195,4 +197,4 @@ def _curve(row: pd.Series, d: Any) -> Any:
     return grain.ustar_at(soulsby_whitehouse(grain.dimensionless_diameter))
 
 
-FIGURE = Kind(order=20, draws=draw, needs=("single_grain",))
+FIGURE = FigureKind(order=20, draws=draw, needs=("single_grain",))

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 
 from orchestrator.physics import measured
 from orchestrator.report import shields, style
-from orchestrator.report.figures import Kind
-from orchestrator.report.results import Results, case_names, split
+from orchestrator.report.figures import FigureKind
+from orchestrator.report.results import Results, case_names, split_by
 from orchestrator.report.style import Figure
 from orchestrator.types import FloatArray
 
@@ -69,7 +69,7 @@ def draw(results: Results) -> Iterator[Figure]:
     _, axes = sheet.panels()
     for ax, part in zip(axes, sheet.parts, strict=True):
         part = part[part["hiding"] > 0]
-        for (fraction,), of_fraction in split(part, "fraction"):
+        for (fraction,), of_fraction in split_by(part, "fraction"):
             _draw_classes(ax, of_fraction, colours[float(str(fraction))])
         sizes = part["size_over_d"]
         ratio = np.geomspace(min(sizes.min(), 0.5), max(sizes.max(), 2), 99)
@@ -114,4 +114,4 @@ def _draw_classes(ax: Axes, rows: pd.DataFrame, colour: str) -> None:
     ax.plot(few["size_over_d"], few["hiding"], "o", ms=3, color="white", zorder=3)
 
 
-FIGURE = Kind(order=140, draws=draw, needs=("size_class",))
+FIGURE = FigureKind(order=140, draws=draw, needs=("size_class",))

@@ -7,7 +7,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from orchestrator.report import labels, style
-from orchestrator.report.figures import Kind
+from orchestrator.report.figures import FigureKind
 from orchestrator.report.results import Results, measured_hills
 from orchestrator.report.solved import USTAR
 from orchestrator.report.style import Figure
@@ -63,7 +63,7 @@ def draw(results: Results) -> Iterator[Figure]:
     for name, colour in MODELS.items():
         if name in used:
             colours.append(style.entry(labels.value("turbulence_model", name), colour))
-    style.legends(figure, colours, style.samples(axes))
+    style.legends_below(figure, colours, style.samples(axes))
     cases = tuple(flows["flow_case"])
     title = "Hills that others measured"
     text = " ".join(CAPTION.split())
@@ -84,4 +84,4 @@ def _draw_hill(ax: Axes, results: Results, rows: pd.DataFrame) -> None:
         ax.plot(ends, [level, level], lw=3, gid="reversed flow", color=colour)
 
 
-FIGURE = Kind(order=30, draws=draw, needs=("flow",), uses=("wall_stress",))
+FIGURE = FigureKind(order=30, draws=draw, needs=("flow",), uses=("wall_stress",))

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
 from orchestrator.report import labels, style, theory
-from orchestrator.report.figures import Kind
+from orchestrator.report.figures import FigureKind
 from orchestrator.report.results import Results
 from orchestrator.report.style import ANSWER, FLOW, NONE, RANGE, Figure
 
@@ -71,4 +71,4 @@ def _row(ax: Axes, place: int, line: theory.Line, colour: str) -> None:
     ax.axhline(place, color=RANGE, lw=0.6, zorder=0)
 
 
-FIGURE = Kind(order=10, draws=draw, uses=("single_grain",))
+FIGURE = FigureKind(order=10, draws=draw, uses=("single_grain",))

@@ -6,9 +6,9 @@ from typing import Any
 import pandas as pd
 
 from orchestrator.report import labels, shields, style, theory
-from orchestrator.report.figures import Kind
-from orchestrator.report.page import written
-from orchestrator.report.results import Results, case_names, split
+from orchestrator.report.figures import FigureKind
+from orchestrator.report.page import filled
+from orchestrator.report.results import Results, case_names, split_by
 from orchestrator.report.style import Figure
 
 CAPTION = """\
@@ -47,7 +47,7 @@ def draw(results: Results) -> Iterator[Figure]:
     Figure
         A figure for each.
     """
-    grains = shields.single_grains(results)
+    grains = shields.diagram_rows(results)
     flat = grains[grains["alpha_deg"] == 0]
     has_dem = bool(grains["shields_dem"].notna().any())
     kind = "dem" if has_dem else "closed-form"
@@ -55,9 +55,11 @@ def draw(results: Results) -> Iterator[Figure]:
     colours: dict[Any, str]
     has_many_laws = len(set(theory.dashes(flat["force_law"]).values())) > theory.MANY
     if has_many_laws:
-        colours = {law: theory.look(law)[0] for law in theory.drawn(flat["force_law"])}
-        for (ratio,), group in split(flat, "z0_over_d"):
-            written = labels.ratio_of(float(str(ratio)), "d")
+        colours = {
+            law: theory.look(law)[0] for law in theory.drawn_laws(flat["force_law"])
+        }
+        for (ratio,), group in split_by(flat, "z0_over_d"):
+            written = labels.ratio_in_words(float(str(ratio)), "d")
             title = f"Force laws on a horizontal bed, z₀ = {written}"
             yield from _figures(
                 group, "force_law", colours, f"shields-{written}", title
@@ -67,7 +69,7 @@ def draw(results: Results) -> Iterator[Figure]:
         title = f"One grain on a horizontal bed: {ending}"
         yield from _figures(flat, "beta_deg", colours, f"{kind}-horizontal", title)
     colours = style.palette("alpha_deg", results.values("alpha_deg"))
-    for (beta,), group in split(grains, "beta_deg"):
+    for (beta,), group in split_by(grains, "beta_deg"):
         if (group["alpha_deg"] > 0).any():
             name = f"{kind}-slope-beta{beta:g}"
             title = f"One grain on a slope, β = {beta:g}°: {ending}"
@@ -81,7 +83,7 @@ def _figures(
     stem = name.replace("/", "").replace(" ", "")
     for sheet, shown, drawing in shields.panels(rows, by, colours):
         about = shields.about(sheet.rows)
-        text = written(CAPTION, by=by, about=about, answers=shields.about(shown))
+        text = filled(CAPTION, by=by, about=about, answers=shields.about(shown))
         is_further = bool(sheet.name)
         numbers = {} if is_further else FOLLOWED
         yield Figure(
@@ -95,4 +97,4 @@ def _figures(
         )
 
 
-FIGURE = Kind(order=100, draws=draw, uses=("single_grain",))
+FIGURE = FigureKind(order=100, draws=draw, uses=("single_grain",))

@@ -8,8 +8,8 @@ from matplotlib.figure import Figure as Canvas
 
 from orchestrator.physics import measured
 from orchestrator.report import style
-from orchestrator.report.figures import Kind
-from orchestrator.report.results import Results, case_names, split
+from orchestrator.report.figures import FigureKind
+from orchestrator.report.results import Results, case_names, split_by
 from orchestrator.report.style import Figure
 
 LATTICE_PIVOT_DEG = 30.0
@@ -49,7 +49,7 @@ def _pivots(rows: pd.DataFrame) -> Canvas:
     figure = style.canvas(3.4)
     ax = figure.subplots()
     widths = rows.assign(width=rows["width"].fillna(0.0))
-    for (width,), part in split(widths, "width"):
+    for (width,), part in split_by(widths, "width"):
         angles = np.sort(part["pivot_deg"].to_numpy(float))
         percent = 100 * (np.arange(len(angles)) + 0.5) / len(angles)
         beds = f"strips of {width:g} d" if width else "beds in one plane"
@@ -66,4 +66,4 @@ def _pivots(rows: pd.DataFrame) -> Canvas:
     return figure
 
 
-FIGURE = Kind(order=130, draws=draw, needs=("pile_grain",))
+FIGURE = FigureKind(order=130, draws=draw, needs=("pile_grain",))

@@ -10,10 +10,18 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
 from orchestrator.report import labels, shields, style, theory
-from orchestrator.report.figures import Kind
-from orchestrator.report.page import written
-from orchestrator.report.results import Results, case_names, drawable, split
-from orchestrator.report.shields import DEM, LABEL, PILE, RESULT, SHAPE, Points, Sheet
+from orchestrator.report.figures import FigureKind
+from orchestrator.report.page import filled
+from orchestrator.report.results import Results, case_names, drawable, split_by
+from orchestrator.report.shields import (
+    DEM,
+    LABEL,
+    PILE,
+    RESULT,
+    SHAPE,
+    DiagramSheet,
+    Points,
+)
 from orchestrator.report.style import Figure
 from orchestrator.report.theory import Going, Line
 from orchestrator.study.criterion import SUSTAINED
@@ -57,7 +65,7 @@ def draw(results: Results) -> Iterator[Figure]:
         return
     curves = _curves(lines, pd.concat([grains, piles]))
     canvas, data = _diagram(results, piles, grains, curves)
-    text = written(
+    text = filled(
         CAPTION,
         piles=shields.about(piles),
         grains=shields.about(grains),
@@ -74,18 +82,18 @@ def _diagram(
     results: Results,
     piles: pd.DataFrame,
     grains: pd.DataFrame,
-    curves: Sequence[shields.Curve],
+    curves: Sequence[shields.DrawnCurve],
 ) -> tuple[Canvas, dict[str, list[list[str]]]]:
     """The drawing, and what the page says of each point."""
     scenes = results.scenes
     panels = cache(partial(style.grid, [""], 3.5, *shields.AXES))
-    sheet = Sheet("", "", [scenes], scenes, panels)
+    sheet = DiagramSheet("", "", [scenes], scenes, panels)
     canvas, (ax,) = panels()
     xlim = shields.ends(scenes, piles, grains)
     points = _points(grains, piles, results)
     level = scenes.assign(alpha_deg=0.0)
     drawn = shields.diagram(ax, level, xlim, curves, points)
-    shields.prepare(sheet, xlim)
+    shields.log_axes(sheet, xlim)
     _legends(canvas, ax)
     return canvas, _titles(drawn, grains, piles)
 
@@ -107,8 +115,8 @@ def _points(
         (grains, "single grain", DEM, "o", 2.4),
         (piles, name, PILE, "s", 3.6),
     ):
-        for (alpha,), part in split(rows, "alpha_deg"):
-            slope = f"{label}, {labels.plain('alpha_deg', alpha)}"
+        for (alpha,), part in split_by(rows, "alpha_deg"):
+            slope = f"{label}, {labels.value_text('alpha_deg', alpha)}"
             marked = part.assign(**{SHAPE: shape, LABEL: slope})
             found.append(Points(marked, shades[float(str(alpha))], columns, size))
     return found
@@ -141,10 +149,10 @@ def _legends(canvas: Canvas, ax: Axes) -> None:
     samples = style.samples([ax])
     of_laws = [one for one in samples if one.get_gid() == RESULT[0]]
     others = [one for one in samples if one.get_gid() != RESULT[0]]
-    style.legends(canvas, of_laws, others)
+    style.legends_below(canvas, of_laws, others)
 
 
-def _curves(lines: Sequence[Line], answers: pd.DataFrame) -> list[shields.Curve]:
+def _curves(lines: Sequence[Line], answers: pd.DataFrame) -> list[shields.DrawnCurve]:
     """The curves of what is answered, each law with its look."""
     criteria = set(answers.get("criterion", []))
     going: list[Going] = []
@@ -169,7 +177,7 @@ def _curves(lines: Sequence[Line], answers: pd.DataFrame) -> list[shields.Curve]
 
 def _grains_on_the_least_slope(results: Results) -> pd.DataFrame:
     """The single grains of the one diagram."""
-    grains = _few_exact(shields.single_grains(results))
+    grains = _few_exact(shields.diagram_rows(results))
     grains = grains[drawable(grains, "reynolds", "shields_dem")]
     is_least: pd.Series[bool] = grains["alpha_deg"] == grains["alpha_deg"].min()
     return grains[is_least]
@@ -219,7 +227,7 @@ def _lines(results: Results) -> list[Line]:
     Other laws have one line, on the bed that fits the measurements best; the two laws
     of the paper are one model, on one bed.
     """
-    flat = theory.lines(results.beds("pile").assign(alpha_deg=0.0))
+    flat = theory.measured_lines(results.beds("pile").assign(alpha_deg=0.0))
     beds = [line.bed for line in flat]
     lines = [line for line in flat if line.bed in (beds[0], beds[-1])]
     drawn = {line.law for line in lines}
@@ -251,4 +259,4 @@ def _texts(row: pd.Series, columns: Sequence[str], telling: Sequence[str]) -> li
     return [scene, threshold, str(row["why_not"]), case]
 
 
-FIGURE = Kind(order=60, draws=draw, uses=("pile_threshold", "single_grain"))
+FIGURE = FigureKind(order=60, draws=draw, uses=("pile_threshold", "single_grain"))

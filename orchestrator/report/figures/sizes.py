@@ -9,7 +9,7 @@ from matplotlib.figure import Figure as Canvas
 from orchestrator.digits import percent
 from orchestrator.physics.grain import Grain
 from orchestrator.report import answers, sheets, style, theory
-from orchestrator.report.figures import Kind
+from orchestrator.report.figures import FigureKind
 from orchestrator.report.results import Results, case_names
 from orchestrator.report.style import ANSWER, INK, PALE, Figure, Look
 
@@ -41,7 +41,7 @@ def draw(results: Results) -> Iterator[Figure]:
         One figure, or none.
     """
     rows = results.exemplars
-    if rows.empty or theory.are_many(results) or sheets.sizes(results) is None:
+    if rows.empty or theory.are_many(results) or sheets.sizes_sheet(results) is None:
         return
     row = rows.iloc[0]
     classes = results.joined("size_class")
@@ -90,4 +90,4 @@ def _names(d: float, here: pd.DataFrame) -> list[str]:
     return names
 
 
-FIGURE = Kind(order=80, draws=draw, needs=("size_class", "pile_threshold"))
+FIGURE = FigureKind(order=80, draws=draw, needs=("size_class", "pile_threshold"))

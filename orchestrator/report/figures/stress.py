@@ -9,8 +9,8 @@ from matplotlib.figure import Figure as Canvas
 
 from orchestrator.grains.pile import Pile
 from orchestrator.report import labels, solved, style
-from orchestrator.report.figures import Kind
-from orchestrator.report.page import written
+from orchestrator.report.figures import FigureKind
+from orchestrator.report.page import filled
 from orchestrator.report.results import Results
 from orchestrator.report.solved import FELT, REVERSED, USTAR
 from orchestrator.report.style import Figure, Look
@@ -53,7 +53,7 @@ def draw(results: Results) -> Iterator[Figure]:
         The figures.
     """
     piles = []
-    for smoothest, *rougher in solved.kinds(results):
+    for smoothest, *rougher in solved.piles_by_kind(results):
         piles += [smoothest, *rougher[-1:]]
     if not piles:
         return
@@ -64,7 +64,7 @@ def draw(results: Results) -> Iterator[Figure]:
         for pile in piles
     ]
     averaged = ", ".join(dict.fromkeys(lengths))
-    text = written(
+    text = filled(
         CAPTION,
         mean=f"{mean:+.0%}",
         crest=f"{crest:+.0%}",
@@ -82,7 +82,7 @@ def _stress(results: Results, piles: list[Pile]) -> Canvas:
         _along(results, pile, ax)
     toes = [pile.model.line.x[-2] / pile.bed.height for pile in piles]
     axes[0].set_xlim(-4, max(toes) + 10)
-    style.legends(figure, [], style.samples(axes))
+    style.legends_below(figure, [], style.samples(axes))
     return figure
 
 
@@ -116,4 +116,4 @@ def _along(results: Results, pile: Pile, ax: Axes) -> None:
     ax.set(zorder=1, frame_on=False)  # the lines lie over the bed
 
 
-FIGURE = Kind(order=160, draws=draw, needs=("wall_stress",))
+FIGURE = FigureKind(order=160, draws=draw, needs=("wall_stress",))

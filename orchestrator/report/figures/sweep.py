@@ -8,10 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
 from orchestrator.report import answers, labels, sheets, style, theory
-from orchestrator.report.figures import Kind
+from orchestrator.report.figures import FigureKind
 from orchestrator.report.results import Results, case_names
 from orchestrator.report.style import ANSWER, INK, MEASURED, NONE, PALE, Figure
-from orchestrator.report.subjects import Quantity
+from orchestrator.report.subjects import ReportedQuantity
 
 MOST_SERIES = 4
 """Curves of a sweep that a drawing tells apart."""
@@ -43,29 +43,31 @@ def draw(results: Results) -> Iterator[Figure]:
     if theory.are_many(results) or answers.is_of_hills(results):
         return
     if results.joined("pile_threshold").empty:
-        rows = sheets.single_grains(results)
+        rows = sheets.single_grains_sheet(results)
         is_one = rows.empty or answers.is_one_grain(rows)
     else:
         rows = results.exemplars
         is_one = rows.empty or not answers.are_several_beds(results.at_fraction)
     column = None if is_one else _across(rows)
-    if column is None or len(rows) < 2 or sheets.sizes(results) is not None:
+    if column is None or len(rows) < 2 or sheets.sizes_sheet(results) is not None:
         return
     series = _series(rows, column)
     if len(series) > MOST_SERIES:
         return
-    told = sheets.quantity(rows)
-    title = f"The {told.name} that moves each, against the {labels.words(column).label}"
+    told = sheets.quantity_of_rows(rows)
+    title = (
+        f"The {told.name} that moves each, against the {labels.info_of(column).label}"
+    )
     place: style.Place = "under" if "fraction" in rows else "lead"
     drawing = _sweep(series, column, told)
     yield Figure("sweep", title, CAPTION, case_names(rows), drawing, place=place)
 
 
 def _sweep(
-    series: Sequence[tuple[str, pd.DataFrame]], column: str, told: Quantity
+    series: Sequence[tuple[str, pd.DataFrame]], column: str, told: ReportedQuantity
 ) -> Canvas:
     """The curves over a column."""
-    info = labels.words(column)
+    info = labels.info_of(column)
     scale = 1e3 if info.unit == "m" else 1.0
     unit = "mm" if info.unit == "m" else info.unit
     is_one = len(series) == 1
@@ -114,7 +116,7 @@ def _series(rows: pd.DataFrame, column: str) -> list[tuple[str, pd.DataFrame]]:
 def _draw_series(
     ax: Axes,
     part: pd.DataFrame,
-    told: Quantity,
+    told: ReportedQuantity,
     column: str,
     scale: float,
     number: int,
@@ -138,4 +140,4 @@ def _draw_series(
     ax.plot(x, measured, color=INK, lw=1.1, ls=MEASURED, zorder=1.5, label=name)
 
 
-FIGURE = Kind(order=90, draws=draw, uses=("pile_threshold", "single_grain"))
+FIGURE = FigureKind(order=90, draws=draw, uses=("pile_threshold", "single_grain"))

@@ -6,8 +6,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from orchestrator.report import labels, shields, style
-from orchestrator.report.figures import Kind
-from orchestrator.report.results import Results, split
+from orchestrator.report.figures import FigureKind
+from orchestrator.report.results import Results, split_by
 from orchestrator.report.style import Figure, Look
 
 FROZEN: Look = {"ls": "--", "lw": 0.9, "label": "flow of the whole pile"}
@@ -42,7 +42,7 @@ def draw(results: Results) -> Iterator[Figure]:
     for sheet in shields.sheets(rows, keys, 2.1, "n/N", labels.TAU_AXIS):
         _, axes = sheet.panels()
         for ax, part in zip(axes, sheet.parts, strict=True):
-            for (d, _), of_pile in split(part, "d_m", "scene_id"):
+            for (d, _), of_pile in split_by(part, "d_m", "scene_id"):
                 _draw_wear(ax, of_pile, colours[float(str(d))])
         # the panels share both axes
         axes[0].set(xlim=(0, None), ylim=(0, None))
@@ -67,4 +67,4 @@ def _draw_wear(ax: Axes, rows: pd.DataFrame, colour: str) -> None:
     ax.plot(end["fraction_moved"], end["shields"], color=colour, **APART)
 
 
-FIGURE = Kind(order=120, draws=draw, needs=("bed_change",))
+FIGURE = FigureKind(order=120, draws=draw, needs=("bed_change",))

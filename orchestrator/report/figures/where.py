@@ -13,8 +13,8 @@ from orchestrator.digits import percent
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import within
 from orchestrator.report import answers, counted, labels, single, style, units
-from orchestrator.report.figures import Kind
-from orchestrator.report.page import written
+from orchestrator.report.figures import FigureKind
+from orchestrator.report.page import filled
 from orchestrator.report.results import Results
 from orchestrator.report.solved import FELT, REVERSED, stress_on
 from orchestrator.report.style import (
@@ -27,7 +27,7 @@ from orchestrator.report.style import (
     Figure,
     Look,
 )
-from orchestrator.report.subjects import Quantity
+from orchestrator.report.subjects import ReportedQuantity
 from orchestrator.study.profile import WITH_X
 
 BEDS = 4
@@ -82,11 +82,11 @@ def draw(results: Results) -> Iterator[Figure]:
     is_local = any(pile.length == 0 for pile in piles)
     is_one = not answers.are_several_beds(results.at_fraction)
     leads = is_one or is_local or bool(piles[0].bed.profile)
-    told = single.quantity(rows[0]).name
+    told = single.quantity_of_row(rows[0]).name
     yield Figure(
         "where",
         "Where motion starts",
-        written(CAPTION, local=is_local, told=told),
+        filled(CAPTION, local=is_local, told=told),
         names,
         _beds(results, rows, piles),
         place="lead" if leads else "",
@@ -119,7 +119,7 @@ def _beds(results: Results, rows: Sequence[pd.Series], piles: Sequence[Pile]) ->
     axes = figure.subplots(3 * count, 1, height_ratios=[1.6, 0.8, 0.7] * count)
     for panels, row, pile in zip(axes.reshape(-1, 3), rows, piles, strict=True):
         _bed(results, row, pile, tuple(panels))
-    style.legends(figure, [], style.samples([*axes]))
+    style.legends_below(figure, [], style.samples([*axes]))
     return figure
 
 
@@ -130,7 +130,7 @@ def _bed(
     top, middle, below = panels
     grains = results.tables["pile_grain"]
     grains = grains[grains["scene_id"] == row["scene_id"]].sort_values("x_m")
-    told = single.quantity(row)
+    told = single.quantity_of_row(row)
     _thresholds(top, row, grains, told)
     top.set_title(_title(results, pile), loc="left")
     _stress(middle, results, pile, grains)
@@ -164,7 +164,9 @@ def _title(results: Results, pile: Pile) -> str:
     return ", ".join(title)
 
 
-def _thresholds(ax: Axes, row: pd.Series, grains: pd.DataFrame, told: Quantity) -> None:
+def _thresholds(
+    ax: Axes, row: pd.Series, grains: pd.DataFrame, told: ReportedQuantity
+) -> None:
     """The flow at which each place goes, with a band, and by the measured threshold."""
     goes = np.isfinite(grains["ustar0_m_s"]) & (grains["ustar0_m_s"] > 0)
     x = grains.loc[goes, "x_m"].to_numpy(float)
@@ -187,9 +189,9 @@ def _thresholds(ax: Axes, row: pd.Series, grains: pd.DataFrame, told: Quantity) 
     ax.set_ylabel(f"{told.name}, {told.unit}")
 
 
-def _band(ax: Axes, row: pd.Series, x: Any, ustar: Any, told: Quantity) -> None:
+def _band(ax: Axes, row: pd.Series, x: Any, ustar: Any, told: ReportedQuantity) -> None:
     """What is within the known error of the method at each place."""
-    error = single.known(row["first_known_error"])
+    error = single.known_number(row["first_known_error"])
     if not (math.isfinite(error) and error < 1):
         return
     least, most = within(1.0, error)
@@ -231,7 +233,7 @@ def _signed_square(ustar: pd.Series) -> Any:
 
 
 def _line(
-    ax: Axes, row: pd.Series, pile: Pile, grains: pd.DataFrame, told: Quantity
+    ax: Axes, row: pd.Series, pile: Pile, grains: pd.DataFrame, told: ReportedQuantity
 ) -> None:
     """The bed line, with the part that has moved at the fraction of the row."""
     bed = pile.bed
@@ -260,7 +262,9 @@ def _line(
         ax.annotate("flow ←", (0.99, 0.75), ha="right", **arrow)
 
 
-def _first(axes: Sequence[Axes], row: pd.Series, pile: Pile, told: Quantity) -> None:
+def _first(
+    axes: Sequence[Axes], row: pd.Series, pile: Pile, told: ReportedQuantity
+) -> None:
     """Mark the place where motion starts, with its flow."""
     x = float(row["first_x_m"])
     value = float(row[f"first_{told.column()}"])
@@ -281,7 +285,7 @@ def _first(axes: Sequence[Axes], row: pd.Series, pile: Pile, told: Quantity) -> 
     top.annotate(text, place, xycoords=top.get_xaxis_transform(), xytext=apart, **look)
 
 
-FIGURE = Kind(
+FIGURE = FigureKind(
     order=40,
     draws=draw,
     needs=("pile_grain", "pile_threshold"),
