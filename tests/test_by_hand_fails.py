@@ -4,11 +4,14 @@ Solvers end with 0 in many of these cases: what they have said counts.
 """
 
 import os
+import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
 
+from orchestrator.runs.case import templates
+from orchestrator.solvers.liggghts import LAST_WORDS
 from tests.flow.conftest import copied
 
 TABLES = ("wall_stress.csv", "diagnostics.csv")
@@ -52,3 +55,48 @@ def test_a_flow_that_did_not_converge(
     assert ("simpleFoam failed, see log.simpleFoam" in errors) == (expected != 0)
     # without digests of results none of the tables is of this run
     assert not any((case / name).exists() for name in TABLES)
+
+
+DERIVED = {
+    "bed": ("load_steps.csv", "motion.csv"),
+    "poured": ("bed.csv",),
+    "rebound": (),
+}
+
+
+@pytest.mark.parametrize(
+    ("said", "code", "expected", "told"),
+    [
+        (LAST_WORDS, 0, 0, ""),
+        ("", 0, 1, "LIGGGHTS stopped before the end of the deck, see log.liggghts"),
+        ("ERROR: Lost atoms", 0, 1, "stopped before the end of the deck"),
+        (LAST_WORDS, 3, 3, ""),
+    ],
+)
+@pytest.mark.parametrize("template", DERIVED)
+def test_a_deck_that_did_not_come_to_its_end(
+    tmp_path: Path, template: str, said: str, code: int, expected: int, told: str
+) -> None:
+    folder = templates() / "liggghts" / template
+    case = Path(shutil.copytree(folder, tmp_path / "case"))
+    for name in DERIVED[template]:
+        (case / name).write_text("of the run before\n")
+    script = f"echo '{said}'; exit {code}"
+    returned, errors = by_hand(case, tmp_path, "liggghts", script)
+    assert returned == expected
+    assert told in errors
+    assert bool(errors) == bool(told)
+    if expected:
+        assert not any((case / name).exists() for name in DERIVED[template])
+
+
+def test_a_bed_that_does_not_come_to_rest(tmp_path: Path) -> None:
+    """It has met no flow: the counts of a run before are not its own."""
+    folder = templates() / "liggghts" / "bed"
+    case = Path(shutil.copytree(folder, tmp_path / "case"))
+    (case / "load_steps.csv").write_text("of the run before\n")
+    script = f"echo 'the bed does not come to rest'; echo '{LAST_WORDS}'"
+    returned, errors = by_hand(case, tmp_path, "liggghts", script)
+    assert returned == 1
+    assert "the bed does not come to rest, and met no flow: see settling.csv" in errors
+    assert not (case / "load_steps.csv").exists()

@@ -82,7 +82,9 @@ def copied(place: Path) -> Path:
     return place
 
 
-def outcome(root: Path, tests: Iterable[str]) -> tuple[str, str]:
+def outcome(
+    root: Path, tests: Iterable[str], limit_s: float | None = LIMIT_S
+) -> tuple[str, str]:
     """What tests say of a copy: "passed", "failed", "hung" or "not run"; and the first that failed."""
     command = [
         sys.executable,
@@ -108,7 +110,7 @@ def outcome(root: Path, tests: Iterable[str]) -> tuple[str, str]:
             env=environment,
             capture_output=True,
             text=True,
-            timeout=LIMIT_S,
+            timeout=limit_s,
         )
     except subprocess.TimeoutExpired:
         return "hung", ""
@@ -168,7 +170,7 @@ def main(words: Sequence[str]) -> int:
     with tempfile.TemporaryDirectory() as place:
         root = copied(Path(place))
         said, by = outcome(
-            root, dict.fromkeys(test for one in chosen for test in one.tests)
+            root, dict.fromkeys(test for one in chosen for test in one.tests), None
         )
         if said != "passed":
             print(f"without a fault the tests have {said}: {by}", file=sys.stderr)

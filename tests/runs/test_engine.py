@@ -85,6 +85,17 @@ def test_a_case_is_a_copy_of_its_template_with_inputs_and_then_results(
     assert not case.done_state(step, tmp_path)
 
 
+def test_a_case_is_another_after_other_cases() -> None:
+    """Its inputs are made of their results: the same words over another flow are another run."""
+    alone, after, after_another = (
+        Step(1.0, needs).id for needs in ((), (Step(2.0),), (Step(3.0),))
+    )
+    assert len({alone, after, after_another}) == 3
+    # also where what it needs differs in what that one needs
+    deeper = Step(1.0, (Step(2.0, (Step(4.0),)),)).id
+    assert deeper not in {alone, after, after_another}
+
+
 def _order(places: int, *cases: Case) -> list[Case]:
     """Cases in the order in which a pool without solvers starts them."""
     started: list[Case] = []

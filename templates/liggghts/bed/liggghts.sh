@@ -1,4 +1,5 @@
-# Read by Allrun: `solve DECK` runs a deck with as many processes as parameters.liggghts says.
+# Read by Allrun: `solve DECK` runs a deck with as many processes as parameters.liggghts says;
+# `came_to_its_end` says of log.liggghts whether the deck was done.
 
 # a solver must not outlive the shell that started it
 bound=
@@ -30,4 +31,11 @@ solve() {
     ended=$?
     rm -rf "$own"
     return $ended
+}
+
+# LIGGGHTS ends with 0 in any case: a deck prints its last words when it is done
+came_to_its_end() {
+    grep -q '^the protocol has ended' log.liggghts && return
+    echo "Allrun: LIGGGHTS stopped before the end of the deck, see log.liggghts" >&2
+    return 1
 }
