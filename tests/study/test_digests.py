@@ -48,7 +48,7 @@ def cases(line: str = "") -> dict[str, str]:
         ("method.grains.load_increment = 0.03", {"pile"}),
         # what a run needs is in its name: another flow is another pile
         ("method.flow.cells_per_face = 20", {"pile", "flow"}),
-        ("method.flow.convection_scheme = 'upwind'", {"pile", "flow"}),
+        ("method.flow.first_cell_height = 4e-4", {"pile", "flow"}),
     ],
 )
 def test_a_field_changes_the_names_of_the_runs_that_depend_on_it(

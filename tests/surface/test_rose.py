@@ -17,6 +17,25 @@ def test_percentages_and_parts_are_one_rose() -> None:
     assert [row[0] for row in parts.rows] == [0.0, 0.0, 270.0]
 
 
+@pytest.mark.parametrize(
+    "rows", ["10,5,0.5\n90,9,0.5\n", "0,6,0.5\n90,9,0.5\n", "0,5,0.4\n90,9,0.6\n"]
+)
+def test_another_direction_speed_or_share_is_another_rose(rows: str) -> None:
+    """An old answer would stand for it."""
+    rose = read_rose(HEAD + "0,5,0.5\n90,9,0.5\n", "a.csv", WHERE)
+    other = read_rose(HEAD + rows, "a.csv", WHERE)
+    assert other != rose
+    assert other.digest != rose.digest
+
+
+def test_directions_go_from_north_over_east() -> None:
+    """The flow of another quarter would answer a rose that is read the other way round."""
+    rose = read_rose(HEAD + "80,5,0.7\n190,5,0.3\n", "a.csv", WHERE)
+    table = rose.table([0.0, 90.0, 180.0, 270.0], WHERE)
+    of = table.groupby("solved_deg")["share"].sum()
+    assert of.to_dict() == pytest.approx({90.0: 0.7, 180.0: 0.3})
+
+
 def test_each_row_is_answered_by_the_nearest_flow() -> None:
     rose = read_rose(HEAD + "350,5,0.5\n100,5,0.5\n", "a.csv", WHERE)
     table = rose.table([0.0, 90.0, 180.0, 270.0], WHERE)
