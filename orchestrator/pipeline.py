@@ -17,6 +17,7 @@ from orchestrator.runs import case, cluster, engine, reuse, terminal, workspace
 from orchestrator.runs.case import Case
 from orchestrator.runs.cluster import Queue
 from orchestrator.runs.workspace import EXPERIMENT, STATE, STUDY, Workspace, claimed
+from orchestrator.study.own_errors import noted
 from orchestrator.study.profile import Files
 from orchestrator.study.study import Study, parse
 
@@ -172,6 +173,7 @@ def _describe(study: Study, planned: Plan, space: Workspace) -> bool:
         study.source.described(space.root) if study.source else {},
         study=study.text,
         tolerance=study.tolerance,
+        errors=study.errors.described(space.root) if study.errors else None,
     )
 
 
@@ -255,6 +257,7 @@ def reopen(space: Workspace) -> tuple[Study, Plan]:
     files = Files(None)
     study = parse(about["study"], name=about["name"], where=where, files=files)
     study = replace(study, tolerance=about.get("tolerance"))
+    study = study.with_errors(noted(about.get("errors"), space.root))
     return study, plan.make(study, space.cases)
 
 

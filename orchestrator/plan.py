@@ -4,15 +4,17 @@ import time
 import timeit
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from orchestrator.digits import number
-from orchestrator.fidelity import decision, flows, limits, smoothing
+from orchestrator.errors import InputError
+from orchestrator.fidelity import decision, flows, limits, measured, smoothing
 from orchestrator.fidelity.decision import Decision, decide
+from orchestrator.fidelity.domain import unmeasured
 from orchestrator.flow.between import MOST_ERROR
 from orchestrator.grains.cells import SingleGrainCase, batches
 from orchestrator.grains.pile import Pile
@@ -20,6 +22,7 @@ from orchestrator.runs import reuse
 from orchestrator.runs.case import Case, is_whole
 from orchestrator.runs.engine import human
 from orchestrator.study.closed_form import law_holds, regime_of
+from orchestrator.study.own_errors import OwnErrors
 from orchestrator.study.parts import PileBed
 from orchestrator.study.study import Study
 
@@ -147,7 +150,10 @@ def make(study: Study, cases: Path | None = None) -> Plan:
         be solved.
     """
     limits.check_study(study)
+    measured.use(study.errors.tables if study.errors else measured.FOLDER)
     decisions = {scene.id: decide(scene, study.tolerance) for scene in study.scenes}
+    if study.errors:
+        decisions = _by_own_errors(study, study.errors, decisions)
     if not study.tolerance:
         return of(decisions, {}, cases)
     checks = decision.checks(decisions.values())
@@ -172,6 +178,26 @@ def refined(plan: Plan, cases: Path) -> Plan:
     """
     groups = flows.solved(plan.decisions, plan.checked, cases)
     return of(*groups, cases) if groups else plan
+
+
+def _by_own_errors(
+    study: Study, errors: OwnErrors, decisions: Mapping[str, Decision]
+) -> dict[str, Decision]:
+    """Note by whose errors piles are answered; refuse one that these do not hold."""
+    found = dict(decisions)
+    for group in study.groups:
+        for scene in group.scenes:
+            answer = decisions[scene.id]
+            if not isinstance(scene.bed, PileBed):
+                continue
+            beyond = unmeasured(answer.scene)
+            if beyond:
+                what = f"the ladder of --errors has no error for {beyond}"
+                remedy = "measure such a scene: orchestrator ladder FILE --out DIR"
+                raise InputError(what, group.where, remedy)
+            why = f"{answer.why}; numerical errors of {errors.name}"
+            found[scene.id] = replace(answer, why=why)
+    return found
 
 
 def of(

@@ -3,11 +3,15 @@
 import sys
 from argparse import Namespace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from orchestrator import guests
 from orchestrator.command import Command, Parser, add_run_options
 from orchestrator.runs.cluster import SYSTEMS, Queue
 from orchestrator.study.units import number_of
+
+if TYPE_CHECKING:
+    from orchestrator.study.own_errors import OwnErrors
 
 
 def _options(command: Parser) -> None:
@@ -16,6 +20,9 @@ def _options(command: Parser) -> None:
     text = "accepted relative error of a threshold, such as 0.05; the fastest models "
     text += "known to be within it are taken"
     command.add_argument("--tolerance", type=number_of, metavar="X", help=text)
+    text = "directory of a ladder, whose numerical errors are taken in place of those "
+    text += "of the package"
+    command.add_argument("--errors", type=Path, metavar="DIR", help=text)
     text = "run the cases in jobs of a queue: %(choices)s; its settings stand in the "
     text += "table [cluster] of the file"
     queues = sorted(SYSTEMS)
@@ -31,6 +38,7 @@ def _run(options: Namespace) -> int:
             print(*answered, sep="\n")
             return 0
     study = guests.load_study(options.source, options.tolerance)
+    study = study.with_errors(_errors(options))
     code = guests.taken_over(study, options)
     if code is not None:
         return code
@@ -44,6 +52,13 @@ def _run(options: Namespace) -> int:
     queue = Queue(options.cluster, study.cluster) if options.cluster else None
     ended = pipeline.run(study, out, workers=options.workers, queue=queue)
     return ended.tell()
+
+
+def _errors(options: Namespace) -> "OwnErrors | None":
+    """The numerical errors in place of the package's; None where none are given."""
+    from orchestrator.study.own_errors import own_errors
+
+    return own_errors(options.errors) if options.errors else None
 
 
 def answer_finished(options: Namespace) -> tuple[str, Path] | None:
@@ -71,7 +86,7 @@ def answer_finished(options: Namespace) -> tuple[str, Path] | None:
         digests = digests_now(file.parent, workspace.files_of(root))
     except OSError:
         return None
-    now = Source(str(file), digests, options.tolerance)
+    now = Source(str(file), digests, options.tolerance, _errors(options))
     return workspace.finished(root, file.stem, now.described(root))
 
 

@@ -38,7 +38,8 @@ import pandas as pd
 FOLDER = Path(__file__).with_name("calibration")
 """What was measured for the package."""
 LEAST_SCENES = 10
-"""Scenes from which on an error is known."""
+"""Scenes from which on an error of the package is known; of another directory one is
+enough, and `Error.confidence` says what so few can hold."""
 Key = tuple[str, str, str]
 """A part, a rung and a class of scenes."""
 _used = [FOLDER]
@@ -171,9 +172,10 @@ def together(parts: tuple[Error, ...]) -> Error:
 def errors() -> Mapping[Key, Measured]:
     """Read the measured errors, by part, name of the rung and class of scenes.
 
-    What fewer than `LEAST_SCENES` scenes say is left out: a class, or an uncertainty,
-    which is None then. Without it nobody knows what the reference is worth: of grains
-    nothing is known of the class, of the flow nothing of the reference.
+    What fewer than `LEAST_SCENES` scenes of the package say is left out: a class, or an
+    uncertainty, which is None then. Without it nobody knows what the reference is
+    worth: of grains nothing is known of the class, of the flow nothing of the
+    reference.
 
     Returns
     -------
@@ -186,8 +188,10 @@ def errors() -> Mapping[Key, Measured]:
 @cache
 def _errors(directory: Path) -> Mapping[Key, Measured]:
     table = pd.read_csv(directory / "errors.csv").sort_values("fraction")
-    is_tried = table["uncertainty_scenes"] >= LEAST_SCENES
-    is_known = table["scenes"] >= LEAST_SCENES
+    # who measures his own scenes knows how few they are
+    least = LEAST_SCENES if directory == FOLDER else 1
+    is_tried = table["uncertainty_scenes"] >= least
+    is_known = table["scenes"] >= least
     is_bare = ~is_tried & (table["part"].eq("grains") | table["rung"].eq("reference"))
     found: dict[Key, tuple[list[float], list[Error]]] = {}
     left_out = set()

@@ -21,7 +21,8 @@ from orchestrator.fidelity.classes import GRAINS, LIMITING, SMALL
 from orchestrator.types import FloatArray, Row
 
 USUAL, FEW = 0.95, 0.9
-"""Share of the scenes that a half width is to hold; the second one if there are few."""
+"""Share of the scenes that a half width is to hold; the second one if there are few:
+the largest error of n scenes holds n in n + 1, which of fewer than 9 is less."""
 LEAST_USUAL = 19
 """Scenes from which on a share of 95 % is found."""
 CHANCE = 0.05
@@ -61,7 +62,9 @@ def confidence(scenes: int) -> float:
     float
         The share.
     """
-    return USUAL if scenes >= LEAST_USUAL else FEW
+    if scenes >= LEAST_USUAL:
+        return USUAL
+    return min(FEW, scenes / (scenes + 1))
 
 
 def rank(scenes: int, share: float) -> int:

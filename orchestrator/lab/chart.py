@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import Normal, Stroke
 
 from orchestrator.digits import number
-from orchestrator.experiment import page_texts
+from orchestrator.experiment import label, page_texts
 from orchestrator.lab.choices import (
     AIM,
     OPEN,
@@ -194,11 +194,11 @@ def _blocks(choice: Choice) -> list[str]:
     """The table `method` of a study file; several where scenes differ in it."""
     blocks: dict[str, list[str]] = {}
     for answer, fields in zip(choice.answers, choice.fields, strict=True):
-        blocks.setdefault("\n".join(_method(fields)), []).append(answer.asked.id)
+        blocks.setdefault("\n".join(_method(fields)), []).append(label(answer.asked))
     lines = []
     for text, scenes in blocks.items():
         if len(blocks) > 1:
-            lines.append(f"# for {', '.join(scenes)} of scenes.csv")
+            lines += [f"# for {scene}" for scene in scenes]
         lines += text.splitlines()
     return lines
 

@@ -288,7 +288,9 @@ def _grains_in_words(rung: Rung, scene: Scene) -> str:
 
 def _of_study(study: Study) -> list[OfStudy]:
     """What the study does by itself: as it is written, and with tolerances."""
-    written_ = {scene.id: as_written(scene) for scene in study.scenes}
+    written_ = {}
+    for scene in study.scenes:
+        written_[scene.id] = as_written(with_criterion(scene))
     found = [OfStudy(WRITTEN, math.nan, written_, {})]
     for tolerance in (None, *TOLERANCES):
         answers = {scene.id: decide(scene, tolerance) for scene in study.scenes}

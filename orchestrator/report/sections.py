@@ -161,7 +161,13 @@ def _methods(results: Results) -> Section:
     fidelities = sheets.fidelities(results)
     if fidelities is not None:
         content += [
-            Text(page_text("fidelities", tolerance=results.study.tolerance)),
+            Text(
+                page_text(
+                    "fidelities",
+                    tolerance=results.study.tolerance,
+                    errors=results.study.errors,
+                )
+            ),
             Table(fidelities, "tables/pile_threshold.csv", 3),
             Text(page_text("intervals")),
         ]

@@ -311,7 +311,8 @@ class Workspace(Folder):
     def _drawn_of(self, ids: Mapping[str, str]) -> dict[str, Any]:
         """All that a page of some cases is made of: digests, and the ids by name."""
         about = self.description()
-        question = canonical_json([about.get("study"), about.get("tolerance")])
+        asked = [about.get(key) for key in ("study", "tolerance", "errors")]
+        question = canonical_json(asked)
         return {
             "question": digest_text(question),
             "cases": dict(ids),

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from orchestrator.errors import InputError, suggestion
 from orchestrator.runs.files import digest_file, opened
+from orchestrator.study.own_errors import OwnErrors
 
 
 @dataclass(frozen=True)
@@ -30,11 +31,14 @@ class Source:
         whose text the study file brings itself.
     tolerance
         The tolerance that was given in place of the file's, if one was.
+    errors
+        The numerical errors in place of the package's, if any were given.
     """
 
     file: str
     digests: Mapping[str, str | None]
     tolerance: float | None = None
+    errors: OwnErrors | None = None
 
     def described(self, root: Path) -> dict[str, object]:
         """The source as JSON, for a directory of results.
@@ -53,11 +57,14 @@ class Source:
             The source as JSON.
         """
         file = os.path.relpath(self.file, root)
-        return {
+        found: dict[str, object] = {
             "file": file,
             "tolerance": self.tolerance,
             "sha256": dict(self.digests),
         }
+        if self.errors:
+            found["errors"] = self.errors.described(root)
+        return found
 
 
 def presets() -> dict[str, Path]:

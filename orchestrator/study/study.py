@@ -29,6 +29,7 @@ from orchestrator.study.fields import FIELDS, PARTS, SEED, Quantity, default_of
 from orchestrator.study.hints import HINTS
 from orchestrator.study.keys import Table, Tables, by_name, nested
 from orchestrator.study.models import FLAT
+from orchestrator.study.own_errors import OwnErrors
 from orchestrator.study.parts import Erosion, PileBed, Sizes, percentile
 from orchestrator.study.profile import WITH_X, Files
 from orchestrator.study.reading import (
@@ -256,6 +257,8 @@ class Study(Generic[S]):
         The file itself, and the texts of the files that it names.
     source
         Where the text came from; None if it was no file.
+    errors
+        The numerical errors by which it is answered; None for those of the package.
     asked
         What is said of numbers that are usual in another unit.
     kind
@@ -274,6 +277,8 @@ class Study(Generic[S]):
     """The file itself, and the texts of the files that it names."""
     source: Source | None = None
     """None if the text came from elsewhere."""
+    errors: OwnErrors | None = None
+    """None: those of the package."""
     asked: tuple[units.NumberRemark, ...] = ()
     """What is said of numbers that are usual in another unit; of a preset nothing."""
     kind: Kind[S] = field(kw_only=True, compare=False, repr=False)
@@ -290,6 +295,30 @@ class Study(Generic[S]):
         for group in self.groups:
             found.update({scene.id: scene for scene in group.scenes})
         return tuple(found.values())
+
+    def with_errors(self, errors: OwnErrors | None) -> "Study[S]":
+        """Answer it by other numerical errors than those of the package.
+
+        Parameters
+        ----------
+        errors
+            The errors; None for those of the package.
+
+        Returns
+        -------
+        Study
+            The study.
+
+        Raises
+        ------
+        InputError
+            For a study of beds that have no such errors.
+        """
+        if errors is not None and self.kind is not PLANE:
+            what = "a ladder measures the errors of beds in a plane, not of this study"
+            raise InputError(what, "--errors", "leave it out")
+        source = self.source and replace(self.source, errors=errors)
+        return replace(self, source=source, errors=errors)
 
     @property
     def questions(self) -> tuple[str, ...]:

@@ -46,6 +46,11 @@ def test_each_kind_of_scene_has_its_own_chart() -> None:
     names = ["entrainment", "sustained motion", "entrainment, poured beds"]
     assert [kind.name for kind in found] == names
     assert [len(kind.scenes) for kind in found] == [2, 2, 2]
+    # the study's own answers are by the criterion that its fluid decides
+    for kind in found:
+        for choice in (*kind.choices, kind.reference):
+            criteria = {one.scene.threshold.criterion for one in choice.answers}
+            assert ("sustained" in criteria) == (kind.name == "sustained motion")
     (peeled,) = choices.kinds(_study('method.kind = "peeling"\n' + TEXT))
     assert peeled.name == "entrainment, by peeling"
     # the method is the study's own: the flow alone is a choice
@@ -90,7 +95,7 @@ def test_the_lines_to_write_answer_as_the_choice_does(text: str) -> None:
             head, *lines = chart.advice(kind, pd.DataFrame([row]), "one.toml")
             assert head.startswith(f"# {kind.name}: 100 % of 8 thresholds within 5 %")
             # scenes that differ in a number of the method have a table each
-            blocks = re.split(r"(?m)^# for .*\n", "\n".join(lines))
+            blocks = re.split(r"(?m)(?:^# for .*\n)+", "\n".join(lines))
             expected = {one.scene.id for one in choice.answers}
             answered: set[str] = set()
             for block in filter(None, blocks):
