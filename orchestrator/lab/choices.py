@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.experiment import Runs
-from orchestrator.fidelity import decision
+from orchestrator.fidelity import decision, flows
 from orchestrator.fidelity.decision import (
     Decision,
     as_written,
@@ -298,8 +298,8 @@ def _of_study(study: Study) -> list[OfStudy]:
             found.append(OfStudy(OPEN, math.nan, answers, {}))
         else:
             checks = decision.checks(answers.values())
-            name = f"tolerance {tolerance:g}"
-            found.append(OfStudy(name, tolerance, answers, checks))
+            put = flows.shared(answers, checks)  # as the plan of a study does
+            found.append(OfStudy(f"tolerance {tolerance:g}", tolerance, *put))
     return found
 
 
