@@ -116,6 +116,7 @@ def test_a_class_of_fewer_than_ten_scenes_has_no_known_error(
     fewer = table.assign(scenes=table["scenes"].where(~of_class, LEAST_SCENES - 1))
     fewer.to_csv(tmp_path / "errors.csv", index=False)
     shutil.copy(FOLDER / "domain.csv", tmp_path)
+    monkeypatch.setattr(measured, "FOLDER", tmp_path)  # as if it were the package's
     monkeypatch.setattr(measured, "_used", [tmp_path])
     assert known(STATIC, pile()) == UNKNOWN
     assert math.isfinite(known(STATIC, pile(packing="horizontal")).total)
