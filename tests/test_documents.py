@@ -87,6 +87,11 @@ def test_tables_of_pages_are_those_of_their_measurements() -> None:
         tool = runpy.run_path(str(ROOT / "tools" / f"{name}.py"))
         text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
         assert tool["BEGIN"] + tool[function]() + tool["END"] in text
+    tool = runpy.run_path(str(ROOT / "tools" / "validation.py"))
+    for page, blocks in tool["BLOCKS"].items():
+        text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+        for name, made in blocks.items():
+            assert tool["begin"](name) + made() + tool["END"] in text, (page, name)
 
 
 def test_the_page_of_maps_counts_the_stored_verdicts() -> None:

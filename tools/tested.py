@@ -1,7 +1,8 @@
-"""The intervals that held measured thresholds, of single grains or of poured strips.
+"""The intervals of measured thresholds, of single grains or of poured strips.
 
-Those of single grains need no run; those of strips are of the rows of a run of
-`orchestrator validate`.
+Each set of measurements is left out once, and predicted by the others. An interval is
+as wide as 80 % of the rows need that are left out so. Those of single grains need no
+run; those of strips are of the rows of a run of `orchestrator validate`.
 
 python tools/tested.py > orchestrator/physics/tested.csv
 python tools/tested.py results/validate/tables/measured.csv > orchestrator/physics/tested_strips.csv
@@ -21,6 +22,7 @@ from orchestrator.lab.validate import (
     FOLDER,
     GUST,
     INTENSITY,
+    IVERSEN_WHITE,
     MODELS,
     measured_grains,
     single,
@@ -40,6 +42,7 @@ from orchestrator.physics.beside import (
     OF_STRIPS,
     SUSTAINED,
 )
+from orchestrator.physics.curves import GAMMA
 from orchestrator.physics.laws import DEFAULT, LAWS
 from orchestrator.physics.threshold import PAPER
 from orchestrator.study import fields as columns
@@ -52,70 +55,123 @@ FLUMES = ("flumes, visual", "flumes, fixed intensity", "flumes, reference transp
 """Sets of level beds in flumes, whose rows an interval holds."""
 STEEP = ("steep flumes", "steep flumes, large elements")
 """Sets of steep beds, which an interval of sustained motion holds as well."""
-WIND = ("wind, field", "wind tunnel, curve")
-"""Sets in air."""
-IN_AIR = (0.35, 52.0)
-"""Range of Re* of the intervals in air: within 2 of those of the rows, 0.7 to 26."""
+WIND = ("wind, field", IVERSEN_WHITE)
+"""Sets in air: three sites, and a formula at some sizes."""
+IN_AIR = (1.1, 52.0)
+"""Range of Re* of the intervals in air: within 2 of those of the rows, 2.2 to 26."""
 DECADES = (0.1, 1.0, 10.0, 100.0, 1000.0, 1e4)
 LEAST = 10
 """Ranges of Re* of the intervals, and the fewest rows of one."""
+COVERED = 0.8
+"""Share of the rows left out that an interval contains."""
 OF_SUSTAINED = (DEFAULT, LAWS[DEFAULT].extended_by)
-"""Force laws of sustained motion whose intervals are found: those of the default."""
+"""Force laws of the sustained motion whose intervals are found: those of the default."""
 BETAS = {60.0: (55.0, 60.0), 50.0: (47.5, 55.0), 45.0: (42.5, 47.5)}
 """Entrainment angles of the intervals, deg, each with the range that it stands for."""
 RATIOS = {30.0: (27.0, 33.0), 10.0: (9.0, 11.0)}
 """The same of d/z0."""
 
 
+COHESIONS = (0.0, MOST_COHESION)
+"""Cohesions with which the rows in air are answered, N/m."""
+
+
 class Found(NamedTuple):
-    """What a range of Re* says: ends of the interval, rows, and the part of them in it."""
+    """What a range of Re* says.
+
+    Ends of the interval, the number of rows and of their sets, the share of the rows
+    that it contains where their set is left out, and the factor by which it is wider
+    than the tenth to ninetieth percentile.
+    """
 
     low: float
     high: float
     rows: int
+    sets: int
     held: float
+    widened: float
 
 
-def ends(
-    ratio: "pd.Series[float]",
-    sets: "pd.Series[str]",
-    fewest: int = LEAST,
-) -> tuple[float, float]:
-    """Tenth and ninetieth percentile of ratios, of all and without each of the sets.
+Ratios = Sequence["pd.Series[float]"]
+"""For each of several answers to the same measurements, the ratios of these to it."""
 
-    They are the widest; what is left without a set has at least the `fewest` rows.
-    """
-    left = (ratio[sets != name] for name in sets.unique())
-    parts = [ratio, *(part for part in left if len(part) >= fewest)]
+
+def ends(parts: Ratios) -> tuple[float, float]:
+    """Tenth and ninetieth percentile of ratios, the widest of several answers."""
     lows = (part.quantile(0.1, interpolation="lower") for part in parts)
     highs = (part.quantile(0.9, interpolation="higher") for part in parts)
     return min(lows), max(highs)
 
 
-def widest(
-    parts: Sequence["pd.Series[float]"], sets: "pd.Series[str]", fewest: int = LEAST
-) -> Found:
-    """Make the interval that is right for several answers to the same measurements.
+def needed(
+    parts: Ratios, sets: "pd.Series[str]", every: Ratios, fewest: int = LEAST
+) -> list["pd.Series[float]"] | None:
+    """Find the factor that each row needs when its set is left out.
 
     Parameters
     ----------
     parts
-        For each answer the ratios of the measured thresholds to it.
+        The ratios.
     sets
         The set of each measurement.
+    every
+        The ratios at all Re*: they are taken where fewer than `fewest` of the others
+        are in this range.
     fewest
-        Fewest rows without a set.
+        Fewest rows that predict a set.
+
+    Returns
+    -------
+    list of Series
+        For each answer, by how much wider than the percentiles of the other sets an
+        interval is that contains the row; at least 1. None where a set is alone: no
+        other says what it needs.
+    """
+    found: list[list[pd.Series[float]]] = [[] for _ in parts]
+    for name in sets[parts[0].index.union(parts[-1].index)].unique():
+        others = [part[sets[part.index] != name] for part in parts]
+        if min(map(len, others)) < fewest:
+            others = [part[sets[part.index] != name] for part in every]
+        if min(map(len, others)) < fewest:
+            return None
+        low, high = ends(others)
+        for place, part in enumerate(parts):
+            left_out = part[sets[part.index] == name]
+            beyond = np.fmax(low / left_out, left_out / high)
+            found[place].append(beyond.clip(lower=1.0))
+    return [pd.concat(each) for each in found]
+
+
+def calibrated(
+    parts: Ratios, sets: "pd.Series[str]", every: Ratios, fewest: int = LEAST
+) -> Found | None:
+    """Make the interval that is right for several answers to the same measurements.
+
+    Parameters
+    ----------
+    parts, sets, every, fewest
+        As `needed` takes them.
 
     Returns
     -------
     Found
-        The widest ends, the fewest rows, and the least part of them between the ends.
+        The percentiles of all rows, widened so that `COVERED` of the rows are contained
+        whose set is left out, and up to the answer itself; of several answers the
+        widest, the fewest rows and the least share. None where `needed` is.
     """
-    every = [ends(part, sets[part.index], fewest) for part in parts]
-    low = min(each for each, _ in every)
-    high = max(each for _, each in every)
-    held = min(float(part.between(low, high).mean()) for part in parts)
-    return Found(low, high, min(map(len, parts)), held)
+    factors = needed(parts, sets, every, fewest)
+    if factors is None:
+        return None
+    widened = max(each.quantile(COVERED, interpolation="higher") for each in factors)
+    low, high = ends(parts)
+    return Found(
+        low=min(low / widened, 1.0),
+        high=max(high * widened, 1.0),
+        rows=min(map(len, parts)),
+        sets=min(sets[part.index].nunique() for part in parts),
+        held=min(float((each <= widened).mean()) for each in factors),
+        widened=float(widened),
+    )
 
 
 def of_grains() -> pd.DataFrame:
@@ -125,8 +181,12 @@ def of_grains() -> pd.DataFrame:
     widest of those of its ends and of its middle.
     """
     beds = pd.read_csv(FOLDER / "beds.csv").rename(columns={"shields": "measured"})
+    beds = beds.assign(group=beds["set"] + ", " + beds["source"])
     grains = measured_grains(beds)
     beds = beds.assign(galileo=grains.galileo, density_ratio=grains.density_ratio)
+    # a formula says nothing of grains that its own cohesion holds
+    is_light = GAMMA / beds["d_m"] > grains.density * grains.gravity * beds["d_m"]
+    air = beds[beds["set"].isin(WIND) & ~is_light]
     made: list[Row] = []
     for name, span in RATIOS.items():
         ratios = sorted({name, *span})
@@ -136,12 +196,17 @@ def of_grains() -> pd.DataFrame:
             for each in ratios
         }
         for (beta, betas), law in itertools.product(BETAS.items(), LAWS):
-            of_entrained, of_sustained = [], []
+            of_entrained, of_sustained, in_air = [], [], []
             for angle, ratio in itertools.product(sorted({beta, *betas}), ratios):
                 at = single(beds, law, angle, ratio)
                 of_entrained.append(pd.Series(np.where(at.valid, at.shields, np.nan)))
                 moved = saltation.motion(at.shields, further[ratio], hops[ratio], GUST)
                 of_sustained.append(pd.Series(moved.shields))
+                for held in (air.assign(cohesion_n_m=each) for each in COHESIONS):
+                    at = single(held, law, angle, ratio)
+                    hop = further[ratio][air.index], hops[ratio][air.index]
+                    moved = saltation.motion(at.shields, *hop, GUST)
+                    in_air.append(pd.Series(moved.shields, air.index))
             place = {
                 "force_law": law,
                 **_range("beta_deg", *betas),
@@ -158,10 +223,9 @@ def of_grains() -> pd.DataFrame:
                 **_range("alpha_deg", 0.0, MOST_SLOPE_DEG),
             }
             in_flumes = beds["set"].isin([*FLUMES, *STEEP])
-            for row in _of_liquids(beds[in_flumes], sustained_shields):
+            for row in _of_liquids(beds[in_flumes], of_sustained):
                 made.append({**sloping, **place, **row})
-            row = _of_air(beds[beds["set"].isin(WIND)], sustained_shields)
-            made.append({**sloping, **place, **row})
+            made.append({**sloping, **place, **_of_air(air, in_air)})
     return _sorted(
         made, ["medium", "criterion", "force_law"], ["beta_deg", "d_over_z0"]
     )
@@ -184,6 +248,7 @@ def _of_liquids(
     beds: pd.DataFrame, answers: Sequence["pd.Series[float]"]
 ) -> Iterator[Row]:
     """The intervals of some answers in a liquid, by decades of their Re*."""
+    every = [(beds["measured"] / answer[beds.index]).dropna() for answer in answers]
     for low, high in itertools.pairwise(DECADES):
         parts = []
         for answer in answers:
@@ -193,6 +258,9 @@ def _of_liquids(
             parts.append((beds["measured"] / value)[here])
         if min(map(len, parts)) < LEAST:
             continue
+        found = calibrated(parts, beds["group"], every)
+        if found is None:
+            continue
         # measured beside every answer of the range
         ratios = [beds.loc[part.index, "density_ratio"] for part in parts]
         yield {
@@ -200,20 +268,22 @@ def _of_liquids(
             **_range("reynolds", low, high),
             **_range("density_ratio", max(map(min, ratios)), min(map(max, ratios))),
             **_range("cohesion_n_m", 0.0, 0.0),
-            **widest(parts, beds["set"])._asdict(),
+            **found._asdict(),
         }
 
 
 def _of_air(beds: pd.DataFrame, answers: Sequence["pd.Series[float]"]) -> Row:
     """The interval of some answers in air."""
     parts = [beds["measured"] / answer[beds.index] for answer in answers]
+    # each site, and the formula, is left out once
+    found = calibrated(parts, beds["group"], parts, fewest=2)
+    assert found is not None
     return {
         "medium": GAS,
         **_range("reynolds", *IN_AIR),
         **_range("density_ratio", *AIR_OF_QUARTZ),
         **_range("cohesion_n_m", 0.0, MOST_COHESION),
-        # each site, and the curve, is left out once
-        **widest(parts, beds["source"], fewest=2)._asdict(),
+        **found._asdict(),
     }
 
 
@@ -231,7 +301,10 @@ def of_strips(rows: pd.DataFrame, strip: Scene) -> pd.DataFrame:
         gusts = {"intensity": INTENSITY, "events": EVENTS} if model.gust > 1 else None
         scene = changed(strip, {**model.fields, "forces.law": law, "flow.gusts": gusts})
         beds = flumes[flumes["model"] == model.name]
-        beds = beds.assign(density_ratio=beds["rho_sol_kg_m3"] / beds["rho_f_kg_m3"])
+        beds = beds.assign(
+            density_ratio=beds["rho_sol_kg_m3"] / beds["rho_f_kg_m3"],
+            group=beds["set"] + ", " + beds["source"],
+        )
         used: dict[str, Any] = {**columns.used(scene), "fraction": MOVED}
         used["gust"] = scene.gust
         used["d_over_z0"] = scene.grain.diameter / scene.bed.roughness

@@ -60,11 +60,11 @@ def as_json(rows: Sequence["Row"]) -> str:
         A record has the parameters, the laws of the rules, and an object for each law.
         Every number has nine digits, which are the same on all processors.
     """
-    from orchestrator.physics.beside import MEASURED, TESTED
+    from orchestrator.physics.beside import COMPARED_WITH, MEASURED, TESTED
     from orchestrator.physics.verdict import COLUMNS
 
     names = {column: name for column, (name, _) in QUANTITIES.items()}
-    for column in ("valid", *COLUMNS, *MEASURED, *TESTED):
+    for column in ("valid", *COLUMNS, *MEASURED, COMPARED_WITH, *TESTED):
         names[column] = column
     for column in OF_CRITERION:
         if column in rows[0]:
@@ -149,6 +149,7 @@ def _of_one(rows: Sequence["Row"]) -> Iterator[str]:
     """The answer card of one point, a table of laws, and the terms of its heads."""
     from orchestrator.calculator.answer import grain_card, nearest
     from orchestrator.physics.threshold import LAWS_OF
+    from orchestrator.report import single
     from orchestrator.report.card import lines
     from orchestrator.report.subjects import TERMS
 
@@ -170,7 +171,7 @@ def _of_one(rows: Sequence["Row"]) -> Iterator[str]:
         if row is not None and row["answer"]:
             marks.append("the answer")
         if row is not None and row["law"] == near:
-            marks.append("nearest to measured")
+            marks.append(f"nearest to {single.what_beside(row)}")
         yield f"{line}  <- {', '.join(marks)}" if marks else line
     yield ""
     for term in TERMS.values():
@@ -225,7 +226,7 @@ def _of_many(rows: Sequence["Row"], asked: str, varied: Sequence[str]) -> Iterat
     if "decides" in rows[0]:
         heads |= OF_CRITERION
     heads["measured_median"] = "measured"
-    heads["measured_curve"] = "curve"
+    heads["formula_shields"] = "formula"
     yield from _as_table(chosen, heads)
 
 

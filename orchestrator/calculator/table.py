@@ -21,7 +21,12 @@ from orchestrator.calculator import (
 )
 from orchestrator.errors import InputError
 from orchestrator.physics import verdict
-from orchestrator.physics.beside import beside, measured_level_ustar
+from orchestrator.physics.beside import (
+    COMPARED_WITH,
+    beside,
+    compared_with,
+    measured_level_ustar,
+)
 from orchestrator.physics.constants import GAS_BELOW, GRAIN_COLUMNS
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import DEFAULT, LAWS, law
@@ -161,9 +166,9 @@ def _of_all_laws(
         rows_beside = beside({**block, **kind})
         block |= rows_beside
         block["level_ustar_m_s"] = of_grains(level, name, criterion).friction_velocity
-        block["measured_level_ustar_m_s"] = measured_level_ustar(
-            {**inputs, **rows_beside}
-        )
+        with_inputs = {**inputs, **rows_beside}
+        block["measured_level_ustar_m_s"] = measured_level_ustar(with_inputs)
+        block[COMPARED_WITH] = compared_with(with_inputs)
         block["answer"] = np.array([name in laws for laws in picked])
         blocks.append(block)
     table = {name: np.repeat(column, len(LAWS)) for name, column in inputs.items()}

@@ -5,7 +5,7 @@ beds are answered on strips poured from a mixture of sand. Each set has the rati
 model's value to the measured one.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,10 +18,12 @@ from orchestrator.errors import InputError
 from orchestrator.experiment import Experiment, ExperimentResults, Runs
 from orchestrator.fidelity.decision import as_written
 from orchestrator.flow.stress import WallStress, bubble
+from orchestrator.lab import activity
 from orchestrator.lab.sphere import speed_of, sphere
 from orchestrator.lab.strips import PERCENTILES, ROUGH, Strips
 from orchestrator.physics import saltation
 from orchestrator.physics.constants import GAS_BELOW
+from orchestrator.physics.curves import shao_lu, soulsby_whitehouse
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import CLIFT_GAUVIN, LAWS
@@ -50,6 +52,8 @@ FREE = 5000.0
 """Particle Reynolds number of the spheres whose drag was measured, about."""
 ENOUGH = 1.5
 """Factor over all sets within which a model would be made the default."""
+NEAR, FAR = 1.5, 2.0
+"""Factors within which rows are counted."""
 LEVEL = 0.01
 """Slope below which a bed is drawn as a level one."""
 BAND = 0.8
@@ -59,6 +63,8 @@ WINDWARD = (0.095, 0.605)
 
 It goes from the hump's steep front to its brink.
 """
+IVERSEN_WHITE = "formula of Iversen and White"
+"""Set of points that are no measurements: a formula that was fitted to wind tunnels."""
 READ = "read"
 """Mark of a row whose numbers were read in their source; others are from memory."""
 
@@ -79,6 +85,9 @@ class Model(NamedTuple):
         but one grain in closed form.
     is_entrained
         Whether grains must leave their pockets in the gust.
+    formula
+        What finds the Shields numbers of measured beds without strips or gusts; None of
+        other models.
     """
 
     name: str
@@ -86,6 +95,7 @@ class Model(NamedTuple):
     gust: float = 1.0
     is_sustained: bool = False
     is_entrained: bool = True
+    formula: Callable[[pd.DataFrame], FloatArray] | None = None
 
 
 LONE = {"forces.exposure": "protrusion"}
@@ -94,10 +104,74 @@ BALANCED = {"forces.exposure": "protrusion", "forces.sheltering": "balanced"}
 """And the drags add up to the stress of the flow."""
 GUST = peak_over_mean(INTENSITY, EVENTS)
 """Largest over mean stress of the gusts of the models that have gusts."""
+GRAVEL = "bridged-gravel"
+"""Force law of one grain, which holds for gravel as well."""
+DEFAULT = "entrained and sustained"
+"""Name of the model that `threshold` answers by in natural fluids."""
+CONSTANTS = (0.05, 0.0123)
+"""Shields numbers that are taken for all grains: in a liquid, and in a gas."""
+
+
+def by_formulas(beds: pd.DataFrame) -> FloatArray:
+    """Find what published formulas say, as one would without a model.
+
+    Parameters
+    ----------
+    beds
+        The grains and fluids, as `single` takes them.
+
+    Returns
+    -------
+    FloatArray
+        Shields numbers by Soulsby and Whitehouse in a liquid and by Shao and Lu in a
+        gas, of shape (rows,), also beyond what they were fitted to.
+    """
+    grains = measured_grains(beds)
+    in_liquid = soulsby_whitehouse(grains.dimensionless_diameter)
+    in_gas = grains.shields(shao_lu(grains))
+    return np.where(grains.fluid_density < GAS_BELOW, in_gas, in_liquid)
+
+
+def by_constants(beds: pd.DataFrame) -> FloatArray:
+    """Take one Shields number for all grains in liquids, and one for those in gases.
+
+    Parameters
+    ----------
+    beds
+        The grains and fluids, as `single` takes them.
+
+    Returns
+    -------
+    FloatArray
+        The `CONSTANTS`, of shape (rows,).
+    """
+    liquid, gas = CONSTANTS
+    return np.where(beds["rho_f_kg_m3"] < GAS_BELOW, gas, liquid)
+
+
+def in_steady_flow(beds: pd.DataFrame) -> FloatArray:
+    """Find the stress at which a flow without gusts entrains one grain.
+
+    Parameters
+    ----------
+    beds
+        The grains and fluids, as `single` takes them.
+
+    Returns
+    -------
+    FloatArray
+        Shields numbers by the law for gravel, of shape (rows,).
+    """
+    return single(beds, GRAVEL).shields
+
+
 MODELS = (
     Model("paper", {"forces.law": PAPER}),
     Model("sustained", {}, GUST, is_sustained=True, is_entrained=False),
-    Model("entrained and sustained", {}, GUST, is_sustained=True),
+    Model(DEFAULT, {}, GUST, is_sustained=True),
+    Model("formulas", {}, formula=by_formulas),
+    Model("constants", {}, formula=by_constants),
+    Model("entrained, steady", {}, formula=in_steady_flow),
     Model("bridged", {}),
     Model("bridged, protrusion", LONE),
     Model("balanced", BALANCED),
@@ -111,9 +185,12 @@ COLOURS = (
     "#56b4e9",
     "#e69f00",
     "#d55e00",
+    "#000000",
+    "#8c564b",
+    "#f0e442",
 )
 """Colours of the models in figures."""
-MARKERS = "os^DvPX"
+MARKERS = "os^DvPX*dh"
 """Markers of the models."""
 
 
@@ -227,7 +304,7 @@ def sustained_shields(
     grains = measured_grains(beds, ratio)
     if not is_entrained:
         return saltation.tabulated(grains).initiation(gust)
-    steady = single(beds, "bridged-gravel", 60, ratio).shields
+    steady = single(beds, GRAVEL, 60, ratio).shields
     return Criteria(steady, grains, gust).shields
 
 
@@ -341,6 +418,8 @@ def compare_models(
             )
             answers = _Answers(np.nan, np.nan, shields, np.nan)
             cessation = ceases
+        elif model.formula is not None:
+            answers = _Answers(np.nan, np.nan, model.formula(beds), np.nan)
         else:
             # a model with gusts has a part of the same model's stresses without them
             key = str(model.fields)
@@ -414,6 +493,61 @@ def scores(rows: pd.DataFrame) -> pd.DataFrame:
     ).reset_index()
 
 
+FLUMES = ("flumes, fixed intensity", "flumes, reference transport", "flumes, visual")
+"""Sets of level beds in flumes."""
+STEEP = ("steep flumes", "steep flumes, large elements")
+"""Sets of flumes that run down a slope."""
+RIVERS, SITES = "rivers, gravel", "wind, field"
+"""Sets of beds outside of laboratories."""
+GROUPS = {
+    "flumes and field sites": (*FLUMES, *STEEP, SITES),
+    "level flumes": FLUMES,
+    "steep flumes": STEEP,
+    "field sites in wind": (SITES,),
+    "rivers": (RIVERS,),
+}
+"""Rows that are scored together, each as much as any other, by what they are called."""
+
+
+def by_rows(rows: pd.DataFrame) -> pd.DataFrame:
+    """Score each model on the measured rows of beds, each row as much as any other.
+
+    Parameters
+    ----------
+    rows
+        The comparison, as of `compare_models`.
+
+    Returns
+    -------
+    DataFrame
+        A row for each of the `GROUPS` and each model that answers it: number of rows,
+        and of those answered; median ratio; factor in the median and at 90 % of the
+        answered rows; the share of these within 1.5 and 2. A formula is no measured
+        row.
+    """
+    made = []
+    for name, sets in GROUPS.items():
+        for model, part in rows[rows["set"].isin(sets)].groupby("model", sort=False):
+            ratio = part["ratio"].dropna()
+            if ratio.empty:
+                continue
+            factor = np.exp(np.abs(np.log(ratio)))
+            made.append(
+                {
+                    "group": name,
+                    "model": model,
+                    "rows": len(part),
+                    "answered": len(ratio),
+                    "ratio": ratio.median(),
+                    "factor": factor.median(),
+                    "factor_90": factor.quantile(0.9),
+                    "within_1.5": (factor <= NEAR).mean(),
+                    "within_2": (factor <= FAR).mean(),
+                }
+            )
+    return pd.DataFrame(made)
+
+
 class Validation(Experiment):
     """What was measured, answered on the strips, the hill and the hump of a study.
 
@@ -459,8 +593,13 @@ class Validation(Experiment):
         over = over_hump(piles[self.hump.id].stress(runs.cases))
         rows = compare_models(Strips(self.strips, runs.cases), over, lengths)
         scored = scores(rows)
-        tables = {"measured": rows, "scores": scored}
-        return ExperimentResults(tables, _sections(rows, scored))
+        tables = {
+            "measured": rows,
+            "scores": scored,
+            "rows": by_rows(rows),
+            "activity": activity.compare_activity(),
+        }
+        return ExperimentResults(tables, _sections(tables))
 
 
 def _is_hill(scene: Scene) -> bool:
@@ -479,13 +618,18 @@ def _reversed_flow(name: str, scene: Scene, runs: Runs) -> dict[str, float]:
 SETS_TEXT = """\
 Each row is a set of measurements with the number of its rows; the ratio is that of \
 the model's value to the measured one, its bar spans 10 to 90 % of the rows. Nothing \
-is fitted to these sets. The first table has the median, over the sets in which the \
-models differ, of the factor in the median; the second the factor of each set. The \
-stress over the hump is compared over its windward side, each over its own mean: the \
-boundary layer of the experiment is thinner."""
+is fitted to these sets. The first table has the median, over the sets of beds on \
+which motion starts, of the factor in the median; the second the factor of each set. \
+The stress over the hump is compared over its windward side, each over its own mean: \
+the boundary layer of the experiment is thinner."""
 FACTORS_TEXT = """\
 Ratio of the model's value to the measured one: median, and 10 to 90 % of the rows of \
 each set. The grey band is a factor of 1.5."""
+ROWS_TEXT = """\
+The factor by which a model differs from each measured threshold, in the median of \
+the rows and at 90 % of them, and the share of the rows within 1.5 and 2. `formulas` \
+(Soulsby and Whitehouse 1997 in liquids, Shao and Lu 2000 in gases) and `constants` \
+(0.05 in liquids, 0.0123 in gases) are what one would take without a model."""
 THRESHOLDS_TEXT = """\
 Level beds are answered on three poured strips of sand, where a tenth of the exposed \
 grains has moved, each by its own pivot. `bridged` is the drag and lift of a grain \
@@ -503,9 +647,10 @@ Figures that are quoted from memory count in no score. They stand here beside th
 last model."""
 
 
-def _sections(rows: pd.DataFrame, scored: pd.DataFrame) -> list[Section]:
-    """The page: the nearest model, the sets, the thresholds, what is from memory."""
-    nearest = _median_factors(scored)
+def _sections(tables: Mapping[str, pd.DataFrame]) -> list[Section]:
+    """The page: the nearest model, sets, rows, thresholds, gusts, and from memory."""
+    rows, scored = tables["measured"], tables["scores"]
+    nearest = median_factors(scored)
     title = "Model over measurement"
     chart = Figure("factors", title, FACTORS_TEXT, (), factors(scored))
     of_points = "Thresholds of level beds"
@@ -521,18 +666,34 @@ def _sections(rows: pd.DataFrame, scored: pd.DataFrame) -> list[Section]:
     return [
         Section("", [_card(nearest), told]),
         Section(title, [chart, Paragraphs(SETS_TEXT, "lead"), *medians]),
+        Section(
+            "Row by row", [Paragraphs(ROWS_TEXT, "lead"), Table.of(tables["rows"])]
+        ),
         Section("Thresholds", [points, of_beds, Table.of(scored)]),
+        activity.activity_section(tables["activity"]),
         Section("From memory", [Paragraphs(MEMORY_TEXT, "lead"), Table.of(memory)]),
         truth.truth_section(truth.stored()),
     ]
 
 
-def _median_factors(scored: pd.DataFrame) -> "pd.Series[float]":
-    """Factor of each model in the median of the sets in which the models differ."""
-    # flows and drags that all models share say nothing of which is nearer
-    differ = scored.groupby("set")["factor"].transform("nunique") > 1
-    median = scored[differ].groupby("model", sort=False)["factor"].median()
-    return median.rename("median of the sets in which they differ")
+def median_factors(scored: pd.DataFrame) -> "pd.Series[float]":
+    """Find the factor of each model in the median of the sets of measured beds.
+
+    Parameters
+    ----------
+    scored
+        The scores, as of `scores`.
+
+    Returns
+    -------
+    Series
+        The factors by model. All models answer these sets, each of which weighs alike;
+        a formula is none of them.
+    """
+    beds = {name for sets in GROUPS.values() for name in sets}
+    of_beds = scored[scored["set"].isin(beds)]
+    median = of_beds.groupby("model", sort=False)["factor"].median()
+    return median.rename("median of the sets of measured beds")
 
 
 def _card(median: "pd.Series[float]") -> Card:

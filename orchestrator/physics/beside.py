@@ -1,11 +1,13 @@
 """What was measured beside a threshold on a level bed, as columns.
 
-In a liquid it is rows of flumes, by eye; in a gas it is three sites in the field; in
-both it is a curve, too. An interval is that which held the thresholds of flumes, from
-the tenth to the ninetieth percentile over the model's. ``tested.csv`` has those of
-single grains, ``tested_strips.csv`` those of poured strips, each with the ranges of
-numbers that it is of: of the model's Re*, the ratio of densities, the entrainment
-angle, d/z0 and more. Outside of them there is none. ``tools/tested.py`` makes both.
+In a liquid it is rows of flumes, by eye; in a gas it is three sites in the field.
+Beside these stands a formula, within the range of fluids and sizes that it was fitted
+in: it is called a formula, never measured. An interval is that which held the
+thresholds of flumes, from the tenth to the ninetieth percentile over the model's.
+``tested.csv`` has those of single grains, ``tested_strips.csv`` those of poured
+strips, each with the ranges of numbers that it is of: of the model's Re*, the ratio of
+densities, the entrainment angle, d/z0 and more. Outside of them there is none.
+``tools/tested.py`` makes both.
 """
 
 import csv
@@ -30,19 +32,30 @@ FIELD_REYNOLDS = (4.4, 27.0)
 """Re* near those of the sites, 8.8 to 13.5: within a factor of 2."""
 AIR_OF_QUARTZ = (1085.0, 4580.0)
 """Densities of grains over that of the gas, within 2 of those of the sites in the
-field, 2,170 to 2,290. The curve of Shao and Lu is one of such grains, too."""
+field, 2,170 to 2,290. The formula of Shao and Lu is taken for such grains alone."""
+VISCOSITY_OF_AIR = (7.5e-6, 3e-5)
+"""Kinematic viscosities of gases that are like air, m2/s: within 2 of 1.5e-5."""
+OF_TUNNELS = (1.2e-5, 1.29e-3)
+"""Diameters of the grains of the wind tunnels that the formula of Shao and Lu was
+fitted to, m; the lower end is in the abstract of R. Greeley et al., Geophys. Res. Lett.
+3, 1976, the upper end is from memory."""
 OF_FLUMES = (1.28, 4.7)
 """Densities of grains over that of the liquid, from the least to the largest of the
 rows of flumes."""
-MOST_COHESION = 5e-5
-"""Largest cohesion of the grains whose thresholds were measured in air, N/m: the curve
-of the wind tunnel is answered with that of Shao and Lu's gamma of 1.65e-4 N/m."""
+DSTAR_OF_FLUMES = (0.379, 1705.0)
+"""Dimensionless diameters of the rows of flumes, steep ones included. The formula of
+Soulsby and Whitehouse is taken there: the range of their own rows was not found."""
+MOST_COHESION = 9.1e-5
+"""Largest cohesion of dry grains in air, N/m: the pull of a contact over the diameter
+that holds a grain between neighbours at 30 degrees as `curves.GAMMA` does,
+pi GAMMA/(12 cos 30 deg) = 9.07e-5."""
 MEASURED: Mapping[str, str] = {
-    "measured_curve": (
-        "Shields number of the same grain by a published curve for level beds: of "
-        "Soulsby and Whitehouse in a liquid, of Shao and Lu in a gas; empty for "
-        "densities over that of the fluid outside of 1.28 to 4.7 and 1085 to 4580, of "
-        "which nothing was measured"
+    "formula_shields": (
+        "Shields number of the same grain on a level bed by a formula: of Soulsby and "
+        "Whitehouse in a liquid, of Shao and Lu in a gas; empty outside of what is "
+        "like the grains that it was fitted to: densities over that of a liquid of "
+        "1.28 to 4.7 and D* of 0.379 to 1705, the rows of flumes, over that of a gas "
+        "of 1085 to 4580, grains of 0.012 to 1.29 mm and 7.5e-6 to 3e-5 m2/s"
     ),
     "measured_median": (
         "median of the Shields numbers that were measured on level beds at this Re*, "
@@ -52,18 +65,28 @@ MEASURED: Mapping[str, str] = {
     "measured_high": "ninetieth percentile of these rows, in a gas the largest",
     "measured_rows": "number of these rows",
 }
-"""Columns of what was measured at the Re*."""
+"""Columns of the formula and of what was measured at the Re*."""
 
+COMPARED_WITH, FLUMES, FORMULA = "compared_with", "flumes", "formula"
+"""Column that says what the columns ``measured_…`` of a flow are made of, and its
+words: the median of flumes, or a formula."""
 TESTED: Mapping[str, str] = {
     "tested_low": (
-        "lower end of the interval that held measured thresholds of flumes on answers "
-        "of this kind (`orchestrator validate`); the widest over the ranges of "
+        "lower end of the interval of measured thresholds on answers of this kind "
+        "(`orchestrator validate`), as wide as 80 % of them need when their set is "
+        "left out, and up to the answer itself; the widest over the ranges of "
         "entrainment angle, d/z0, ratio of densities and Re* that the rows and answers "
         "are of; empty outside of them"
     ),
     "tested_high": "upper end of this interval",
-    "tested_rows": "number of the measured rows",
-    "tested_held": "share of them that it held, the least over these ranges",
+    "tested_rows": (
+        "number of these rows; in a gas three sites in the field and five points of a "
+        "formula"
+    ),
+    "tested_held": (
+        "share of them that it contained, each set predicted from the others; the "
+        "least over these ranges"
+    ),
 }
 """Columns of the interval."""
 
@@ -74,6 +97,8 @@ LIQUID, GAS = "liquid", "gas"
 GRAINS = Path(__file__).with_name("tested.csv")
 STRIPS = Path(__file__).with_name("tested_strips.csv")
 """The tested intervals of single grains, and of poured strips."""
+OF_THE_TOOL = ("sets", "widened")
+"""Columns of both files that no answer needs: `tools/tested.py` explains them."""
 OF_STRIPS = ("sizes", "exposure", "sheltering")
 """Words that tell tested strips apart, beside those of all tested intervals."""
 NUMBERS_OF_STRIPS = (
@@ -119,17 +144,16 @@ def beside(table: Any) -> dict[str, FloatArray]:
     reynolds = np.asarray(table["reynolds"], float)
     grain = _grain(table)
     is_gas = grain.fluid_density < GAS_BELOW
-    curve = _curve(grain)
+    formula = by_formula(grain)
     rows = np.where(is_gas, _of_field(reynolds).T, _of_flumes(reynolds).T)
-    # of other grains nothing was measured, whatever a curve says
+    # of other grains nothing was measured, whatever a formula says
     is_alike = _is_alike(grain.density_ratio, is_gas)
-    curve = np.where(is_alike, curve, np.nan)
     rows = np.where(is_alike, rows, np.array(NO_ROWS)[:, None])
     held = tested(table)
     width = _slope_width(table)
     held[0] *= np.asarray(table["shields"], float) / width
     held[1] *= np.asarray(table["shields"], float) * width
-    return dict(zip((*MEASURED, *TESTED), [curve, *rows, *held], strict=True))
+    return dict(zip((*MEASURED, *TESTED), [formula, *rows, *held], strict=True))
 
 
 def _grain(table: Any) -> Grain:
@@ -143,15 +167,36 @@ def _grain(table: Any) -> Grain:
     )
 
 
-def _curve(grain: Grain) -> FloatArray:
-    """Shields number of each grain by the published curve of its medium."""
+def by_formula(grain: Grain) -> FloatArray:
+    """Find the threshold of grains on a level bed by the formula of their medium.
+
+    It is that of Soulsby and Whitehouse in a liquid and that of Shao and Lu in a gas.
+
+    Parameters
+    ----------
+    grain
+        The grains.
+
+    Returns
+    -------
+    ndarray
+        Shields numbers; NaN of grains and fluids that are not like those that the
+        formula was fitted to.
+    """
+    is_gas = grain.fluid_density < GAS_BELOW
+    dstar = grain.dimensionless_diameter
+    is_of_liquid = _is_within(dstar, DSTAR_OF_FLUMES)
+    is_of_gas = _is_within(grain.diameter, OF_TUNNELS)
+    is_of_gas &= _is_within(grain.viscosity, VISCOSITY_OF_AIR)
+    fitted = np.where(is_gas, is_of_gas, is_of_liquid)
+    fitted &= _is_alike(grain.density_ratio, is_gas)
     in_gas = grain.shields(shao_lu(grain))
-    in_liquid = soulsby_whitehouse(grain.dimensionless_diameter)
-    return np.where(grain.fluid_density < GAS_BELOW, in_gas, in_liquid)
+    theta = np.where(is_gas, in_gas, soulsby_whitehouse(dstar))
+    return np.where(fitted, theta, np.nan)
 
 
 def measured_level_ustar(table: Any) -> FloatArray:
-    """Find the measured threshold of one grain on a level bed.
+    """Find the threshold of one grain on a level bed to compare the computed one with.
 
     Parameters
     ----------
@@ -162,13 +207,39 @@ def measured_level_ustar(table: Any) -> FloatArray:
     -------
     ndarray
         Friction velocity, m/s: in a liquid that of the median of the flumes where they
-        have rows, else that of the curve. NaN where nothing was measured.
+        have rows, else that of the formula; `compared_with` says which. NaN where there
+        is neither.
     """
-    grain = _grain(table)
     median = np.asarray(table["measured_median"], float)
-    has_rows = (grain.fluid_density >= GAS_BELOW) & np.isfinite(median)
-    theta = np.where(has_rows, median, np.asarray(table["measured_curve"], float))
-    return grain.ustar_at(theta)
+    formula = np.asarray(table["formula_shields"], float)
+    return _grain(table).ustar_at(np.where(_has_flumes(table), median, formula))
+
+
+def compared_with(table: Any) -> NDArray[Any]:
+    """Say what the threshold of `measured_level_ustar` is.
+
+    Parameters
+    ----------
+    table
+        As `measured_level_ustar` takes it.
+
+    Returns
+    -------
+    ndarray
+        `FLUMES`, `FORMULA`, or None where there is neither.
+    """
+    formula = np.asarray(table["formula_shields"], float)
+    words = np.full(formula.shape, None, object)
+    words[np.isfinite(formula)] = FORMULA
+    words[_has_flumes(table)] = FLUMES
+    return words
+
+
+def _has_flumes(table: Any) -> BoolArray:
+    """Whether flumes have rows near thresholds."""
+    median = np.asarray(table["measured_median"], float)
+    is_liquid = np.asarray(table["rho_f_kg_m3"], float) >= GAS_BELOW
+    return np.asarray(is_liquid & np.isfinite(median))
 
 
 def _is_alike(density_ratio: FloatArray, is_gas: BoolArray) -> BoolArray:
@@ -329,7 +400,7 @@ def _interval(row: Mapping[str, str]) -> TestedInterval:
     own = {name: float(row[name]) for name in ("low", "high", "rows", "held")}
     words, ranges = {}, {}
     for name, value in row.items():
-        if name in own:
+        if name in own or name in OF_THE_TOOL:
             continue
         column, _, end = name.rpartition("_")
         if end == "low":

@@ -239,8 +239,16 @@ def bagnold(grain: Grain) -> FloatArray:
     return np.asarray(0.1 * grain.unit_ustar)
 
 
+GAMMA = 3e-4
+"""Cohesion of the formula of Shao and Lu, N/m.
+
+They give 1.65e-4 to 5e-4. This is the number of Y. Shao's own routine of June 2000, as
+public models of dust have it, and so the one that is meant by the formula's name.
+"""
+
+
 def shao_lu(grain: Grain) -> FloatArray:
-    """Threshold friction velocity of Shao and Lu (2000), with a cohesion of 3e-4 N/m.
+    """Threshold friction velocity of Shao and Lu (2000), with the cohesion `GAMMA`.
 
     Parameters
     ----------
@@ -258,7 +266,7 @@ def shao_lu(grain: Grain) -> FloatArray:
     >>> print(shao_lu(Grain(diameter=[5e-5, 3e-4], density=2650.0, **air)).round(4))
     [0.2735 0.3003]
     """
-    cohesion = 3e-4 / (grain.fluid_density * grain.diameter)
+    cohesion = GAMMA / (grain.fluid_density * grain.diameter)
     of_weight = grain.density_ratio * grain.gravity * grain.diameter
     return np.asarray(np.sqrt(0.0123 * (of_weight + cohesion)))
 

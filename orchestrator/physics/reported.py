@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orchestrator.physics.beside import SUSTAINED
+from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.types import BoolArray, FloatArray
@@ -34,6 +35,8 @@ MEASURED, NUMERICAL, SEEDS, OF_LAWS = (
     "force laws",
 )
 """What an interval is of, in the column ``interval_of``."""
+IN_GAS = "field sites and a formula"
+"""The same of measured thresholds in a gas."""
 COUNT = "interval_laws"
 """Column of the number of force laws whose range an interval is."""
 WIDTH = 1.02
@@ -160,7 +163,7 @@ class Interval(NamedTuple):
             high = ustar * np.sqrt(np.asarray(table["tested_high"], float) / theta)
         is_tested = np.asarray(table["tested_rows"], float) > 0
         of = np.full(len(ustar), None, object)
-        of[is_tested] = MEASURED
+        of[is_tested] = tested_word(table)[is_tested]
         return cls(low, high, of, np.full(len(ustar), np.nan))
 
     def or_of_laws(self, by_law: Iterable[tuple[FloatArray, BoolArray]]) -> "Interval":
@@ -210,6 +213,23 @@ class Interval(NamedTuple):
             made |= in_units(at, table, end)
             made[f"shields{end}"] = grains.shields(at)
         return {**made, "interval_of": self.of, COUNT: self.laws}
+
+
+def tested_word(table: Any) -> Any:
+    """Say what the tested intervals of thresholds are of.
+
+    Parameters
+    ----------
+    table
+        Columns, among them the density of the fluid.
+
+    Returns
+    -------
+    ndarray
+        `MEASURED`, or `IN_GAS`.
+    """
+    is_gas = np.asarray(table["rho_f_kg_m3"], float) < GAS_BELOW
+    return np.where(is_gas, IN_GAS, MEASURED).astype(object)
 
 
 def has_no_law(table: Any, count: int) -> BoolArray:

@@ -8,7 +8,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
 from orchestrator.physics import saltation
-from orchestrator.physics.beside import LIKE, MOST_COHESION, SUSTAINED
+from orchestrator.physics.beside import (
+    COMPARED_WITH,
+    FORMULA,
+    LIKE,
+    MOST_COHESION,
+    SUSTAINED,
+)
+from orchestrator.physics.curves import GAMMA
 from orchestrator.physics.fluids import is_gas
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.velocity import LAMINAR_BELOW, laminar
@@ -27,9 +34,6 @@ MOST_CORRECTION = 2.0
 The tested intervals of the usual roughness reach as far: 0.21 to 3.5 in the stress."""
 EXPOSED_FROM = 0.25
 """Part of a grain over the tops of its neighbours from which it is exposed."""
-COHESION = 1.65e-4
-"""Gamma of Shao and Lu, 2000, the least of theirs, N/m: over d it is a stress beside
-that of the weight. It is that of a cohesion of `MOST_COHESION`."""
 NO_START = f"not reached: no flow up to a Shields number of {saltation.MOST:g} does it"
 NO_END = "not known: hops have no end"
 NOT_REACHED = "not reached: the grain has not moved"
@@ -143,8 +147,11 @@ def of_measurements(row: Mapping[Any, Any], is_closed: bool) -> Iterator[Reason]
     if off > MOST_CORRECTION and not is_other:
         computed, measured = row["level_ustar_m_s"], row["measured_level_ustar_m_s"]
         what = f"one grain on a level bed has a friction velocity of {computed:.3g} m/s"
-        what = f"{what}, measured is {measured:.3g} m/s: more than {MOST_CORRECTION:g}"
-        yield Reason("correction", f"{what} times off", "take the measured value")
+        source, remedy = "measured is", "take the measured value"
+        if row.get(COMPARED_WITH) == FORMULA:
+            source, remedy = "the formula gives", "take the value of the formula"
+        what = f"{what}, {source} {measured:.3g} m/s: more than {MOST_CORRECTION:g}"
+        yield Reason("correction", f"{what} times off", remedy)
 
 
 def _held_by_cohesion(row: Mapping[Any, Any]) -> Iterator[Reason]:
@@ -152,11 +159,12 @@ def _held_by_cohesion(row: Mapping[Any, Any]) -> Iterator[Reason]:
     if not is_gas(row["rho_f_kg_m3"]):
         return
     left_out = 1 - row["cohesion_n_m"] / MOST_COHESION
-    pull = COHESION * left_out / row["d_m"]
+    pull = GAMMA * left_out / row["d_m"]
     weight = row["rho_sol_kg_m3"] * row["g_m_s2"] * row["d_m"]
     if pull > weight:
         times = f"{pull / weight:.2g} times its weight"
-        what = f"cohesion holds such a grain by {times} (Shao and Lu 2000)"
+        what = f"cohesion holds such a grain by {times}"
+        what = f"{what} (by the formula of Shao and Lu 2000 for dry grains in air)"
         yield Reason("cohesion", what, f"give a cohesion of {MOST_COHESION:g} N/m")
 
 
@@ -189,14 +197,18 @@ def is_measured(row: Mapping[Any, Any]) -> bool:
     Returns
     -------
     bool
-        Whether rows were measured beside it, it lies in its tested interval, and one
+        Whether rows were measured beside it, it lies inside its tested interval, which
+        ends at the answer where all that was measured is on one side of it, and one
         grain on a level bed is as measured: in a liquid within 80 % of the rows of
-        flumes or between them and the curve, else its interval contains the measured
-        value.
+        flumes or between them and the formula, else its interval contains the value
+        of the formula.
     """
     theta = float(row["shields"])
     has_interval = row["tested_rows"] > 0
-    if has_interval and not row["tested_low"] <= theta <= row["tested_high"]:
+    inside = 1 + LIKE
+    if has_interval and not (
+        row["tested_low"] * inside < theta < row["tested_high"] / inside
+    ):
         return False
     computed = float(row["level_ustar_m_s"])
     has_rows = row["measured_rows"] > 0
@@ -205,7 +217,7 @@ def is_measured(row: Mapping[Any, Any]) -> bool:
         return bool(row["tested_low"] <= theta * over**2 <= row["tested_high"])
     if not has_rows:
         return False
-    ends = (row["measured_low"], row["measured_high"], row["measured_curve"])
+    ends = (row["measured_low"], row["measured_high"], row["formula_shields"])
     level = float(Grain.of_table(row).shields(computed))
     return bool(min(ends) <= level <= max(ends))
 

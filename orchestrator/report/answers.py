@@ -477,10 +477,12 @@ def _of_mixture(row: pd.Series, results: Results) -> Card:
         f"stress that moves {percent(row['fraction'])} of the finest size, and of the "
         "coarsest",
         f"{sizes[0]:.3g} mm and {sizes[-1]:.3g} mm; beside it: the function that "
-        "Wilcock and Crowe (2003) fitted to transport, at the measured stress of d50",
+        "Wilcock and Crowe (2003) fitted to transport, at the "
+        f"{'formula' if single.is_by_formula(row) else 'measured stress'} of d50",
         last=float(stress[-1]),
         measured=beside[0],
         measured_last=beside[-1],
+        beside_is="formula",
     )
     told = single.quantity_of_row(row)
     flow = ustar_number(row) if told is STRESS else share(row, told)
@@ -681,11 +683,16 @@ def _worth_of_many(shown: pd.DataFrame, count: int, of: int) -> Worth:
         return Worth("care", word, "The others are marked, each with its reason.")
     is_near = (shown["verdict"] == USABLE).tolist()
     if all(is_near):
-        return Worth("good", "usable", "All are within what was measured.")
+        within = "All are within what was measured."
+        if any(single.is_by_formula(row) for _, row in shown.iterrows()):
+            within = "The interval of each contains what was measured or a formula."
+        return Worth("good", "usable", within)
     outside = len(is_near) - sum(is_near)
-    what = "wind" if is_gas(float(shown.iloc[0]["rho_f_kg_m3"])) else "flow"
+    first = shown.iloc[0]
+    what = "wind" if is_gas(float(first["rho_f_kg_m3"])) else "flow"
+    value = "value of the formula" if single.is_by_formula(first) else "measured value"
     advice = (
         f"{outside} of {len(is_near)} are outside what was measured on level beds: for "
-        f"a {what} take the measured value, to compare beds the computed ones."
+        f"a {what} take the {value}, to compare beds the computed ones."
     )
     return Worth("care", "usable, with a correction", advice)

@@ -50,6 +50,8 @@ class Number:
         The other end of a range of numbers, NaN of one number.
     measured_last
         The measured value beside that end.
+    beside_is
+        What the value beside it is called: ``measured``, or ``formula``.
     decimals
         Digits behind the point; None for as many as the number needs.
     mark
@@ -66,6 +68,7 @@ class Number:
     measured: float = math.nan
     last: float = math.nan
     measured_last: float = math.nan
+    beside_is: str = "measured"
     decimals: int | None = None
     mark: Mark | None = None
 
@@ -236,7 +239,7 @@ class Card:
     numbers: tuple[Number, ...]
     source: str
     worth: Worth
-    heads: tuple[str, str] = ("What measurement says", "Can it be used?")
+    heads: tuple[str, str] = ("What it is compared with", "Can it be used?")
 
     def __post_init__(self) -> None:
         if len(self.numbers) > MOST_NUMBERS:
@@ -270,7 +273,7 @@ def lines(card: Card) -> Iterator[str]:
     yield from _wrapped(text, "  ", "    ")
     if card.source:
         yield ""
-        yield from _wrapped(f"measured: {card.source}", "  ", "    ")
+        yield from _wrapped(f"compared with: {card.source}", "  ", "    ")
 
 
 def _numbers(numbers: Sequence[Number]) -> Iterator[str]:
@@ -278,10 +281,11 @@ def _numbers(numbers: Sequence[Number]) -> Iterator[str]:
     if not numbers:
         return
     has_interval = any(number.interval for number in numbers)
-    has_measured = any(number.beside for number in numbers)
+    beside_is = [number.beside_is for number in numbers if number.beside]
+    has_measured = bool(beside_is)
     heads = ["answer"]
     heads += ["interval"] if has_interval else []
-    heads += ["measured"] if has_measured else []
+    heads += beside_is[:1]
     rows = []
     for number in numbers:
         cells = [f"{number.figure} {number.unit}".strip()]

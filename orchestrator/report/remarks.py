@@ -13,7 +13,7 @@ from orchestrator.fidelity.limits import FROZEN_BED
 from orchestrator.physics.fluids import is_gas
 from orchestrator.physics.velocity import log_law_speed
 from orchestrator.physics.verdict import USABLE
-from orchestrator.report import counted, labels, sheets, theory
+from orchestrator.report import counted, labels, sheets, single, theory
 from orchestrator.report.card import Remark
 from orchestrator.report.page import caption
 from orchestrator.report.results import Results
@@ -139,7 +139,7 @@ def _of_laws(results: Results) -> Iterator[Remark]:
 
 
 def _correction(results: Results, table: pd.DataFrame) -> Iterator[Remark]:
-    """By how much the computed threshold of one grain is off the measured one."""
+    """By how much the computed threshold of one grain is off a measured one."""
     rows = table
     if len(results.exemplars):
         rows = results.exemplars
@@ -149,19 +149,17 @@ def _correction(results: Results, table: pd.DataFrame) -> Iterator[Remark]:
     if np.isnan(computed / measured) or row["verdict"] == USABLE:
         return
     ratio = computed / measured
-    flow = "flow"
-    who = "flumes"
-    if is_gas(float(row["rho_f_kg_m3"])):
-        flow = "wind"
-        who = "wind tunnels"
+    flow = "wind" if is_gas(float(row["rho_f_kg_m3"])) else "flow"
+    who, other = "flumes found", "the measured one"
+    if single.is_by_formula(row):
+        who = f"the formula of {single.formula_of(row)} gives"
+        other = "that of the formula"
     size = length(float(row["d_m"]))
     law = labels.value("force_law", row["force_law"])
-    head = (
-        f"The computed {flow} differs from the measured one by a factor of {ratio:.2g}."
-    )
+    head = f"The computed {flow} differs from {other} by a factor of {ratio:.2g}."
     text = (
         f"On a level bed of grains of {size} the force law {law} asks for a friction "
-        f"velocity of {computed:#.3g} m/s; {who} found {measured:#.3g} m/s. The table "
+        f"velocity of {computed:#.3g} m/s; {who} {measured:#.3g} m/s. The table "
         f"has both.{_of_one(row, rows)}"
     )
     yield Remark(head, text)

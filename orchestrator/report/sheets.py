@@ -179,12 +179,13 @@ def _first_grain(
     told = single.quantity_of_row(row)
     values = {**dict.fromkeys(frame.columns, "—"), **named}
     heads = _heads(told)
+    beside = next((each for each in heads[2:] if each in values), "")
     values[heads[0]] = f"{row[f'first_{told.column()}']:#.3g}"
     if heads[1] in values:
         ends = (row[f"first_{told.column(end)}"] for end in ("_low", "_high"))
         values[heads[1]] = labels.interval(*ends)
-    if heads[2] in values:
-        values[heads[2]] = f"{row[f'measured_first_{told.column()}']:#.3g}"
+    if beside:
+        values[beside] = f"{row[f'measured_first_{told.column()}']:#.3g}"
     if USTAR_HEAD in values:
         values[USTAR_HEAD] = f"{row['first_ustar0_m_s']:#.3g}"
     if "usable" in values:
@@ -271,13 +272,13 @@ def _sheet(rows: pd.DataFrame, keys: Sequence[str], name: str) -> Sheet:
     return Sheet(title, frame, tuple(shared), terms, f"tables/{name}.csv")
 
 
-def _heads(told: ReportedQuantity) -> tuple[str, str, str]:
-    """The heads of a quantity, of its interval and of what was measured."""
+def _heads(told: ReportedQuantity) -> tuple[str, ...]:
+    """The heads of a quantity, of its interval and of each kind of value beside it."""
     name = HEADS[told]
     return (
         f"{name}, {told.unit}",
         f"interval, {told.unit}",
-        f"with the measured threshold, {told.unit}",
+        *(f"{words}, {told.unit}" for words in single.WITH),
     )
 
 
@@ -326,9 +327,12 @@ def _thresholds(
         d_mm = 1e3 * rows["d_m"].groupby(number).agg(["min", "max"])
         table["diameter, mm"] = _ranges(d_mm["min"], d_mm["max"], "g")
     known = set(rows.columns[rows.notna().any()])
-    table |= _spans(low, high, _columns(told, known, is_range, bool(more)))
-    reasons = zip(usable.sum(), usable.size(), first["why_not"], strict=True)
-    table["usable"] = [_usable(*reason, is_range) for reason in reasons]
+    beside = single.with_threshold(*(row for _, row in first.iterrows()))
+    table |= _spans(low, high, _columns(told, known, beside, is_range, bool(more)))
+    table["usable"] = [
+        _usable(*reason, is_range)
+        for reason in zip(usable.sum(), usable.size(), first["why_not"], strict=True)
+    ]
     return pd.DataFrame(table)
 
 
@@ -338,15 +342,19 @@ def _different(rows: pd.DataFrame, *columns: str) -> list[str]:
 
 
 def _columns(
-    told: ReportedQuantity, known: Collection[str], is_range: bool, with_models: bool
+    told: ReportedQuantity,
+    known: Collection[str],
+    beside: str,
+    is_range: bool,
+    with_models: bool,
 ) -> dict[str, list[str]]:
     """The columns of a table of thresholds that have values, by their heads."""
-    value, interval, measured = _heads(told)
+    value, interval, *_ = _heads(told)
     columns = {value: [told.column()]}
     if not is_range:
         columns[interval] = [told.column("_low"), told.column("_high")]
     if f"measured_{told.column()}" in known:
-        columns[measured] = [f"measured_{told.column()}"]
+        columns[f"{beside}, {told.unit}"] = [f"measured_{told.column()}"]
     columns[USTAR_HEAD] = ["ustar0_m_s"]
     columns[TAU_HEAD] = ["shields"]
     columns[TAU_INTERVAL] = ["shields_low", "shields_high"]

@@ -9,9 +9,17 @@ from typing import Any
 
 from orchestrator.digits import percent
 from orchestrator.physics import verdict
-from orchestrator.physics.beside import FIELD, LEVEL_DEG, SUSTAINED
+from orchestrator.physics.beside import (
+    COMPARED_WITH,
+    FIELD,
+    FLUMES,
+    FORMULA,
+    LEVEL_DEG,
+    OF_TUNNELS,
+    SUSTAINED,
+)
 from orchestrator.physics.fluids import is_gas
-from orchestrator.physics.reported import COUNT, MEASURED, OF_LAWS, SEEDS
+from orchestrator.physics.reported import COUNT, IN_GAS, MEASURED, OF_LAWS, SEEDS
 from orchestrator.report.card import Card, Number, Worth, decimals
 from orchestrator.report.subjects import (
     DEPTH,
@@ -31,6 +39,13 @@ Row = Any
 """A row of a table with the columns of its scene, or a mapping with them."""
 
 
+WITH = (
+    "with the measured threshold",
+    "with the threshold of the formula",
+    "with the measured threshold or that of the formula",
+)
+"""What the values beside those of beds are made with: a median of flumes, a formula,
+or one of these."""
 LOAD_STEP = "the load step"
 """What the numerical interval of a single grain is of."""
 
@@ -234,7 +249,94 @@ def reported_number(
         high=known_number(row.get(f"{which}{told.column('_high')}")),
         interval_of=of_what,
         measured=known_number(row.get(f"measured_{which}{told.column()}")),
+        beside_is=beside_is(row),
     )
+
+
+def is_by_formula(row: Row) -> bool:
+    """Say whether the value beside a threshold is that of a formula.
+
+    Parameters
+    ----------
+    row
+        A threshold.
+
+    Returns
+    -------
+    bool
+        Whether it is; else it is measured, or there is none.
+    """
+    return bool(row.get(COMPARED_WITH) == FORMULA)
+
+
+def beside_is(row: Row) -> str:
+    """Name the value beside a threshold in one word.
+
+    Parameters
+    ----------
+    row
+        A threshold.
+
+    Returns
+    -------
+    str
+        ``formula`` or ``measured``.
+    """
+    return "formula" if is_by_formula(row) else "measured"
+
+
+def what_beside(row: Row) -> str:
+    """Name the value beside a threshold within a sentence.
+
+    Parameters
+    ----------
+    row
+        A threshold.
+
+    Returns
+    -------
+    str
+        ``the formula`` or ``measured``.
+    """
+    return "the formula" if is_by_formula(row) else "measured"
+
+
+def with_threshold(*rows: Row) -> str:
+    """Say with which threshold of one grain the values beside those of beds are made.
+
+    Parameters
+    ----------
+    *rows
+        Thresholds.
+
+    Returns
+    -------
+    str
+        One of the `WITH`.
+    """
+    measured, formula, either = WITH
+    words = {row.get(COMPARED_WITH) for row in rows}
+    if FORMULA not in words:
+        return measured
+    return either if FLUMES in words else formula
+
+
+def formula_of(row: Row) -> str:
+    """Name the formula of the fluid of a threshold.
+
+    Parameters
+    ----------
+    row
+        A threshold with the columns of its scene.
+
+    Returns
+    -------
+    str
+        Its authors and year.
+    """
+    if is_gas(float(row["rho_f_kg_m3"])):
+        return "Shao and Lu (2000)"
+    return "Soulsby and Whitehouse (1997)"
 
 
 def interval_of(row: Row, numerical: str) -> str:
@@ -262,12 +364,12 @@ def interval_of(row: Row, numerical: str) -> str:
         beds = f"{row['of_seeds']} replicates"
     if of_what == SEEDS:
         return f"the range of {beds}; no error of the method is known"
-    said = tested_on(row) if of_what == MEASURED else numerical
+    said = tested_on(row) if of_what in (MEASURED, IN_GAS) else numerical
     return f"{said}; it holds {beds}" if beds else said
 
 
 def tested_on(row: Row) -> str:
-    """Say which measured thresholds the tested interval of a row held.
+    """Say which measured thresholds the tested interval of a row contained.
 
     Parameters
     ----------
@@ -277,11 +379,16 @@ def tested_on(row: Row) -> str:
     Returns
     -------
     str
-        The part of them that it held, how many they are, and whether the interval
+        The part of them that it contained, how many they are, and whether the interval
         is widened for a slope.
     """
     part = percent(row["tested_held"])
-    held = f"it held {part} of {row['tested_rows']:.0f} measured thresholds"
+    count = int(row["tested_rows"])
+    them = f"{count} measured thresholds"
+    if row["interval_of"] == IN_GAS:
+        sites = len(FIELD)
+        them = f"thresholds at {sites} field sites and {count - sites} of a formula"
+    held = f"this band contained {part} of {them}, each set predicted from the others"
     if row["alpha_deg"] > LEVEL_DEG:
         return f"on level beds {held}; it is widened for the slope"
     return held
@@ -311,10 +418,12 @@ def source(row: Row, told: ReportedQuantity, which: str = "") -> str:
     if is_level(row) or row["bed"] == "grain":
         alike = ""
     if is_gas(float(row["rho_f_kg_m3"])):
+        least, most = (1e3 * end for end in OF_TUNNELS)
         said = (
-            f"Squares: {alike}the curve of Shao and Lu (2000) through wind tunnels in "
+            f"Squares: {alike}the formula of {formula_of(row)} for a level bed of "
+            f"grains of {size}, fitted to wind tunnels in air with dry grains of "
+            f"{least:g} to {most:.2g} mm."
         )
-        said += f"air, for a level bed of grains of {size}."
         return f"{said} {_field(row, told, which)}"
     if row["measured_rows"] > 0:
         rows = f"{row['measured_rows']:.0f} rows of flumes"
@@ -325,8 +434,8 @@ def source(row: Row, told: ReportedQuantity, which: str = "") -> str:
             f"{ends}."
         )
     return (
-        f"Squares: {alike}the curve of Soulsby and Whitehouse (1997) through flume "
-        f"data; no flume of the compilation has rows at Re* {row['reynolds']:.3g}."
+        f"Squares: {alike}the formula of {formula_of(row)}, fitted to flumes; no flume "
+        f"of the compilation has rows at Re* {row['reynolds']:.3g}."
     )
 
 
@@ -338,7 +447,7 @@ def _field(row: Row, told: ReportedQuantity, which: str) -> str:
     places = decimals(float(ends[0]))
     low, high = (f"{end:.{places}f}" for end in ends)
     sites = f"{len(FIELD)} field sites (Martin and Kok 2018)"
-    return f"{sites} would give {low} … {high} {told.unit}."
+    return f"The thresholds measured at {sites} give {low} … {high} {told.unit}."
 
 
 def worth(row: Row, few: bool = False) -> Worth:
@@ -365,15 +474,25 @@ def worth(row: Row, few: bool = False) -> Worth:
         )
         return Worth("care", "usable, with doubt where grains are few", advice)
     if row["verdict"] == verdict.USABLE:
-        return Worth("good", "usable", "It is within what was measured on level beds.")
+        return Worth("good", "usable", _within(row))
     advice = "No measurement is near; compare beds with each other alone."
     if row["verdict"] == verdict.CORRECTED:
         what = "wind" if is_gas(float(row["rho_f_kg_m3"])) else "flow"
-        advice = f"For the {what} take the measured value."
+        value = "value of the formula" if is_by_formula(row) else "measured value"
+        advice = f"For the {what} take the {value}."
         advice += " To compare beds take the computed one."
     if not is_level(row) and row["bed"] != "grain":
         advice = f"Take the place as computed. {advice}"
     return Worth("care", row["verdict"], advice)
+
+
+def _within(row: Row) -> str:
+    """Within what an answer is that can be used as it stands."""
+    if not is_by_formula(row):
+        return "It is within what was measured on level beds."
+    if row["measured_rows"] > 0:
+        return "Its interval contains the formula; field sites were measured near."
+    return "Its interval contains the formula; no threshold was measured near."
 
 
 def _sentence(text: object) -> str:

@@ -12,7 +12,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from orchestrator.physics.beside import ENTRAINED, measured_level_ustar
+from orchestrator.physics.beside import (
+    COMPARED_WITH,
+    ENTRAINED,
+    compared_with,
+    measured_level_ustar,
+)
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.onset import of_grains
@@ -24,6 +29,7 @@ from orchestrator.physics.reported import (
     has_no_law,
     in_units,
     measured,
+    tested_word,
 )
 from orchestrator.study.shapes import SHAPES
 from orchestrator.tables.columns import several
@@ -61,7 +67,8 @@ QUOTED: Mapping[str, str] = {
     ),
     "interval_of": (
         "what the interval of the threshold in all its units is of: measured "
-        "thresholds (tested_low, tested_high), else numerical (shields_numerical_low, "
+        "thresholds, in a gas field sites and a formula (tested_low, tested_high), "
+        "else numerical (shields_numerical_low, "
         "shields_numerical_high; of a single grain its load step), else seeds: the "
         "range of replicates, where no error is known; of a usable single grain "
         "without these force laws: the range of those that hold"
@@ -82,8 +89,13 @@ QUOTED: Mapping[str, str] = {
         "force law, closed form"
     ),
     "measured_level_ustar_m_s": (
-        "the same as measured: the median of the flumes at this Re*, else the "
-        "published curve of measured_curve"
+        "the same to compare it with: the median of the flumes at this Re*, else that "
+        "of formula_shields"
+    ),
+    COMPARED_WITH: (
+        "which of the two the columns measured_level_ustar_m_s, measured_ustar0_m_s "
+        "and measured_first_ustar0_m_s are, in all their units: flumes, measured, or "
+        "formula; empty without both"
     ),
     "measured_ustar0_m_s": (
         "undisturbed friction velocity of the same flow at the threshold, with the "
@@ -158,6 +170,7 @@ def quoted(rows: pd.DataFrame, twins: "pd.Series[int] | None" = None) -> dict[st
     of_grain = {
         "level_ustar_m_s": of_rows(rows.assign(alpha_deg=0.0))["ustar"],
         "measured_level_ustar_m_s": measured_level_ustar(rows),
+        COMPARED_WITH: compared_with(rows),
     }
     columns |= of_grain
     rows = rows.assign(**of_grain)
@@ -424,7 +437,7 @@ def _named(
     choices = [~is_known, is_tested, is_numerical]
     names = np.array([None, MEASURED, NUMERICAL, SEEDS], object)
     first = np.argmax([*choices, np.ones(len(rows), bool)], axis=0)
-    return np.asarray(names[first])
+    return np.asarray(np.where(first == 1, tested_word(rows), names[first]))
 
 
 def of_rows(rows: pd.DataFrame) -> dict[str, Any]:

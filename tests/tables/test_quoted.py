@@ -40,7 +40,7 @@ BED = {
     "force_law": "bridged",
     "depth_m": NAN,
     "flow_top": "boundary layer",
-    "measured_curve": 0.03,
+    "formula_shields": 0.03,
     "measured_median": NAN,
     "measured_low": NAN,
     "measured_high": NAN,

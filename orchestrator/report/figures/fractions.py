@@ -44,8 +44,12 @@ ENDINGS: Mapping[Along, tuple[str, str, str]] = {
 }
 """Endings of names and titles, and the figure of the paper."""
 COMPUTED: Look = {"label": "computed", "color": ANSWER, "lw": 1.5}
+REPLICATE: Look = {
+    "label": "replicates (random seeds)",
+    "color": ANSWER,
+    "lw": 0.6,
+}
 BESIDE: Look = {
-    "label": "with the measured threshold",
     "color": INK,
     "lw": 1.0,
     "ls": MEASURED,
@@ -54,8 +58,8 @@ SLOPE_OF_PAPER = 15.0
 """Slope of the pile of Fig. 14, degrees."""
 OF_THE_CARD = """\
 How the part that has moved grows with the {{ told }}. {% if seeds %}Thin: replicates
-(random seeds); disc: their mean.{% endif %} {% if measured %}Dashed: with
-the measured threshold of one grain.{% endif %}"""
+(random seeds); disc: their mean.{% endif %} {% if beside %}Dashed: {{
+beside }} of one grain.{% endif %}"""
 CAPTION = """\
 {% from "captions.j2" import laws, protocol, is_open, low_regime %} After Fig. 14 of the
 paper. Each marker is a flow: the fraction of the N(d) exposed grains that had moved,
@@ -96,9 +100,9 @@ def _of_the_card(results: Results) -> Iterator[Figure]:
     row = rows.iloc[0]
     told = single.quantity_of_row(row).name
     others = seeds_of(row, results.at_fraction)
-    has_measured = not single.is_level(row)
+    beside = "" if single.is_level(row) else single.with_threshold(row)
     title = f"The part of the grains that has moved, against the {told}"
-    text = filled(OF_THE_CARD, told=told, seeds=others, measured=has_measured)
+    text = filled(OF_THE_CARD, told=told, seeds=others, beside=beside)
     cases = tuple(run.name for run in results.plan.piles[str(row["scene_id"])].runs)
     drawing = _draw_card(row, others, results.tables["pile_curve"])
     yield Figure("share", title, text, cases, drawing, place="under")
@@ -110,16 +114,16 @@ def _draw_card(row: pd.Series, others: Sequence[str], table: pd.DataFrame) -> Ca
     canvas = style.canvas(2.0, style.NARROW)
     ax = canvas.subplots()
     table = table[np.isfinite(table["ustar0_m_s"]) & (table["ustar0_m_s"] > 0)]
-    alike: Look = {"label": "replicates (random seeds)", "color": ANSWER, "lw": 0.6}
     for scene in others:
         points = table[table["scene_id"] == scene]
         flow = units.told_by(row, points["ustar0_m_s"], told)
-        _draw_curve(ax, flow, points["fraction_moved"], alike)
+        _draw_curve(ax, flow, points["fraction_moved"], REPLICATE)
     points = table[table["scene_id"] == row["scene_id"]]
     moved = points["fraction_moved"]
     factors = [(1.0, COMPUTED)]
     if not single.is_level(row):
-        factors.append((units.measured_over_computed(row), BESIDE))
+        beside: Look = {**BESIDE, "label": single.with_threshold(row)}
+        factors.append((units.measured_over_computed(row), beside))
     at = float(row[told.column()])
     reach = [at]
     for factor, look in factors:

@@ -1,7 +1,6 @@
 """One grain: its threshold by force law and by size."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -9,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
 from orchestrator.physics import saltation
-from orchestrator.physics.curves import shao_lu, soulsby_whitehouse
+from orchestrator.physics.beside import by_formula
 from orchestrator.physics.fluids import is_gas
 from orchestrator.physics.grain import Grain
 from orchestrator.report import answers, sheets, single, style, theory, units
@@ -28,13 +27,15 @@ from orchestrator.report.style import (
 from orchestrator.report.subjects import ReportedQuantity
 from orchestrator.study.criterion import SUSTAINED
 from orchestrator.tables.quoted import of_rows
+from orchestrator.types import FloatArray
 
 FEW = 13
 """Sizes of the curve of a grain in sustained motion where no table holds it."""
 CAPTION = (
     "By law: orange, the answer; blue discs, other laws that hold; grey rings, laws "
-    "outside their range. By size: the same law, each size on its like. Dashed: "
-    "measured; shaded: the range of the sites in the field, or of 80 % of the flumes."
+    "outside their range. By size: the same law, each size on its like. Dashed: what "
+    "is written there, a formula over the sizes that it was fitted to; shaded: the "
+    "range of the sites in the field, or of 80 % of the flumes."
 )
 
 
@@ -84,7 +85,8 @@ def grain_panels(row: pd.Series) -> Canvas:
     found = of_rows(here)
     ustar = np.where(found["holds"], found["ustar"], np.nan)
     computed = units.told_by(here, ustar, told)
-    measured = units.told_by(here, _curve(row, d), told)
+    grains = Grain.of_table(here)
+    measured = units.told_by(here, grains.ustar_at(by_formula(grains)), told)
     curves = pd.DataFrame({"mm": 1e3 * d, "computed": computed, "measured": measured})
     canvas = style.canvas(2.6)
     left, right = canvas.subplots(1, 2)
@@ -140,10 +142,10 @@ def _by_law(ax: Axes, row: pd.Series, told: ReportedQuantity) -> None:
 
 
 def _measured_lines(ax: Axes, row: pd.Series, told: ReportedQuantity) -> None:
-    """A dashed line where the threshold was measured, and the field's range."""
+    """A dashed line at the median of flumes or the formula, and the measured range."""
     measured = float(row[f"measured_{told.column()}"])
     ax.axvline(measured, color=INK, lw=1.1, ls=MEASURED, zorder=1)
-    name = "wind tunnels" if is_gas(float(row["rho_f_kg_m3"])) else "flumes"
+    name = "formula" if single.is_by_formula(row) else "flumes"
     look: Look = {
         "xycoords": ax.get_xaxis_transform(),
         "textcoords": "offset points",
@@ -162,7 +164,7 @@ def _measured_lines(ax: Axes, row: pd.Series, told: ReportedQuantity) -> None:
 def _by_size(
     ax: Axes, row: pd.Series, curves: pd.DataFrame, told: ReportedQuantity
 ) -> None:
-    """The threshold by size: by the law where it holds, and by the published curve."""
+    """The threshold by size: by the law where it holds, and by the formula."""
     size = float(row["d_m"])
     mm, computed, measured = curves.to_numpy().T
     ax.plot(mm, computed, color=ANSWER, lw=1.5)
@@ -170,7 +172,8 @@ def _by_size(
     value = float(row[told.column()])
     ax.plot([1e3 * size], [value], "o", color=ANSWER, ms=6, mec="white")
     # both curves rise to the right: what is below them is free there
-    is_below = value < measured[len(measured) // 2]
+    at = _middle(measured)
+    is_below = at is None or value < measured[at]
     below: Look = {"textcoords": "offset points"}
     below |= {"xytext": (8, -6), "va": "top"}
     above = {**below, "xytext": (-8, 6), "va": "bottom", "ha": "right"}
@@ -181,20 +184,18 @@ def _by_size(
         **(below if is_below else above),
         **bold,
     )
-    name = "wind tunnels" if is_gas(float(row["rho_f_kg_m3"])) else "flumes"
-    at = 11 * len(mm) // 15
-    ax.annotate(name, (mm[at], measured[at]), **(above if is_below else below))
+    if at is not None:
+        name = f"formula of {single.formula_of(row)}"
+        ax.annotate(name, (mm[at], measured[at]), **(above if is_below else below))
     style.log_sizes(ax)
     ax.set(ylim=(0, None), xlabel="the same for other sizes, mm")
     ax.set_ylabel(f"{told.name}, {told.unit}")
 
 
-def _curve(row: pd.Series, d: Any) -> Any:
-    """Friction velocity of a published curve for grains of some sizes (m), m/s."""
-    grain = Grain.of_table(row).changed(diameter=d)
-    if is_gas(float(row["rho_f_kg_m3"])):
-        return shao_lu(grain)
-    return grain.ustar_at(soulsby_whitehouse(grain.dimensionless_diameter))
+def _middle(values: FloatArray) -> int | None:
+    """The place in the middle of the known numbers; None if there are none."""
+    known = np.flatnonzero(np.isfinite(values))
+    return int(known[len(known) // 2]) if len(known) else None
 
 
 FIGURE = FigureKind(order=20, draws=draw, needs=("single_grain",))

@@ -7,7 +7,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
-from orchestrator.report import answers, labels, sheets, style, theory
+from orchestrator.report import answers, labels, sheets, single, style, theory
 from orchestrator.report.figures import FigureKind
 from orchestrator.report.results import Results, case_names
 from orchestrator.report.style import ANSWER, INK, MEASURED, NONE, PALE, Figure
@@ -22,7 +22,7 @@ MOST_TICKS = 6
 """Sizes that an axis names each."""
 CAPTION = (
     "Orange: computed, with its interval; rings: not usable. Dashed, black: with the "
-    "measured threshold of one grain."
+    "threshold of one grain that was measured, or that a formula has."
 )
 
 
@@ -136,7 +136,8 @@ def _draw_series(
     ax.plot(x[usable], y[usable], marker, color=ANSWER, ms=5)
     ax.plot(x[~usable], y[~usable], marker, color=NONE, mfc="white", ms=5)
     measured = part[f"measured_{told.column()}"].to_numpy(float)
-    name = "with the measured threshold" if number == 0 else "_"
+    every = (row for _, row in part.iterrows())
+    name = single.with_threshold(*every) if number == 0 else "_"
     ax.plot(x, measured, color=INK, lw=1.1, ls=MEASURED, zorder=1.5, label=name)
 
 

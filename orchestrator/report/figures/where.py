@@ -41,7 +41,6 @@ COMPUTED: Look = {
     "lw": 1.5,
 }
 BESIDE: Look = {
-    "label": "with the measured threshold",
     "gid": "measured",
     "color": INK,
     "lw": 1.0,
@@ -53,8 +52,8 @@ GAP = 5.0
 CAPTION = """\
 Each bed has three panels. Above: the {{ told }} at which {{ "the local stress reaches
 the threshold of a grain on the local slope" if local else "each counted grain goes" }}.
-Orange: computed, with the known error of the method as a band. Dashed: with the
-measured threshold of one grain. Motion starts where the curve is lowest. Grey: what
+Orange: computed, with the known error of the method as a band. Dashed: {{
+beside }} of one grain. Motion starts where the curve is lowest. Grey: what
 never goes. Middle: the stress on the bed over that on the flat ground upwind; the dots
 are averaged as a grain feels it. Where the flow runs back, which is shaded, it pushes
 grains upstream. Below: the bed line; thick: what has moved by the flow of the tables at
@@ -83,10 +82,11 @@ def draw(results: Results) -> Iterator[Figure]:
     is_one = not answers.are_several_beds(results.at_fraction)
     leads = is_one or is_local or bool(piles[0].bed.profile)
     told = single.quantity_of_row(rows[0]).name
+    beside = single.with_threshold(*rows)
     yield Figure(
         "where",
         "Where motion starts",
-        filled(CAPTION, local=is_local, told=told),
+        filled(CAPTION, local=is_local, told=told, beside=beside),
         names,
         _beds(results, rows, piles),
         place="lead" if leads else "",
@@ -176,7 +176,7 @@ def _thresholds(
     measured = units.told_by(row, factor * ustar, told)
     cuts = _parted(x)
     _band(ax, row, x, ustar, told)
-    ax.plot(*_broken(x, measured, cuts), **BESIDE)
+    ax.plot(*_broken(x, measured, cuts), label=single.with_threshold(row), **BESIDE)
     ax.plot(*_broken(x, computed, cuts), **COMPUTED)
     # one collection: by the method local these may be hundreds
     across = ax.get_xaxis_transform()
