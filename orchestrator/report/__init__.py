@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from orchestrator.runs import terminal
+from orchestrator.runs import second, terminal
 
 if TYPE_CHECKING:
     from orchestrator.report.page import Guest
@@ -82,22 +82,36 @@ def _drawn(
     """The figures of a study, and a line for each that failed."""
     from orchestrator.report import figures, style
 
+    kinds = figures.kinds(packages)
+
+    def of_kind(number: int) -> "tuple[list[Figure], str]":
+        """The figures of one kind, and why others of it could not be drawn."""
+        made: list[Figure] = []
+        kind = kinds[number]
+        try:
+            for figure in kind.draw(results):
+                if is_paper and figure.follows:
+                    figure = replace(figure, place="")
+                is_drawn = every or figure.place != "folded"
+                made.append(
+                    style.drawn(figure) if is_drawn else replace(figure, drawing=None)
+                )
+        except Exception as error:
+            return made, f"{kind.name}: {type(error).__name__}: {error}"
+        terminal.check_signals()
+        return made, ""
+
     found: list[Figure] = []
     faults: list[str] = []
     with style.settings():
-        for kind in figures.kinds(packages):
-            try:
-                for figure in kind.draw(results):
-                    if is_paper and figure.follows:
-                        figure = replace(figure, place="")
-                    if every or figure.place != "folded":
-                        figure = style.saved(figure, folder)
-                    found.append(figure)
-            except Exception as error:
-                fault = f"{kind.name}: {type(error).__name__}: {error}"
+        for made, fault in second.shared(of_kind, len(kinds)):
+            found += made
+            if fault:
                 faults.append(fault)
                 print(f"a figure could not be drawn: {fault}", file=sys.stderr)
-            terminal.check_signals()
+    for figure in found:
+        if figure.image:
+            folder.put(f"{style.FIGURES}/{figure.name}.svg", figure.image)
     return found, faults
 
 

@@ -472,18 +472,34 @@ def saved(figure: Figure, folder: Folder, *, png: bool = False) -> Figure:
     Figure
         The figure with its image.
     """
-    drawn = figure.canvas  # `savefig` would draw twice, once for the layout alone
-    if drawn is None:
-        folder.put(f"{FIGURES}/{figure.name}.svg", figure.image)
-        return replace(figure, drawing=None)
-    if png:
-        raster = _png(drawn)
+    raster = b""
+    if png and figure.canvas is not None:
+        raster = _png(figure.canvas)
         folder.put(f"{FIGURES}/{figure.name}.png", raster)
-        drawn.set_layout_engine("none")  # it is laid out now
-    vector = svg(drawn)
-    folder.put(f"{FIGURES}/{figure.name}.svg", vector)
-    part = round(float(drawn.get_figwidth()) / WIDTH, 3)
-    return replace(figure, drawing=None, image=raster if png else vector, part=part)
+        figure.canvas.set_layout_engine("none")  # it is laid out now
+    made = drawn(figure)
+    folder.put(f"{FIGURES}/{figure.name}.svg", made.image)
+    return replace(made, image=raster or made.image)
+
+
+def drawn(figure: Figure) -> Figure:
+    """Draw a figure as SVG.
+
+    Parameters
+    ----------
+    figure
+        The figure.
+
+    Returns
+    -------
+    Figure
+        The figure with its image, in place of the drawing.
+    """
+    canvas = figure.canvas  # `savefig` would draw twice, once for the layout alone
+    if canvas is None:
+        return replace(figure, drawing=None)
+    part = round(float(canvas.get_figwidth()) / WIDTH, 3)
+    return replace(figure, drawing=None, image=svg(canvas), part=part)
 
 
 def _png(drawn: Canvas) -> bytes:

@@ -8,6 +8,7 @@ and kept.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cache
 from typing import cast
 
 from orchestrator.physics import velocity
@@ -26,6 +27,7 @@ from orchestrator.physics.threshold import (
 from orchestrator.study.scene import CELLS_OVER_Z0, Scene
 
 
+@cache  # every question to a scene begins with it
 def single_grain(scene: Scene) -> Grain:
     """Make the single grain of a scene.
 

@@ -1,0 +1,79 @@
+"""Pieces of work shared with a second process: all done, in order, whatever becomes of it."""
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from orchestrator.runs import processors, second
+
+
+@pytest.fixture(autouse=True)
+def _two_processors(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(processors, "count", lambda: 2)
+
+
+def test_each_piece_is_done_in_its_place(tmp_path: Path) -> None:
+    def work(number: int) -> tuple[int, int]:
+        with (tmp_path / str(number)).open("x"):
+            time.sleep(0.02)
+        return number, os.getpid()
+
+    found = second.shared(work, 9)
+    assert [number for number, _ in found] == [*range(9)]
+    assert os.getpid() in {process for _, process in found}
+
+
+def test_two_processes_share_them(tmp_path: Path) -> None:
+    def work(number: int) -> int:
+        """Pieces 0 and 1 wait for each other."""
+        (tmp_path / str(number)).touch()
+        until = time.monotonic() + 60
+        while number < 2 and not (tmp_path / str(1 - number)).exists():
+            assert time.monotonic() < until
+            time.sleep(0.01)
+        return os.getpid()
+
+    assert len({*second.shared(work, 2)}) == 2
+
+
+def test_with_one_processor_there_is_one_process(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(processors, "count", lambda: 1)
+    assert {*second.shared(lambda _: os.getpid(), 4)} == {os.getpid()}
+
+
+def test_pieces_of_a_process_that_dies_are_done(tmp_path: Path) -> None:
+    first = os.getpid()
+
+    def work(number: int) -> int:
+        """The second process dies on its first piece; the first waits until it has."""
+        if os.getpid() != first:
+            (tmp_path / "died").touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        while not (tmp_path / "died").exists():
+            time.sleep(0.01)
+        return number
+
+    assert second.shared(work, 5) == [*range(5)]
+
+
+def test_a_failure_here_ends_the_second_process(tmp_path: Path) -> None:
+    first = os.getpid()
+
+    def work(number: int) -> int:
+        if os.getpid() == first:
+            while not (tmp_path / "begun").exists():
+                time.sleep(0.01)
+            raise MemoryError
+        (tmp_path / "begun").write_text(str(os.getpid()))
+        time.sleep(600)
+        return number
+
+    with pytest.raises(MemoryError):
+        second.shared(work, 4)
+    with pytest.raises(ProcessLookupError):
+        os.kill(int((tmp_path / "begun").read_text()), 0)
