@@ -39,7 +39,7 @@ def shared(work: Callable[[int], Result], count: int) -> list[Result]:
         The results, in the order of the pieces.
     """
     can_fork = FORK in multiprocessing.get_all_start_methods()
-    if count < 2 or not can_fork or processors.count() < 2:
+    if count < 2 or not can_fork or processors.usable_count() < 2:
         return [work(number) for number in range(count)]
     context: Any = multiprocessing.get_context(FORK)
     taken = context.Value("i", 0)

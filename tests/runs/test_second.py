@@ -12,7 +12,7 @@ from orchestrator.runs import processors, second
 
 @pytest.fixture(autouse=True)
 def _two_processors(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(processors, "count", lambda: 2)
+    monkeypatch.setattr(processors, "usable_count", lambda: 2)
 
 
 def test_each_piece_is_done_in_its_place(tmp_path: Path) -> None:
@@ -42,7 +42,7 @@ def test_two_processes_share_them(tmp_path: Path) -> None:
 def test_with_one_processor_there_is_one_process(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(processors, "count", lambda: 1)
+    monkeypatch.setattr(processors, "usable_count", lambda: 1)
     assert {*second.shared(lambda _: os.getpid(), 4)} == {os.getpid()}
 
 
