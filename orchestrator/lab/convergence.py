@@ -552,12 +552,13 @@ def _sections(found: pd.DataFrame, judged: pd.DataFrame) -> list[Section]:
     """The page: the card, and each scene with its figure and its table."""
     words = page_texts(__file__, "convergence")
     sections = []
-    for place, (_, rows) in enumerate(judged.groupby("scene_id", sort=False), 1):
-        scene = str(rows["scene"].iloc[0])
-        of_scene = found[found["scene_id"] == rows["scene_id"].iloc[0]]
+    for place, (name, rows) in enumerate(judged.groupby("scene_id", sort=False), 1):
+        # words do not tell every two scenes apart
+        title = f"{rows['scene'].iloc[0]}; scene {name}"
+        of_scene = found[found["scene_id"] == name]
         drawn = chart_of(of_scene, rows)
         chart = Figure(f"convergence-{place}", CHANGES, words["figure"], (), drawn)
-        sections.append(Section(scene, [chart, Table(_table(rows), FILE)]))
+        sections.append(Section(title, [chart, Table(_table(rows), FILE)]))
     limit = Limits([words["limit"]])
     told = Paragraphs(words["method"], "lead")
     head = Section("", [_card(judged)])

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from orchestrator import cli
 from orchestrator.bed.line import of_bed
 from orchestrator.errors import InputError
 from orchestrator.experiment import piles
@@ -249,3 +250,21 @@ def test_a_pile_is_refined(tmp_path: Path) -> None:
     assert TITLE in page
     assert all(name in page for name in NAMES)
     assert made.run(tmp_path / "out", workers=2).started == 0
+
+
+def test_the_command_says_first_what_it_will_take(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "sizes.toml"
+    file.write_text(SIZES, encoding="utf-8")
+    out = tmp_path / "out"
+    assert cli.main(["convergence", str(file), "--plan", "--out", str(out)]) == 0
+    said = capsys.readouterr()
+    assert "2 of 4 scenes refined:" in said.err
+    scenes = study.load(str(file)).scenes
+    assert sum(f"  {scene.id}  20°" in said.err for scene in scenes) == 2
+    assert "expected: about" in said.out
+    assert not out.exists()
+    words = ["convergence", str(file), "--plan", "--scene", scenes[3].id]
+    assert cli.main([*words, "--out", str(out)]) == 0
+    assert f"1 of 4 scenes refined:\n  {scenes[3].id}" in capsys.readouterr().err
