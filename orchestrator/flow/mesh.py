@@ -7,6 +7,7 @@ stress has its peaks.
 
 import threading
 from dataclasses import dataclass, replace
+from functools import cache
 from math import inf, log, radians, tan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -190,6 +191,7 @@ def extended(line: BedLine, upstream: float, downstream: float) -> BedLine:
     return replace(line, x=(start, *line.x[1:-1], end))
 
 
+@cache  # flows of many roughnesses share it
 def along(line: BedLine, slope_deg: float, cells_per_face: int, growth: float) -> Grid:
     """The grid along a bed line.
 
