@@ -124,6 +124,8 @@ def test_a_mesh_that_is_no_such_mesh(
         made_by_gmsh(template)
 
 
+# so coarse a mesh is warned of, too
+@pytest.mark.filterwarnings("ignore:method.flow.cells_per_face")
 @pytest.mark.parametrize(
     ("text", "field"),
     [
