@@ -284,7 +284,7 @@ def _reasons_of_pile(
     error = row["known_error"]
     if pd.isna(error):
         what = "the error of its fidelity on such a bed is not known"
-        remedy = "`orchestrator convergence` on the study file, which estimates it"
+        remedy = "run `orchestrator convergence` on the study file, which estimates it"
         yield Reason("error not known", what, remedy)
     elif tolerance and error > tolerance * (1 + 1e-9):
         what = f"known error {error:.1%} is above the tolerance of {tolerance:.3g}"
