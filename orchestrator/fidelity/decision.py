@@ -7,14 +7,20 @@ other.
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 
-from orchestrator.fidelity import spread
+from orchestrator.fidelity import choice, spread
+from orchestrator.fidelity.choice import Way
 from orchestrator.fidelity.classes import FLOW, GRAINS, scene_class
 from orchestrator.fidelity.domain import has_measured, unmeasured
-from orchestrator.fidelity.fidelities import FIDELITIES, LOCAL, Fidelity, fidelity_of
+from orchestrator.fidelity.fidelities import (
+    LOCAL,
+    PAIRS,
+    Fidelity,
+    fidelity_of,
+)
 from orchestrator.fidelity.known import UNKNOWN, Known, known
 from orchestrator.grains.loads import LONGEST_PACKED, Geometry, has_rows_along
 from orchestrator.grains.pile import Pile
@@ -34,8 +40,7 @@ ALONG = f"{LONG_BED}: closed form along the bed, checked where motion starts"
 HOPS = "sustained motion: entrainment and hopping have closed forms"
 ENDLESS = "the rows of the bed have no end: closed form along the bed"
 NOT_MET = "the tolerance cannot be met, no error is known"
-CHOSEN = FIDELITIES[:-1]
-"""The fidelities that a choice may take: errors are measured against the last one."""
+NONE_CHEAPER = "no fidelity of a known error is cheaper than the scene as written"
 KEPT = ("method.flow.speed", "method.flow.viscosity")
 """Numbers of the solve that every fidelity keeps: u*/U_e is the same at each of them
 (docs/flow.md). Their values do not ask for DEM."""
@@ -192,24 +197,29 @@ def _along_the_bed(scene: Scene, tolerance: float | None) -> Decision:
     if not model.is_solved:
         why = f"the study asks for the flow model {model.name}"
         return replace(written, why=f"{ENDLESS}; {why}")
-    errors = {}
-    for one in CHOSEN:
-        if one.flow.takes(answer):
-            found = known(LOCAL, changed(answer, one.flow.changes(answer)))
-            if math.isfinite(found.total):
-                errors[one] = found
-    if not errors:
+    ways = [*_ways_along(answer)]
+    if not ways:
         beyond = unmeasured(answer) or "such a bed"
         return replace(written, why=f"{ENDLESS}; {NOT_MET} for {beyond}")
-    one, why = _cheapest(errors, tolerance)
-    return Decision(
-        scene,
-        changed(answer, one.flow.changes(answer)),
-        LOCAL,
-        errors[one],
-        f"{ENDLESS}, its flow by {why} within the tolerance",
-        is_chosen=True,
-    )
+    offers = choice.offered(ways, choice.cost_s(answer))
+    if not offers:
+        return replace(written, why=f"{ENDLESS}; {NONE_CHEAPER}")
+    way = choice.chosen(offers, tolerance)
+    why = f"{ENDLESS}, its flow by {choice.in_words(way, ways, tolerance)}"
+    return Decision(scene, way.answer, LOCAL, way.known, why, is_chosen=True)
+
+
+def _ways_along(scene: Scene) -> Iterator[Way]:
+    """The rungs of the flow beside the closed form along the bed, of known errors."""
+    if math.isfinite(known(LOCAL, scene).total):
+        yield Way(LOCAL, scene, known(LOCAL, scene), choice.cost_s(scene))
+    for flow in {one.flow.name: one.flow for one in PAIRS}.values():
+        if flow.takes(scene):
+            answer = changed(scene, flow.changes(scene))
+            found = known(LOCAL, answer)
+            if math.isfinite(found.total):
+                one = replace(LOCAL, name=f"{flow.name} flow", flow=flow)
+                yield Way(one, answer, found, choice.cost_s(answer))
 
 
 def _by(scene: Scene, method: ThresholdMethod) -> Scene:
@@ -264,19 +274,22 @@ def _leaving(scene: Scene, tolerance: float | None) -> Decision:
     why_as_written = _why_as_written(scene, tolerance)
     if why_as_written is not None:
         return as_written(scene, why_as_written)
-    within = "within the tolerance"
+    ways = [*_ways(scene)]
+    if not ways:
+        return as_written(scene, "no error is known for such a bed")
+    offers = choice.offered(ways, choice.cost_s(written(scene)))
+    if not offers:
+        return as_written(scene, NONE_CHEAPER)
     most = tolerance
     if most is None:
-        floor = floor_of(scene)
-        most = floor.error
-        within = f"within the model's own spread of {floor}"
-    fidelity, why = _looked_up(scene, most)
-    if fidelity is None:
-        return as_written(scene, why)
-    why = f"{why} {within}"
+        most = floor_of(scene).error
+    way = choice.chosen(offers, most)
+    why = choice.in_words(way, ways, most)
     if tolerance is None:
-        why = f"chosen by default: {why}"
-    return on_fidelity(scene, fidelity, why, is_chosen=True)
+        why = (
+            f"chosen by default, for the model's own spread of {floor_of(scene)}: {why}"
+        )
+    return Decision(scene, way.answer, way.fidelity, way.known, why, is_chosen=True)
 
 
 def floor_of(scene: Scene) -> spread.Floor:
@@ -473,38 +486,24 @@ def _best_model(scene: Scene) -> FlowModel:
     return models.FLAT if scene.bed.is_level else models.SOLVE
 
 
-def _looked_up(scene: Scene, most: float) -> tuple[Fidelity | None, str]:
-    """The fidelity that answers a pile with an error of at most `most`, and why it.
-
-    No fidelity where no error is known.
-    """
+def _ways(scene: Scene) -> Iterator[Way]:
+    """The ways to answer a pile whose errors are known, the scene as written first."""
+    own = written(scene)
+    found = known(fidelity_of(own), own)
+    if math.isfinite(found.total):
+        yield Way(fidelity_of(own), own, found, choice.cost_s(own))
     is_long = scene.method.is_open and _is_long(scene)
-    errors: dict[Fidelity, Known] = {}
-    for one in CHOSEN:
-        if is_long and one.is_resolved_in_time:
+    seen = set()
+    for one in PAIRS:
+        pair = (one.flow_over(scene), one.grains)
+        if pair in seen or (is_long and one.is_resolved_in_time):
             continue
+        seen.add(pair)
         if one.takes(scene):
             found = known(one, scene)
             if math.isfinite(found.total):
-                errors[one] = found
-    if not errors:
-        return None, "no error is known for such a bed"
-    return _cheapest(errors, most)
-
-
-def _cheapest(errors: Mapping[Fidelity, Known], most: float) -> tuple[Fidelity, str]:
-    """The cheapest fidelity with an error of at most `most`, and why it.
-
-    Where there is none, it is the cheapest whose error alone is no larger than that of
-    the best with its uncertainty: they cannot be told apart.
-    """
-    for one, error in errors.items():
-        if error.total <= most:
-            return one, f"{one.name}, the cheapest fidelity"
-    least = min(error.total for error in errors.values())
-    alike = next(one for one, error in errors.items() if error.worst.error <= least)
-    why = "the cheapest fidelity that cannot be told from the best, which is known to"
-    return alike, f"{alike.name}, {why} {least:.1%}: none is"
+                answer = one.answer(scene)
+                yield Way(one, answer, found, choice.cost_s(answer))
 
 
 def _check_group(scene: Scene) -> tuple[object, ...]:
@@ -518,7 +517,8 @@ def checks(answers: Iterable[Decision]) -> dict[str, Decision]:
 
     Of each group it is the pile that DEM, as the scene is written, answers in the least
     time. A check is the answer of the same scene with ``method.kind = "dem"``, by the
-    same criterion of motion.
+    same criterion of motion. A group is not checked where that would cost more than its
+    answers save: one that is checked costs no more than as it is written.
 
     Parameters
     ----------
@@ -530,18 +530,25 @@ def checks(answers: Iterable[Decision]) -> dict[str, Decision]:
     dict of str to Decision
         The checks, by the id of the asked scene.
     """
-    cheapest: dict[object, tuple[float, str, Scene]] = {}
+    groups: dict[object, list[Decision]] = {}
     for answer in answers:
-        if not answer.is_unchecked:
-            continue
-        dem = _by(answer.asked, methods.DEM)
-        member = (Pile(dem).case.cost_s, answer.asked.id, dem)
-        group = _check_group(answer.asked)
-        cheapest[group] = min(
-            cheapest.get(group, member), member, key=lambda one: one[:2]
-        )
-    why = "it checks an answer without DEM"
-    return {
-        asked: replace(decide(dem, None), why=why)
-        for _, asked, dem in cheapest.values()
-    }
+        if answer.is_unchecked:
+            groups.setdefault(_check_group(answer.asked), []).append(answer)
+    found = {}
+    for members in groups.values():
+        by_dem = [(_by(one.asked, methods.DEM), one.asked.id) for one in members]
+        dem, asked = min(by_dem, key=lambda one: (Pile(one[0]).case.cost_s, one[1]))
+        if _is_worth(dem, members):
+            why = "it checks an answer without DEM"
+            found[asked] = replace(decide(dem, None), why=why)
+    return found
+
+
+def _is_worth(check: Scene, members: Iterable[Decision]) -> bool:
+    """Whether answers with their check cost no more than all of them as written."""
+    spent = choice.runs_of(check)
+    saved: dict[str, float] = {}
+    for one in members:
+        spent |= choice.runs_of(one.scene)
+        saved |= choice.runs_of(written(one.asked))
+    return sum(spent.values()) <= sum(saved.values()) * (1 + 1e-9)

@@ -1,4 +1,4 @@
-"""Fidelities: named ways to answer a pile, from fast to accurate.
+"""Fidelities: named ways to answer a pile, by cost.
 
 A fidelity changes how a scene is answered, never what it asks. It has two rungs of the
 ladder of models, one for the flow and one for the grains. ``study/fidelities.toml``
@@ -299,8 +299,35 @@ FLAT = Rung(
     {"method.flow.model": models.FLAT.name},
 )
 FIDELITIES = _load()
-"""The fidelities, from fast to accurate: the last one is the reference."""
-QUICK, REFERENCE = FIDELITIES[0], FIDELITIES[-1]
+"""The fidelities, by cost."""
+REFERENCE = next(one for one in FIDELITIES if written.WRITTEN[one.name].is_reference)
+"""The fidelity against which errors are measured; a choice takes none of its rungs."""
+
+
+def _pairs() -> tuple[Fidelity, ...]:
+    """Each rung of the flow beside each rung of the grains, but for the reference."""
+    flows: list[Rung] = []
+    grains: list[Rung] = []
+    for one in FIDELITIES:
+        if one is REFERENCE:
+            continue
+        if all(one.flow.sets != flow.sets for flow in flows):
+            flows.append(one.flow)
+        grains.append(one.grains)
+    return tuple(_pair(flow, other) for flow in flows for other in grains)
+
+
+def _pair(flow: Rung, grains: Rung) -> Fidelity:
+    """The fidelity of two rungs: one that has a name, or a new one."""
+    for one in FIDELITIES:
+        if one.flow.sets == flow.sets and one.grains is grains:
+            return one
+    meaning = f"flow as in {flow.name}, grains as in {grains.name}"
+    return Fidelity(f"{flow.name} flow, {grains.name} grains", meaning, flow, grains)
+
+
+PAIRS = _pairs()
+"""The fidelities that a choice may take: flow and grains are chosen apart."""
 OWN = Rung("own", "numbers of the study file")
 OWN_NUMBERS = Fidelity("own numbers", "numbers of the study file", OWN, OWN)
 """Stands for the fidelity of a scene that has the numbers of none."""

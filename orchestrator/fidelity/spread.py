@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.digits import number
-from orchestrator.fidelity.measured import FOLDER
+from orchestrator.fidelity.measured import FOLDER, LEAST_SCENES
 from orchestrator.study.closed_form import closed_form
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
@@ -148,9 +148,9 @@ class Floor(NamedTuple):
     ----------
     error
         Half the interval of the choices that no study file states, the smallest over
-        the fractions.
+        the fractions and the classes of beds of one kind.
     scenes
-        The number of scenes that it was measured on.
+        The number of beds that it was measured on.
     """
 
     error: float
@@ -164,18 +164,29 @@ class Floor(NamedTuple):
 def floors() -> dict[str, Floor]:
     """Find the errors below which the model's uncertainty hides the numerics, by class.
 
+    Poured beds and lattices are a kind each: of one class two beds were measured.
+
     Returns
     -------
     dict of str to Floor
-        The floors, each with the few scenes that it rests on.
+        The floors of the classes of each kind of which at least `LEAST_SCENES` beds
+        were measured.
     """
     unstated = _budget()[~_budget()["choice"].isin(STATED)]
-    found = {}
+    kinds: dict[bool, dict[str, Floor]] = {}
     for model, rows in unstated.groupby("model_class"):
         halves = [
             sum(combined_shares(part)) / 2 for _, part in rows.groupby("fraction")
         ]
-        found[str(model)] = Floor(min(halves), int(rows["scenes"].min()))
+        floor = Floor(min(halves), int(rows["scenes"].min()))
+        is_poured = str(model).startswith("poured")
+        kinds.setdefault(is_poured, {})[str(model)] = floor
+    found: dict[str, Floor] = {}
+    for classes in kinds.values():
+        least = min(floor.error for floor in classes.values())
+        pooled = Floor(least, sum(floor.scenes for floor in classes.values()))
+        if pooled.scenes >= LEAST_SCENES:
+            found |= dict.fromkeys(classes, pooled)
     return found
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.digits import percent
-from orchestrator.fidelity.fidelities import FIDELITIES, LOCAL, OWN_NUMBERS
+from orchestrator.fidelity.fidelities import FIDELITIES, LOCAL, OWN_NUMBERS, PAIRS
 from orchestrator.grains.threshold import STEP
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import LAWS
@@ -616,7 +616,9 @@ def fidelities(results: Results) -> pd.DataFrame | None:
     DataFrame or None
         Why each was chosen, and what is known of it; None without piles.
     """
-    meanings = {one.name: one.meaning for one in (*FIDELITIES, LOCAL, OWN_NUMBERS)}
+    meanings = {
+        one.name: one.meaning for one in (*FIDELITIES, *PAIRS, LOCAL, OWN_NUMBERS)
+    }
     table = results.joined("pile_threshold")
     rows = []
     for (name, why), group in split_by(table, "fidelity", "why"):

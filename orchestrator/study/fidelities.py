@@ -34,6 +34,8 @@ class Written:
         By packing, the fields of the grains that it sets to something else there.
     not_on
         The packings that it does not answer.
+    is_reference
+        Whether errors are measured against it.
     """
 
     meaning: str
@@ -41,10 +43,11 @@ class Written:
     grains: Fields
     on: Mapping[str, Fields]
     not_on: tuple[str, ...]
+    is_reference: bool
 
 
 def _read() -> dict[str, Written]:
-    """Every fidelity by its name, from fast to accurate."""
+    """Every fidelity by its name, by cost."""
     text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
     found = {}
     for name, table in tomllib.loads(text).items():
@@ -58,6 +61,7 @@ def _read() -> dict[str, Written]:
             grains={name: fields[name] for name in fields if not name.startswith(FLOW)},
             on=on,
             not_on=tuple(table.get("not_on", ())),
+            is_reference=table.get("is_reference", False),
         )
     return found
 
@@ -75,7 +79,7 @@ def _by_name(method: Mapping[str, Any]) -> Fields:
 
 
 WRITTEN: Mapping[str, Written] = _read()
-"""The fidelities by name, from fast to accurate: the last one is the reference."""
+"""The fidelities by name, by cost."""
 
 
 def packing_of(bed: Mapping[str, Any]) -> str:

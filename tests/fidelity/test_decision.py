@@ -5,8 +5,10 @@ import math
 import pytest
 
 from orchestrator.errors import InputError
+from orchestrator.fidelity import choice
 from orchestrator.fidelity.classes import FLOW, LEVEL_BED, scene_class
-from orchestrator.fidelity.decision import CHOSEN, checks, decide, written
+from orchestrator.fidelity.decision import checks, decide, written
+from orchestrator.fidelity.fidelities import PAIRS
 from orchestrator.fidelity.known import known
 from orchestrator.fidelity.spread import floors, model_class
 from orchestrator.study import study
@@ -33,18 +35,50 @@ def test_the_choice_is_within_the_tolerance_or_says_that_none_is(
 ) -> None:
     scene = pile(MEASURED[packing], packing=packing)
     chosen = decide(scene, tolerance)
-    errors = {one: known(one, scene) for one in CHOSEN if one.takes(scene)}
+    errors = {one: known(one, scene) for one in PAIRS if one.takes(scene)}
     errors = {one: error for one, error in errors.items() if math.isfinite(error.total)}
     assert chosen.fidelity in errors
     assert chosen.error_estimate == chosen.known.total == errors[chosen.fidelity].total
     assert chosen.scene == chosen.fidelity.answer(scene)
-    within = [one for one, error in errors.items() if error.total <= tolerance]
-    if within:
-        assert chosen.fidelity is within[0]
-        assert "none is" not in chosen.why
-    else:
-        assert "none is within the tolerance" in chosen.why
-        assert chosen.known.worst.error <= min(error.total for error in errors.values())
+    assert chosen.known.worst.scenes
+    missed = chosen.known.total > tolerance
+    assert missed == ("meets the tolerance at n/N" in chosen.why)
+    # none that is cheaper has as much within the tolerance
+    own = choice.cost_s(chosen.scene)
+    for one, error in errors.items():
+        if choice.cost_s(one.answer(scene)) < own and not missed:
+            assert error.total > tolerance
+
+
+def test_flow_and_grains_are_chosen_apart(pile: MakePile) -> None:
+    """The crest grain changes its rank on 20 cells; its pivot is as good as a run."""
+    scene = pile({"threshold.fractions": [0.1, 0.3, 0.5, 0.7]})
+    chosen = decide(scene, 0.05)
+    assert chosen.fidelity
+    assert (chosen.fidelity.flow.name, chosen.fidelity.grains.name) == (
+        "static",
+        "quick",
+    )
+    loose = decide(scene, 0.2)
+    assert loose.fidelity
+    assert loose.fidelity.name == "quick"
+    # each fraction has its own error: above the crest the coarse flow is enough
+    upper = pile({"threshold.fractions": [0.3, 0.5]})
+    assert decide(upper, 0.05).scene.method.flow.cells_per_face == 20
+
+
+def test_where_nothing_meets_the_tolerance_the_message_says_what_would_help(
+    pile: MakePile,
+) -> None:
+    uncertain = decide(pile(packing="horizontal"), 0.05)
+    assert "the reference itself is known to" in uncertain.why
+    assert "no DEM is better" in uncertain.why
+    scene = pile({"threshold.fractions": [0.3]})
+    near = decide(scene, 0.03)
+    assert "tolerance = " in near.why
+    said = float(near.why.rpartition("tolerance = ")[2].split()[0])
+    assert decide(scene, said).known.total <= said
+    assert decide(scene, said - 0.002).known.total > said - 0.002
 
 
 @pytest.mark.parametrize(
@@ -232,10 +266,12 @@ def test_what_dem_does_not_know_is_answered_by_a_method_that_does(
 
 def test_one_pile_of_each_kind_is_checked_by_dem(pile: MakePile) -> None:
     """The one that DEM answers fastest, whatever the order, and as it is written."""
+    eq10 = {"forces.stress": "eq10", "forces.law": "high"}
     scenes = [
         pile(height=0.02),
         pile(height=0.01),
-        pile({"forces.stress": "eq10", "forces.law": "high"}),
+        pile(eq10, height=0.02),
+        pile(eq10, height=0.014),
         pile(slope_deg=20.0),
         pile({"method.kind": "pivot"}),
     ]
@@ -243,8 +279,9 @@ def test_one_pile_of_each_kind_is_checked_by_dem(pile: MakePile) -> None:
     scenes = [changed(scene, numbers) for scene in scenes]
     answers = [decide(scene, 0.2) for scene in scenes]
     made = checks(answers)
-    assert set(made) == {scenes[1].id, scenes[2].id, scenes[3].id}
+    # a pile alone is not checked: the check would cost more than the answer saves
+    assert set(made) == {scenes[1].id, scenes[3].id}
     assert made == checks(answers[::-1])
-    for number in (1, 2, 3):
+    for number in (1, 3):
         by_dem = changed(scenes[number], {"method.kind": "dem"})
         assert made[scenes[number].id].scene == by_dem

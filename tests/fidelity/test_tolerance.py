@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator import cli, pipeline
 from orchestrator.fidelity import measured
-from orchestrator.fidelity.fidelities import FIDELITIES, QUICK
+from orchestrator.fidelity.fidelities import FIDELITIES, named
 from orchestrator.fidelity.measured import Error, Measured
 from orchestrator.study import study
 
@@ -42,10 +42,10 @@ def test_cheap_answers_are_checked_by_one_pile_by_dem(tmp_path: Path) -> None:
     tables = _run("aligned", tmp_path)
     answers, check = tables["pile_threshold"], tables["check"]
     methods = tables["methods"]
-    assert set(methods["fidelity"]) <= {"quick", "static"}
+    assert set(methods["method"]) <= {"pivot", "peeling"}
     assert (methods["error_estimate"] <= 0.2).all()
     (why,) = set(methods["why"])
-    assert why.endswith("the cheapest fidelity within the tolerance")
+    assert "the cheapest fidelity that is within" in why
     # the smaller of the two piles stands for both
     assert check["scene_id"].nunique() == 1
     assert len(list((tmp_path / "cases").glob("pile-*"))) == 1
@@ -60,7 +60,7 @@ def test_an_answer_that_its_check_contradicts_is_not_usable(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # quick by pivots, and data that call them good for level rows, which they are not
-    monkeypatch.setitem(QUICK.grains.on, "horizontal", {})
+    monkeypatch.setitem(named("quick").grains.on, "horizontal", {})
     wrong = {
         (part, one.name, like): Measured((0.1, 0.7), 2 * (Error(0.01, 0.0),))
         for part, like in (("flow", "wall"), ("grains", "horizontal"))
