@@ -20,6 +20,8 @@ LEVEL_BED = "level bed"
 """Class for the flow of beds over which u* is u*_0 everywhere."""
 LIMITING = ", limiting slope"
 """End of the name of a class of beds near the limiting slope."""
+LIFTED = ", lifted"
+"""End of the name of a class of grains that lift takes off before they roll."""
 SMALL = ", small"
 """End of the name of a class of beds with few grains."""
 LEAST_COUNTED = 38.0
@@ -98,7 +100,7 @@ def _grain_class(scene: Scene) -> str:
         # a lifted grain does not roll over those beside it: slight gaps change nothing
         if is_near_row:
             name = "aligned"
-        return f"{name}, lifted"
+        return f"{name}{LIFTED}"
     if bed.form.is_level and not bed.profile:
         return f"{name}, level bed"
     if is_curved(bed):
