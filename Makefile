@@ -30,7 +30,13 @@ calibration: setup  ## measure known errors, maps and intervals anew, for the pa
 	$(PYTHON) -m orchestrator stability
 	$(PYTHON) -m orchestrator budget
 	$(PYTHON) -m orchestrator validate
-	cp results/ladder/tables/errors.csv results/ladder/tables/domain.csv results/stability/tables/maps.csv orchestrator/fidelity/calibration/
+	cp results/stability/tables/maps.csv orchestrator/fidelity/calibration/
+	$(PYTHON) -m orchestrator study paper
+	$(PYTHON) tools/beside_dem.py results/paper > beside.csv
+	$(PYTHON) tools/calibration.py results/ladder/tables/scene_errors.csv beside.csv
+	rm beside.csv
+	$(PYTHON) tools/domain.py > domain.csv
+	mv domain.csv orchestrator/fidelity/calibration/
 	cp results/budget/tables/budget.csv orchestrator/fidelity/calibration/
 	$(PYTHON) tools/tested.py > tested.csv
 	mv tested.csv orchestrator/physics/tested.csv

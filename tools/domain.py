@@ -1,4 +1,4 @@
-"""The domain of the stored known errors, from the scenes of the preset `ladder`.
+"""The domain of the stored numerical errors, from the scenes of their calibration.
 
 python tools/domain.py > domain.csv
 
@@ -8,6 +8,8 @@ field of study files is new, this is enough: every scene had its default.
 
 import sys
 
+import beside_dem
+
 from orchestrator.lab import ladder
 from orchestrator.study import study
 from orchestrator.tables import csv
@@ -16,7 +18,7 @@ from orchestrator.tables import csv
 def main() -> None:
     """Write the domain of the scenes of the preset."""
     pairs = ladder.decisions(study.load("ladder"))
-    sys.stdout.write(csv(ladder.measured_domain(pairs.values())))
+    sys.stdout.write(csv(ladder.measured_domain(pairs.values(), beside_dem.scenes())))
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from pathlib import Path
 import pandas as pd
 from matplotlib.axes import Axes
 
+from orchestrator.lab.calibration import USUAL
 from orchestrator.report import style
 
 ROOT = Path(__file__).parents[1]
@@ -60,7 +61,7 @@ FEWEST = 10  # scenes of a class with a known error
 
 
 def tables() -> str:
-    """Write the tables of the page: the largest error of each fidelity in each class.
+    """Write the tables of the page: the widest half width of each fidelity by class.
 
     Returns
     -------
@@ -96,6 +97,8 @@ def _table(part: str, errors: pd.DataFrame, classes: list[str], first: str) -> s
         for scene_class in classes:
             row = largest.loc[(rung, scene_class)]
             cell = f"{100 * row[column]:.3g} %"
+            if column == "error" and row["confidence"] < USUAL:
+                cell += "\\*"
             if column == "uncertainty" and row["uncertainty_scenes"] < FEWEST:
                 cell = f"not known ({row['uncertainty_scenes']:.0f} scenes)"
             cells.append(cell)
@@ -118,7 +121,7 @@ def main() -> None:
         panels = canvas.subplots(2, 1, sharex=True, height_ratios=heights)
         for part, axes in zip(NAMES, panels, strict=True):
             _panel(axes, part, errors[errors["part"] == part])
-        panels[-1].set_xlabel("largest error of τ$_c$ at n/N = 10 to 70 %, %")
+        panels[-1].set_xlabel("half width of τ$_c$ (95 %), largest of n/N = 10 to 70 %, %")
         panels[0].legend(loc="lower left", bbox_to_anchor=(0, 1.06), ncols=5)
         canvas.savefig(PICTURE, dpi=110)
 

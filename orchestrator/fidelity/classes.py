@@ -16,6 +16,9 @@ from orchestrator.study.scene import Scene
 
 FLOW, GRAINS = "flow", "grains"
 """The two parts of a known error."""
+BY_DEM = "grains by DEM"
+"""Part of the domain of what moves grains in time: a smaller one than that of pivots
+and peeling, which were compared with DEM on more piles."""
 LEVEL_BED = "level bed"
 """Class for the flow of beds over which u* is u*_0 everywhere."""
 LIMITING = ", limiting slope"

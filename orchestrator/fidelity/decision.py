@@ -328,7 +328,8 @@ def as_written(scene: Scene, why: str = "") -> Decision:
     if not isinstance(answer.bed, PileBed):
         return Decision(scene, answer, None, UNKNOWN, why)
     fidelity = fidelity_of(answer)
-    beyond = unmeasured(answer)
+    by_dem = answer.method.is_resolved_in_time
+    beyond = unmeasured(answer, by_dem=by_dem)
     if beyond and beyond not in why:
         why = f"{why}; no error is known for {beyond}"
     return Decision(scene, answer, fidelity, known(fidelity, answer), why)

@@ -19,6 +19,7 @@ import pandas as pd
 
 from orchestrator.fidelity import measured
 from orchestrator.fidelity.classes import (
+    BY_DEM,
     FLOW,
     GRAINS,
     lift_over_weight,
@@ -405,13 +406,15 @@ def _has_measured(part: str, name: str, fraction: float) -> bool:
     return _is_within(fraction, measured.domain().get((part, name, FRACTIONS)))
 
 
-def unmeasured(scene: Scene) -> str:
+def unmeasured(scene: Scene, *, by_dem: bool = False) -> str:
     """Name the property of a pile for which no error was measured.
 
     Parameters
     ----------
     scene
         The scene of a pile, as it is asked for or as it is answered.
+    by_dem
+        Whether its grains are to be moved in time.
 
     Returns
     -------
@@ -424,6 +427,8 @@ def unmeasured(scene: Scene) -> str:
     for part in _parts(scene):
         if found := outside(part, scene):
             return found
+    if by_dem and (found := outside(BY_DEM, scene)):
+        return f"DEM of {found}"
     if scene.method.flow.facts.is_solved:
         return _unmeasured_solve(scene)
     return ""

@@ -26,6 +26,7 @@ from orchestrator.fidelity.fidelities import (
     Rung,
 )
 from orchestrator.fidelity.measured import NOTHING, Error, Measured, together
+from orchestrator.study.methods import METHODS
 from orchestrator.study.scene import Scene
 
 UNBOUND = 10.0  # a rung that was off by so many times a threshold says nothing of it
@@ -99,7 +100,7 @@ def known(fidelity: Fidelity, scene: Scene) -> Known:
     Known
         `UNKNOWN` where nothing was measured.
     """
-    if unmeasured(scene):
+    if unmeasured(scene, by_dem=_is_by_dem(fidelity, scene)):
         return UNKNOWN
     if fidelity is LOCAL:
         return _of_flow(scene)
@@ -118,6 +119,12 @@ def known(fidelity: Fidelity, scene: Scene) -> Known:
     if flow_class != LEVEL_BED:
         keys.append((FLOW, flow.name, flow_class))
     return _of(keys, scene)
+
+
+def _is_by_dem(fidelity: Fidelity, scene: Scene) -> bool:
+    """Whether a fidelity moves the grains of a scene in time."""
+    kind = fidelity.grains.sets.get("method.kind", scene.method.kind)
+    return kind in METHODS and METHODS[kind].is_resolved_in_time
 
 
 def _of_flow(scene: Scene) -> Known:

@@ -248,7 +248,9 @@ def _rows(measured: pd.DataFrame) -> Iterator[Row]:
                     "fraction": fraction,
                     **held,
                     "pool": "; ".join(pool),
-                    "cost_core_s": by_class[name]["cost_core_s"].mean(),
+                    "cost_core_s": by_class[name]["cost_core_s"]
+                    .replace(0.0, np.nan)
+                    .mean(),
                 }
 
 

@@ -1,6 +1,9 @@
 """The domain of known errors: what the calibration varied, and nothing beside it."""
 
+import runpy
+from collections import Counter
 from io import StringIO
+from pathlib import Path
 
 import pandas as pd
 import pytest
@@ -12,8 +15,7 @@ from orchestrator.fidelity.decision import decide
 from orchestrator.fidelity.fidelities import FIDELITIES, named
 from orchestrator.fidelity.known import UNKNOWN, known
 from orchestrator.fidelity.measured import FOLDER
-from orchestrator.lab import ladder
-from orchestrator.lab.calibration import family
+from orchestrator.lab import calibration, ladder
 from orchestrator.study import study
 from orchestrator.study.criterion import ENTRAINED
 from orchestrator.study.fields import FIELDS
@@ -22,6 +24,9 @@ from orchestrator.study.study import changed
 from orchestrator.tables import csv
 from tests.fidelity.conftest import MakePile
 
+ROOT = Path(__file__).parents[2]
+TOOLS = ROOT / "tools"
+SCENE_ERRORS = ROOT / "docs" / "measured" / "scene_errors.csv"
 SPANNED = {
     *("fluid.density", "fluid.viscosity", "fluid.gravity", "flow.top", "flow.depth"),
     *("grain.density", "grain.diameter", "grain.sizes", "forces.law", "forces.stress"),
@@ -61,31 +66,39 @@ def table() -> pd.DataFrame:
 def test_the_stored_domain_is_that_of_the_scenes_that_were_measured() -> None:
     """A field that is new has its values here: `python tools/domain.py` writes it anew."""
     pairs = ladder.decisions(study.load("ladder"))
-    made = csv(ladder.measured_domain(pairs.values()))
+    beside = runpy.run_path(str(TOOLS / "beside_dem.py"))["scenes"]()
+    made = csv(ladder.measured_domain(pairs.values(), beside))
     assert made == domain.FILE.read_text(encoding="utf-8")
 
 
 def test_the_scenes_of_the_domain_are_those_of_the_errors() -> None:
     """Else scenes would count as measured that the preset has and nobody has run."""
-    counted: dict[tuple[str, str], set[str]] = {}
+    counted: dict[str, set[tuple[str, str]]] = {FLOW: set(), GRAINS: set()}
     for scene, bed in piles(study.load("ladder")).items():
         # a pile of both criteria of motion is one
         pile = changed(scene, {"threshold.criterion": ENTRAINED}).id
-        parts = [part for part, is_solved in ((FLOW, not bed.is_level),) if is_solved]
+        if not bed.is_level:
+            counted[FLOW].add((scene_class(FLOW, scene), pile))
         if scene.method.kind == "dem":
-            parts.append(GRAINS)
-        for part in parts:
-            name = family(part, scene_class(part, scene))
-            counted.setdefault((part, name), set()).add(pile)
-    errors = pd.read_csv(FOLDER / "errors.csv").query("rung == 'reference'")
-    # the reference is without an error, so that it pools all of a family
-    stored = {
-        (str(row["part"]), family(str(row["part"]), str(row["scene_class"]))): row[
-            "scenes"
-        ]
-        for row in errors.to_dict("records")
-    }
-    assert stored == {key: len(piles_) for key, piles_ in counted.items()}
+            counted[GRAINS].add((scene_class(GRAINS, scene), pile))
+    stored = pd.read_csv(SCENE_ERRORS).query("rung == 'reference'")
+    for part, rows in stored.groupby("part"):
+        found = Counter(rows["scene_class"])
+        assert found == Counter(name for name, _ in counted[str(part)])
+    beside = runpy.run_path(str(TOOLS / "beside_dem.py"))["scenes"]()
+    piles_ = Counter(scene_class(GRAINS, scene) for scene in beside)
+    rows = pd.read_csv(SCENE_ERRORS).query("part == 'grains' and rung == 'static'")
+    more = Counter(rows["scene_class"]) - Counter(
+        stored.query("part == 'grains'")["scene_class"]
+    )
+    assert more == piles_
+
+
+def test_the_stored_half_widths_are_those_of_the_errors_of_scenes() -> None:
+    long = runpy.run_path(str(TOOLS / "calibration.py"))["long"]
+    rows = long(pd.read_csv(SCENE_ERRORS))
+    made = csv(calibration.table(rows, ladder.AGAIN_OF))
+    assert made == (FOLDER / "errors.csv").read_text(encoding="utf-8")
 
 
 def test_every_field_was_varied_or_is_named_as_untested(table: pd.DataFrame) -> None:
