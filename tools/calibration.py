@@ -65,7 +65,7 @@ def main() -> None:
     if sys.argv[1:]:
         rows = pd.concat(map(pd.read_csv, sys.argv[1:]), ignore_index=True)
         STORED.write_text(csv(wide(rows)), encoding="utf-8")
-    table = calibration.table(long(pd.read_csv(STORED)), AGAIN_OF)
+    table = calibration.half_widths(long(pd.read_csv(STORED)), AGAIN_OF)
     (FOLDER / "errors.csv").write_text(csv(table), encoding="utf-8")
 
 

@@ -121,7 +121,9 @@ def main() -> None:
         panels = canvas.subplots(2, 1, sharex=True, height_ratios=heights)
         for part, axes in zip(NAMES, panels, strict=True):
             _panel(axes, part, errors[errors["part"] == part])
-        panels[-1].set_xlabel("half width of τ$_c$ (95 %), largest of n/N = 10 to 70 %, %")
+        panels[-1].set_xlabel(
+            "half width of τ$_c$ (95 %), largest of n/N = 10 to 70 %, %"
+        )
         panels[0].legend(loc="lower left", bbox_to_anchor=(0, 1.06), ncols=5)
         canvas.savefig(PICTURE, dpi=110)
 

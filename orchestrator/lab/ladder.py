@@ -345,12 +345,7 @@ def known_errors(points: pd.DataFrame) -> pd.DataFrame:
         The uncertainty is how far the reference itself moved; empty where the reference
         was not run with other numbers.
     """
-<<<<<<< HEAD
-    again = {GRAINS: AGAIN, FLOW: FINER}
-    return calibration.half_widths(scene_errors(points), again)
-=======
-    return calibration.table(scene_errors(points), AGAIN_OF)
->>>>>>> ad26c49f (Numerical errors of pivots and peeling are known on tall piles, in viscous fluids and of Eq. 10, with the errors of single scenes stored; the flow's reference moves by at most 0.7 %)
+    return calibration.half_widths(scene_errors(points), AGAIN_OF)
 
 
 def scene_errors(points: pd.DataFrame) -> pd.DataFrame:

@@ -97,7 +97,7 @@ def test_the_scenes_of_the_domain_are_those_of_the_errors() -> None:
 def test_the_stored_half_widths_are_those_of_the_errors_of_scenes() -> None:
     long = runpy.run_path(str(TOOLS / "calibration.py"))["long"]
     rows = long(pd.read_csv(SCENE_ERRORS))
-    made = csv(calibration.table(rows, ladder.AGAIN_OF))
+    made = csv(calibration.half_widths(rows, ladder.AGAIN_OF))
     assert made == (FOLDER / "errors.csv").read_text(encoding="utf-8")
 
 
