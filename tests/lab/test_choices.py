@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from orchestrator import plan
 from orchestrator.fidelity.decision import as_written, with_criterion
 from orchestrator.lab import chart, choices
 from orchestrator.lab.choices import OPEN, REFERENCES, TOLERANCES, WITHIN, WRITTEN
@@ -69,8 +70,14 @@ def test_every_pair_of_rungs_is_a_choice_once_and_so_is_what_the_study_does() ->
     assert kind.reference.scenes not in {one.scenes for one in pairs}
     for one in (*kind.choices, kind.reference):
         assert [answer.asked for answer in one.answers] == list(kind.scenes)
-    # with a tolerance, piles are checked by DEM, and the choice pays for it
-    assert any(one.checks for one in kind.choices if one.tolerance == 0.2)
+    # a tolerance is what a study does with it, and pays for its checks by DEM
+    for one in kind.choices:
+        if one.tolerance > 0:
+            planned = plan.make(replace(_study(TEXT), tolerance=one.tolerance))
+            checks = {each.scene.id for each in planned.checks.values()}
+            answers = {each.scene.id for each in planned.decisions.values()}
+            assert {each.scene.id for each in one.checks} == checks
+            assert {each.scene.id for each in one.answers} == answers
 
 
 def test_over_a_level_bed_no_flow_is_a_choice() -> None:
