@@ -13,7 +13,7 @@ import numpy as np
 from orchestrator.digits import number
 from orchestrator.errors import InputError
 from orchestrator.fidelity import decision, flows, limits, measured, smoothing
-from orchestrator.fidelity.decision import Decision, decide
+from orchestrator.fidelity.decision import Decision, as_written, decide
 from orchestrator.fidelity.domain import unmeasured
 from orchestrator.flow.between import MOST_ERROR
 from orchestrator.grains.cells import SingleGrainCase, batches
@@ -33,6 +33,8 @@ BESIDE = 1.3
 """Time of a case with the Python beside its solver, over that of the solver."""
 SORT_S = 4.3e-3
 """Time of `pace` on the machine of these times and of those that cases expect, s."""
+TOLERANCES = (0.05, 0.2)
+"""Tolerances of which a plan says what they cost."""
 BYTES = 2.2e6
 """Mean size of a case of the preset `paper`."""
 BY_DEM = (
@@ -71,6 +73,11 @@ class Plan:
     checked: dict[str, Decision]
     cases: dict[str, Case]
     smoothings: dict[str, dict[float, Pile]] = field(default_factory=dict)
+
+    @property
+    def cost_s(self) -> float:
+        """Expected time of all cases on one core, s."""
+        return sum(case.cost_s for case in self.cases.values())
 
     @property
     def drawing_s(self) -> float:
@@ -324,7 +331,9 @@ def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
         thresholds = number(times, "threshold")
         yield f"  {thresholds} of piles will not be usable: {why}"
     if plan.checks:
-        yield f"  {number(len(plan.checks), 'check')} by DEM of answers without it"
+        yield f"  {number(len(plan.checks), 'check')} by DEM of answers without it:"
+        named = Counter(_about(pile) for pile in plan.checks.values())
+        yield from (f"    {name}" for name in sorted(named))
     put = flows.lying([*plan.decisions.values(), *plan.checked.values()])
     if put:
         between = "lie between solved ones of other roughness"
@@ -334,7 +343,44 @@ def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
         noisy = number(len(plan.smoothings), "noisy profile")
         other = "half and twice the smoothing, and with what it needs"
         yield f"  {noisy}: also with {other}"
+    yield from _choices(study, plan, workers)
     yield from expected(plan, directory, workers)
+
+
+def _about(pile: Pile) -> str:
+    """Name the pile of a check."""
+    scene = pile.scene
+    size = f"{1e3 * scene.grain.diameter:g} mm"
+    words = [f"{scene.bed.slope_deg:g}°", size, pile.bed.packing, scene.forces.law]
+    return f"{', '.join(words)}: {pile.case.name}"
+
+
+def _choices(study: Study, plan: Plan, workers: int) -> Iterator[str]:
+    """Say what each tolerance costs and leaves unusable, if nothing was run before."""
+    piles = [one for one in study.scenes if isinstance(one.bed, PileBed)]
+    if not piles:
+        return
+    count = sum(len(scene.threshold.fractions) for scene in piles)
+    tolerances = sorted({*TOLERANCES, *filter(None, [study.tolerance])})
+    slower = pace() * BESIDE / workers
+    what = f"how many of {count} thresholds are known within it"
+    yield f"what a choice costs, and {what}:"
+    for tolerance in tolerances:
+        made = plan
+        if tolerance != study.tolerance:
+            made = make(replace(study, tolerance=tolerance))
+        within = 0
+        for answer in made.decisions.values():
+            if isinstance(answer.scene.bed, PileBed):
+                errors = map(answer.error_at, answer.scene.threshold.fractions)
+                within += sum(one is not None and one <= tolerance for one in errors)
+        took = human(slower * made.cost_s)
+        yield f"  {tolerance:g}: {took}, {within} known within it"
+    whole = of({scene.id: as_written(scene) for scene in study.scenes})
+    yield f"  as written: {human(slower * whole.cost_s)}"
+    if study.tolerance and plan.cost_s > whole.cost_s:
+        dearer = "costs more than the study as written: leave it out"
+        yield f"  {study.tolerance:g} {dearer}"
 
 
 def _not_usable(plan: Plan, tolerance: float | None) -> Iterator[str]:

@@ -36,7 +36,6 @@ bed = {{ kind = "pile", slope_deg = 15.0{} }}
             "4 thresholds of piles will not be usable: no fidelity is known to be within "
             "the tolerance",
         ),
-        ("", "tolerance = 0.2", "1 check by DEM"),
     ],
 )
 def test_what_is_known_from_the_file_is_said(
@@ -49,6 +48,41 @@ def test_what_is_known_from_the_file_is_said(
     assert line in said
     if not line:
         assert "will not be usable" not in said
+
+
+def test_a_plan_says_what_each_choice_costs_and_names_its_checks(
+    tmp_path: Path,
+) -> None:
+    text = "tolerance = 0.2\nmethod.kind = 'dem'\n" + PILE.format(", height = 0.02")
+    text += "\n[[group]]\n[group.axes]\n'bed.height' = [0.016, 0.018, 0.02]\n"
+    asked = study.parse(text, name="three", where="three")
+    said = [*plan.forecast(asked, tmp_path, 2)]
+    (check,) = plan.make(asked).checks.values()
+    assert sum("1 check by DEM" in line for line in said) == 1
+    assert any(check.case.name in line for line in said)
+    (head,) = (line for line in said if line.startswith("what a choice costs"))
+    count = sum(len(one.threshold.fractions) for one in asked.scenes)
+    assert f"of {count} thresholds" in head
+    first = said.index(head) + 1
+    names = [line.split(":")[0].strip() for line in said[first : first + 3]]
+    assert names == ["0.05", "0.2", "as written"]
+    assert f"{count} known within it" in said[first + 1]
+
+
+def test_a_tolerance_that_costs_more_than_the_study_as_written_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Piles are chosen one by one; two that shared a flow may need one each."""
+    text = "tolerance = 0.2\nmethod.kind = 'dem'\n" + PILE.format(", height = 0.02")
+    asked = study.parse(text, name="one", where="one")
+    assert not any("leave it out" in line for line in plan.forecast(asked, tmp_path, 2))
+    dear = plan.make(asked)
+    costs = {id(dear.cases): 1e9}
+    monkeypatch.setattr(
+        plan.Plan, "cost_s", property(lambda self: costs.get(id(self.cases), 1.0))
+    )
+    monkeypatch.setattr(plan, "make", lambda *_: dear)
+    assert any("leave it out" in line for line in plan.forecast(asked, tmp_path, 2))
 
 
 def test_the_budget_of_a_study_has_its_criterion() -> None:
