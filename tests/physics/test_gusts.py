@@ -8,7 +8,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from orchestrator.grains.loads import Geometry
+from orchestrator.grains.loads import Geometry, on_slopes
 from orchestrator.grains.pile_case import in_time
 from orchestrator.physics.gusts import gust_stresses, peak_over_mean
 from orchestrator.study.closed_form import closed_form
@@ -54,6 +54,20 @@ def test_no_gusts_strengthen_a_bed(intensity: float, events: int) -> None:
     (steady,) = parse(SAND, name="steady", where="steady").scenes
     gusty = closed_form(_scene(SAND, intensity, events))
     assert float(gusty.shields) <= float(closed_form(steady).shields)
+
+
+def test_gusts_lower_the_mean_flow_by_the_root_of_their_peak() -> None:
+    """The peak is one of the stress, which goes with the square of the flow."""
+    peak = peak_over_mean(0.4, 100)
+    assert peak > 2
+    (steady,) = parse(SAND, name="steady", where="steady").scenes
+    gusty = _scene(SAND, 0.4, 100)
+    ratio = closed_form(gusty).friction_velocity / closed_form(steady).friction_velocity
+    assert float(ratio) == pytest.approx(peak**-0.5, rel=1e-9)
+    slopes = np.array([-10.0, 0.0, 8.0, 20.0])
+    (calm,) = parse(PILE, name="steady", where="steady").scenes
+    found = on_slopes(_scene(PILE, 0.4, 100), slopes) / on_slopes(calm, slopes)
+    assert found == pytest.approx(peak**-0.5, rel=1e-9)
 
 
 # the largest stress of the second is above the mean by its last digits alone

@@ -141,6 +141,29 @@ def test_moments_balance_at_the_threshold(
     assert float(curve) == pytest.approx(float(found.shields), rel=1e-12)
 
 
+@pytest.mark.parametrize("beta", [45.0, 52.0, 60.0, 75.0])
+def test_the_pull_of_the_contact_that_opens_has_its_arm(beta: float) -> None:
+    """F_a sin(2 beta): at 60 degrees alone that is F_a sin(beta)."""
+    d, slope, cohesion = 2e-4, 12.0, 3e-4
+    grain = Grain(
+        diameter=d,
+        density=2650.0,
+        fluid_density=1.2,
+        viscosity=1.5e-5,
+        slope_deg=slope,
+        entrainment_angle_deg=beta,
+        cohesion=cohesion,
+    )
+    found = physics.threshold(LAWS["bridged"], grain)
+    b = np.radians(beta)
+    moment = float(found.drag * np.sin(b) + found.lift * np.cos(b))
+    of_weight = np.pi / 6 * d**3 * (2650 - 1.2) * 9.81 * np.cos(np.radians(slope) - b)
+    # two spheres touch at each side: the arm of the pull is d sin(beta) cos(beta)
+    assert moment - of_weight == pytest.approx(
+        2 * cohesion * d * np.sin(b) * np.cos(b), rel=1e-9
+    )
+
+
 @every_law
 def test_an_array_of_grains_is_its_grains_in_turn(name: str) -> None:
     d, slope = np.array([[5e-5], [3e-4], [2e-3]]), np.array([0.0, 10.0, 25.0])

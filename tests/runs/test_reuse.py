@@ -306,6 +306,33 @@ def _kinds_of(base: type[Any]) -> Iterator[type[Any]]:
         yield from _kinds_of(kind)
 
 
+def test_each_file_of_a_template_is_in_the_digest_of_its_cases(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A changed deck or script runs again; the cases of another template do not."""
+    root = Path(shutil.copytree(case_states.templates(), tmp_path / "templates"))
+    monkeypatch.setattr(case_states, "templates", lambda: root)
+    caches = case_states.template_files, case_states.code_of
+
+    def digests() -> dict[type[case_states.Case], str]:
+        for cached in caches:
+            cached.cache_clear()
+        return {kind: case_states.code_of(kind) for kind in (FlowCase, PileCase)}
+
+    before = digests()
+    for kind in before:
+        folder = root / kind.template
+        for name in (folder / case_states.FILES).read_text().split():
+            content = (folder / name).read_bytes()
+            (folder / name).write_bytes(content + b"\n")
+            after = digests()
+            (folder / name).write_bytes(content)
+            assert {one for one in before if before[one] != after[one]} == {kind}, name
+    assert digests() == before
+    for cached in caches:
+        cached.cache_clear()
+
+
 def test_every_file_that_a_case_is_made_by_is_in_the_digest_of_its_code(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
