@@ -65,6 +65,17 @@ def test_the_depth_mean_is_the_mean_of_the_profile(depth: float) -> None:
     )
 
 
+@pytest.mark.parametrize("depth", [0.05, 1.0])
+def test_a_closed_channel_has_the_profile_of_half_its_depth_on_each_wall(
+    depth: float,
+) -> None:
+    half = depth / 2
+    total = quad(lambda z: float(log_law_speed(0.05, z, 1e-4)), 0, half, epsrel=1e-12)
+    found = depth_mean_speed(0.05, depth, 1e-4, closed=[True, False])
+    assert float(found[0]) == pytest.approx(total[0] / half, rel=1e-9)
+    assert found[0] < found[1]
+
+
 @pytest.mark.parametrize("gap", [-0.6 * D, -0.1 * D, 0.0, Z0, 0.2 * D, 1.5 * D])
 def test_speeds_and_shears_are_means_over_the_height_of_the_grain(gap: float) -> None:
     height = np.array(gap)
