@@ -17,6 +17,7 @@ from orchestrator.physics.velocity import (
     layer,
     log_law_speed,
     log_law_ustar,
+    measurable_speeds,
     outer_roughness,
     rough_gradient,
     rough_speed,
@@ -139,6 +140,16 @@ def test_the_shift_of_a_smooth_wall_is_none_and_it_sets_in_continuously() -> Non
     assert not np.any(shift(np.linspace(0, 4.5, 50)))
     assert 0 < float(shift(np.array(4.54))) < 0.01
     assert float(shift(np.array(70.0))) == pytest.approx(0.9 * np.sqrt(70), rel=1e-3)
+
+
+def test_winds_are_those_of_the_log_law_at_1_and_10_metres() -> None:
+    ustar, z0 = 0.6, 5e-3  # a rough bed: no viscosity adds to it
+    found = measurable_speeds(
+        ustar, roughness=z0, fluid_density=1.2, viscosity=1.5e-5, depth=np.nan
+    )
+    for height, name in ((1.0, "wind_1m_m_s"), (10.0, "wind_10m_m_s")):
+        exact = ustar / 0.41 * np.log((height + z0) / z0)
+        assert float(found[name]) == pytest.approx(exact, rel=1e-9)
 
 
 def test_a_threshold_of_sand_is_a_wind_of_known_strength() -> None:

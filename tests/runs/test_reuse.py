@@ -279,6 +279,17 @@ def test_a_changed_template_runs_again_and_what_lies_beside_it_does_not_matter(
     assert len([*cases.glob("pile-*/foo.txt")]) == 2
     assert not [*cases.glob("pile-*/1/U")]
 
+    # piles over a flow that runs again are piles over another flow
+    solution = own_templates / "openfoam" / "flow" / "system" / "fvSolution"
+    before = solution.read_text()
+    solution.write_text(f"{before}// another word\n")
+    _forget()
+    with pytest.warns(UserWarning, match="2 cases made by other code"):
+        assert "flow" not in _kinds_done(cases)
+    solution.write_text(before)
+    _forget()
+    assert _kinds_done(cases) == EVERYTHING
+
     deck = bed / "in.bed"
     deck.write_text(f"# another word\n{deck.read_text()}")
     _forget()
