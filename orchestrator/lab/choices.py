@@ -183,7 +183,8 @@ def kinds(study: Study) -> list[Kind]:
     Returns
     -------
     list of Kind
-        The kinds, in the order of the study.
+        The kinds, in the order of the study; none without a pair of rungs to choose,
+        such as level beds by a method without DEM.
     """
     sorted_: dict[str, dict[Scene, Scene]] = {}
     for asked in study.scenes:
@@ -191,7 +192,8 @@ def kinds(study: Study) -> list[Kind]:
             scene = written(with_criterion(asked))
             sorted_.setdefault(_kind_of(scene), {}).setdefault(scene, asked)
     own = _of_study(study)
-    return [_kind(name, scenes, own) for name, scenes in sorted_.items()]
+    found = [_kind(name, scenes, own) for name, scenes in sorted_.items()]
+    return [kind for kind in found if any(one.fields for one in kind.choices)]
 
 
 def _kind_of(scene: Scene) -> str:

@@ -86,6 +86,8 @@ def test_over_a_level_bed_no_flow_is_a_choice() -> None:
     (kind,) = choices.kinds(_study(text))
     names = [one.name for one in kind.choices if one.fields]
     assert names == ["pivot", "peeling", "DEM 1 × 3 %", "DEM 2 × 2 %"]
+    # and by a method without DEM nothing is a choice
+    assert choices.kinds(_study('method.kind = "peeling"\n' + text)) == []
 
 
 @pytest.mark.parametrize("text", [TEXT, TEXT + WATER])
