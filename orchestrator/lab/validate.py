@@ -290,7 +290,7 @@ def sustained_shields(
         The grains and fluids, as `single` takes them.
     gust
         Largest over mean stress.
-    leaves
+    is_entrained
         Whether a grain must also leave its pocket in the gust: that of `single` by the
         law for gravel, between neighbours at 60 degrees.
     ratio
