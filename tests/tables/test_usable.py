@@ -370,7 +370,8 @@ def test_grains_of_a_pile_that_go_on_have_the_interval_of_one_grain(
         **{"force_law": "bridged", "criterion": "sustained"},
     }
     alone = beside.tested({name: [value] for name, value in grain.items()})[:, 0]
-    assert alone[2] == 11
+    # three sites in the field and five points of a formula
+    assert alone[2] == 8
     # slope laws of friction angles of 32 and 50 degrees
     most, least = (
         np.cos(np.radians(12.0)) + np.sin(np.radians(12.0)) / np.tan(np.radians(phi))
