@@ -86,11 +86,10 @@ def threshold(
         Of that fluid, deg C, by default 15.
     criterion
         What a grain must do: "entrained", which is to leave its pocket, or "sustained",
-        to leave it in a gust and to hop on after it. The threshold is then the larger
-        of both mean stresses, and there are columns of both, of the upper end by the
-        weakest rebounds, of the stress at which motion ceases, and of which decides.
-        "auto" is "entrained" in the paper's gas and by its laws, "sustained" in all
-        others.
+        to leave it in a gust and to roll and hop on after it. The threshold is then the
+        larger of both mean stresses, and there are columns of both, of its ends, of the
+        stress at which motion ceases, and of which decides. "auto" is "entrained" in
+        the paper's gas and by its laws, "sustained" in all others.
     **parameters
         Any of those below, by their names.
     density, fluid_density

@@ -22,6 +22,7 @@ PHYSICS = (
     "orchestrator.physics.curves",
     "orchestrator.physics.laws",
     "orchestrator.physics.measured",
+    "orchestrator.physics.rolling",
     "orchestrator.physics.saltation",
     "orchestrator.physics.threshold",
     "orchestrator.physics.velocity",

@@ -18,6 +18,7 @@ from matplotlib.patches import Arc, Circle
 import orchestrator
 from orchestrator.physics import saltation
 from orchestrator.physics.grain import Grain
+from orchestrator.physics.gusts import PEAK
 from orchestrator.report import style
 from orchestrator.types import FloatArray
 
@@ -30,7 +31,6 @@ HEIGHT = 0.02  # of the pile of first-look, m
 AIR = {"fluid_density": 1.225, "viscosity": 1.48e-5}
 WATER = {"fluid_density": 999.1, "viscosity": 1.14e-6}
 THETA = 0.02
-PEAK = saltation.PEAK
 MOST_D = 150.0
 FOOT = HEIGHT / np.tan(np.radians(15))  # its half width, m
 

@@ -28,7 +28,6 @@ from orchestrator.lab.validate import (
     single,
     sustained_shields,
 )
-from orchestrator.physics import saltation
 from orchestrator.physics.beside import (
     AIR_OF_QUARTZ,
     ENTRAINED,
@@ -190,7 +189,6 @@ def of_grains() -> pd.DataFrame:
     made: list[Row] = []
     for name, span in RATIOS.items():
         ratios = sorted({name, *span})
-        hops = {each: saltation.hops(measured_grains(beds, each)) for each in ratios}
         further = {
             each: sustained_shields(beds, GUST, is_entrained=False, ratio=each)
             for each in ratios
@@ -200,13 +198,12 @@ def of_grains() -> pd.DataFrame:
             for angle, ratio in itertools.product(sorted({beta, *betas}), ratios):
                 at = single(beds, law, angle, ratio)
                 of_entrained.append(pd.Series(np.where(at.valid, at.shields, np.nan)))
-                moved = saltation.motion(at.shields, further[ratio], hops[ratio], GUST)
-                of_sustained.append(pd.Series(moved.shields))
+                moved = np.maximum(at.shields / GUST, further[ratio])
+                of_sustained.append(pd.Series(moved))
                 for held in (air.assign(cohesion_n_m=each) for each in COHESIONS):
                     at = single(held, law, angle, ratio)
-                    hop = further[ratio][air.index], hops[ratio][air.index]
-                    moved = saltation.motion(at.shields, *hop, GUST)
-                    in_air.append(pd.Series(moved.shields, air.index))
+                    moved = np.maximum(at.shields / GUST, further[ratio][air.index])
+                    in_air.append(pd.Series(moved, air.index))
             place = {
                 "force_law": law,
                 **_range("beta_deg", *betas),

@@ -137,6 +137,7 @@ laws, `SUSTAINED` in all other fluids."""
 OF_CRITERION = {
     "shields_entrained": "entrained",
     "shields_sustained": "sustained",
+    "shields_sustained_low": "at least",
     "shields_sustained_high": "at most",
     "shields_cessation": "ceases",
     "decides": "decides",

@@ -40,8 +40,9 @@ LAW_HELP = (
 )
 CRITERION_HELP = (
     "what a grain must do: sustained, which is to leave its pocket in a gust and to "
-    "move on after it; entrained, which is to leave its pocket; default: entrained in "
-    "the fluid paper and by the laws paper, low and high, sustained in all others"
+    "roll and hop on after it; entrained, which is to leave its pocket; default: "
+    "entrained in the fluid paper and by the laws paper, low and high, sustained in "
+    "all others"
 )
 
 

@@ -190,21 +190,18 @@ def _criteria(chosen: Sequence["Row"]) -> Iterator[str]:
     for row in chosen:
         of_law = f"{row['law']}: " if len(chosen) > 1 else ""
         dislodged = _cell(row["shields_entrained"])
-        if _is_nan(row["shields_sustained"]):
-            yield (
-                f"{of_law}“{row['decides']}” decides: such a grain does not hop, the "
-                f"mean stress turns it over its neighbour from {dislodged}"
-            )
-            continue
         sustained = _cell(row["shields_sustained"])
         ceases = _cell(row["shields_cessation"])
         yield (
             f"{of_law}“{row['decides']}” decides: a gust dislodges it from {dislodged} "
-            f"of the mean flow, saltation continues after it from {sustained}; motion "
+            f"of the mean flow, it rolls and hops on after it from {sustained}; motion "
             f"ceases below {ceases}"
         )
-        highest = _cell(row["shields_sustained_high"])
-        yield f"{of_law}with the weakest rebounds of sand it is {highest}"
+        low, high = (_cell(row[f"shields_sustained_{end}"]) for end in ("low", "high"))
+        yield (
+            f"{of_law}at least {low}, at most {high}: a quarter of the grains over "
+            "half of the way, three quarters over twice the way"
+        )
 
 
 def _of_many(rows: Sequence["Row"], asked: str, varied: Sequence[str]) -> Iterator[str]:
@@ -242,7 +239,7 @@ def _quantities(rows: Sequence["Row"]) -> dict[str, str]:
 
 
 def _whether_it_holds(row: "Row") -> str:
-    """Whether the law holds: at entrainment, which hopping on may exceed."""
+    """Whether the law holds: at entrainment, which sustained motion may exceed."""
     if row["valid"]:
         return "yes"
     is_further = row.get("decides") == "sustained"

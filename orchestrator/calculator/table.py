@@ -70,9 +70,8 @@ def thresholds(
         paper's rule.
     criterion
         What a grain must do: one of `CRITERIA`, or `BY_FLUID`. Grains that go on leave
-        their pockets in a gust of `saltation.PEAK` times the mean stress and hop on
-        after it; their threshold is the larger of the two mean stresses. Grains that
-        cannot hop go on where the mean stress turns them over their neighbours.
+        their pockets in a gust of `gusts.PEAK` times the mean stress, and roll and hop
+        on after it; their threshold is the larger of the two mean stresses.
     bed_slope
         Slope at which a channel falls, whatever its sign: the depth and the mean
         velocity are then those of its uniform flow.
@@ -116,9 +115,6 @@ def thresholds(
     # numbers beyond all floats end as laws that do not hold
     with np.errstate(all="ignore"):
         table, against = _of_all_laws(grains, asked, criterion)
-    if criterion == SUSTAINED and not np.isfinite(table["shields"]).any():
-        remedy = f"take the criterion {ENTRAINED}, or a larger grain"
-        raise InputError(verdict.NO_START, "threshold: criterion", remedy)
     if not table["valid"].any():
         place = int(np.argmax(table["answer"]))
         reason = f"{table['law'][place]}: {verdict.texts(against[place])}"

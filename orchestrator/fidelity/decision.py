@@ -37,7 +37,7 @@ from orchestrator.study.study import changed, value_of
 EXACT = "the closed form is exact for a single grain in a held flow"
 LONG_BED = f"more than {LONGEST_PACKED:g} grains long"
 ALONG = f"{LONG_BED}: closed form along the bed, checked where motion starts"
-HOPS = "sustained motion: entrainment and hopping have closed forms"
+HOPS = "sustained motion: entrainment has a closed form, rolling and hopping a table"
 ENDLESS = "the rows of the bed have no end: closed form along the bed"
 NOT_MET = "the tolerance cannot be met, no error is known"
 NONE_CHEAPER = "no fidelity of a known error is cheaper than the scene as written"

@@ -36,7 +36,7 @@ from orchestrator.physics.threshold import LIFT_OFF, check_known, root, threshol
 from orchestrator.runs.files import state_of
 from orchestrator.study import methods
 from orchestrator.study.closed_form import closed_form, single_grain
-from orchestrator.study.criterion import SUSTAINED, hopping_on, peak_of
+from orchestrator.study.criterion import SUSTAINED, peak_of, sustaining
 from orchestrator.study.declare import UnfitError
 from orchestrator.study.parts import PileBed, Range
 from orchestrator.study.scene import Scene
@@ -52,7 +52,6 @@ which no grain is packed where no method is asked for."""
 MARGIN = 20.0
 """Fixed bed before and behind the grains of such a range, d: twice the way of a grain
 that goes."""
-NO_END = "their hops have no end"
 LOOSE = 1e-4
 """Threshold over that of the scene's grain, below which a grain lies loose: at the
 limiting slope round-off leaves it 1e-8. Tables of forces begin there."""
@@ -792,36 +791,24 @@ class Loads:
         return np.asarray(np.where(self.ratio[counted] < 0, -slopes, slopes))
 
     def sustained(self) -> tuple[FloatArray, FloatArray]:
-        """Find the flows from which counted grains go on hopping, and their gust.
+        """Find the flows from which counted grains go on, and their gust.
 
         Returns
         -------
         flows, over
             Undisturbed friction velocities of the mean flow, m/s, and the friction
             velocity of the gust in which a grain leaves over that of the mean flow,
-            shape (N,). A grain that cannot hop has no gust, and goes on when it leaves;
-            one that hops on in any flow has 0, and one that never does infinity.
-
-        Raises
-        ------
-        InputError
-            If hops of a grain have no end: its threshold is not known.
+            shape (N,). A grain that goes on in any flow has 0.
         """
         scene = self.geometry.scene
         packed = self.geometry.packing
         sizes = packed.sizes[packed.windward]
-        found, can_hop = hopping_on(scene, self._slopes_deg, sizes)
-        endless = int(np.count_nonzero(can_hop & np.isnan(found)))
-        if endless:
-            what = f"from which flow on {endless} grains go on is not known: {NO_END}"
-            where = f"scene {scene.id}: threshold.criterion"
-            raise InputError(what, where, 'choose "entrained"')
-        shields = np.where(can_hop, found, 0.0)
+        shields = sustaining(scene, self._slopes_deg, sizes)
         grain = single_grain(scene)
         ustar = grain.changed(diameter=grain.diameter * sizes).ustar_at(shields)
         # the loads have the scene's own gusts already
-        over = np.where(can_hop, np.sqrt(peak_of(scene) / scene.gust), 1.0)
-        return self._undisturbed(ustar), over
+        over = np.sqrt(peak_of(scene) / scene.gust)
+        return self._undisturbed(ustar), np.full(len(sizes), over)
 
     def _undisturbed(self, local: FloatArray) -> FloatArray:
         """Undisturbed friction velocity to local ones of counted grains, m/s, (N,)."""

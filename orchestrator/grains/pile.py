@@ -188,8 +188,8 @@ class Pile(Geometry):
         """Whether its grains must go on, not only leave their pockets."""
         return self.scene.threshold.criterion == SUSTAINED
 
-    def hops_decide(self, cases: Path) -> BoolArray:
-        """Find the counted grains that hopping on holds longer than their pockets.
+    def sustained_decides(self, cases: Path) -> BoolArray:
+        """Find the counted grains that going on holds longer than their pockets.
 
         Parameters
         ----------

@@ -21,7 +21,7 @@ from orchestrator.flow.stress import WallStress, bubble
 from orchestrator.lab import activity
 from orchestrator.lab.sphere import speed_of, sphere
 from orchestrator.lab.strips import PERCENTILES, ROUGH, Strips
-from orchestrator.physics import saltation
+from orchestrator.physics import rolling
 from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.physics.curves import shao_lu, soulsby_whitehouse
 from orchestrator.physics.grain import Grain
@@ -81,7 +81,7 @@ class Model(NamedTuple):
     gust
         Largest over mean stress of its gusts.
     is_sustained
-        Whether grains must hop on after the gust. Such a model has no strips,
+        Whether grains must go on after the gust. Such a model has no strips,
         but one grain in closed form.
     is_entrained
         Whether grains must leave their pockets in the gust.
@@ -281,8 +281,7 @@ def sustained_shields(
 ) -> FloatArray:
     """Find the mean stress from which grains go on after a gust, on measured beds.
 
-    In a liquid the bed's slope is that of the surface of an open uniform flow. Grains
-    that cannot hop go on where the mean stress turns them over.
+    In a liquid the bed's slope is that of the surface of an open uniform flow.
 
     Parameters
     ----------
@@ -303,7 +302,7 @@ def sustained_shields(
     """
     grains = measured_grains(beds, ratio)
     if not is_entrained:
-        return saltation.tabulated(grains).initiation(gust)
+        return rolling.sustained(grains).initiation(gust)
     steady = single(beds, GRAVEL, 60, ratio).shields
     return Criteria(steady, grains, gust).shields
 
@@ -407,7 +406,9 @@ def compare_models(
         }
     )
     ends = pd.read_csv(FOLDER / "cessation.csv").rename(columns={"shields": "measured"})
-    ceases = saltation.tabulated(measured_grains(ends)).cessation
+    in_motion = measured_grains(ends)
+    # motion ceases in the mean flow, whatever its gusts would turn over
+    ceases = Criteria(np.zeros(len(ends)), in_motion, GUST).cessation
     without_gusts: dict[str, _Answers] = {}
     rows = []
     for model in MODELS:
@@ -636,8 +637,8 @@ grains has moved, each by its own pivot. `bridged` is the drag and lift of a gra
 that stands alone, as high as all others; `protrusion` takes its own height over the \
 bed; `balanced` lets the drags on a patch add up to the stress of the flow; gusts are \
 the largest of 100 independent, log-normal stresses of intensity 0.4. `sustained` is \
-the least mean stress at which one grain that has left its pocket keeps hopping after \
-such a gust, in closed form; `entrained and sustained` asks as well that the gust \
+the least mean stress at which a grain that has left its pocket rolls and hops on \
+after such a gust, by a table; `entrained and sustained` asks as well that the gust \
 turns it over its neighbour."""
 SHIELDS_TEXT = """\
 Measured thresholds and those of the models, in water (solid) and in air (dotted). The \

@@ -50,10 +50,10 @@ class Grain:
     fall
         Fall of the surface of an open uniform flow, the sine of its slope. The flow's
         own weight drives it then, and its depth is ``theta (s - 1)/fall`` diameters. It
-        is 0 in a flow that is much deeper than a grain. Only hops depend on it.
+        is 0 in a flow that is much deeper than a grain. Only going on depends on it.
     relative_size
-        Diameter of the grain over that of the grains of its bed. Only hops depend on
-        it: a pocket has it in the entrainment angle.
+        Diameter of the grain over that of the grains of its bed. Only going on depends
+        on it: a pocket has it in the entrainment angle.
 
     Examples
     --------

@@ -1,8 +1,7 @@
 """The threshold of grains by a force law and a criterion, made once.
 
-A grain leaves its pocket, or it also goes on after that. One that goes on leaves in a
-gust and hops on after it; one that cannot hop goes on where the mean stress turns it
-over its neighbours.
+A grain leaves its pocket, or its motion is also sustained: it leaves in a gust, and
+rolls and hops on after it (`orchestrator.physics.rolling`).
 """
 
 from dataclasses import dataclass
@@ -12,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orchestrator.physics import saltation
+from orchestrator.physics import rolling, saltation
 from orchestrator.physics.beside import ENTRAINED, SUSTAINED
 from orchestrator.physics.grain import Grain
+from orchestrator.physics.gusts import PEAK
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.threshold import Threshold, threshold, why_not
 from orchestrator.physics.verdict import Reason
@@ -29,69 +29,58 @@ class Criteria:
     ----------
     steady
         Shields number at which a flow without gusts turns each over its neighbours.
-    hoppers
-        The grains as they hop over their beds.
+    spheres
+        The grains as they roll and hop over their beds.
     peak
         Stress of the gust over the mean stress.
     """
 
     steady: FloatArray
-    hoppers: Grain
-    peak: ArrayLike = saltation.PEAK
-
-    @cached_property
-    def can_hop(self) -> BoolArray:
-        """Whether each can hop."""
-        return saltation.hops(self.hoppers)
-
-    @cached_property
-    def _usual(self) -> saltation.SustainedThresholds:
-        """The thresholds of hops, with the usual rebounds."""
-        return saltation.tabulated(self.hoppers)
-
-    def _motion(
-        self, thresholds: saltation.SustainedThresholds
-    ) -> saltation.MotionOnset:
-        """What both criteria ask together."""
-        further = thresholds.initiation(self.peak)
-        return saltation.motion(self.steady, further, self.can_hop, self.peak)
-
-    @cached_property
-    def _both(self) -> saltation.MotionOnset:
-        return self._motion(self._usual)
-
-    @property
-    def shields(self) -> FloatArray:
-        """Shields number from which each leaves and goes on."""
-        return self._both.shields
-
-    @property
-    def hops_decide(self) -> BoolArray:
-        """Whether hopping on holds each longer than its pocket."""
-        return self._both.goes_on
+    spheres: Grain
+    peak: ArrayLike = PEAK
 
     @property
     def entrained(self) -> FloatArray:
-        """That from which the gust turns each over, or the flow one that cannot hop."""
-        return np.where(
-            self.can_hop, self.steady / np.asarray(self.peak, float), self.steady
-        )
+        """Shields number from which the gust turns each over."""
+        return np.asarray(self.steady / np.asarray(self.peak, float))
+
+    @cached_property
+    def sustained(self) -> FloatArray:
+        """That from which each rolls and hops on after the gust."""
+        return self._sustained("middle")
+
+    def _sustained(self, end: rolling.End) -> FloatArray:
+        """The same, or an end of the model's interval."""
+        return rolling.sustained(self.spheres, end).initiation(self.peak)
 
     @property
-    def sustained(self) -> FloatArray:
-        """That from which each hops on after the gust; NaN of one that cannot hop."""
-        return np.where(self.can_hop, self._usual.initiation(self.peak), np.nan)
+    def shields(self) -> FloatArray:
+        """That from which each is entrained, and its motion sustained."""
+        return np.maximum(self.entrained, self.sustained)
+
+    @property
+    def sustained_decides(self) -> BoolArray:
+        """Whether sustained motion needs more than entrainment."""
+        return ~(self.entrained > self.sustained)
+
+    @property
+    def at_least(self) -> FloatArray:
+        """The threshold of a quarter of the spheres, and half of the way."""
+        return np.maximum(self.entrained, self._sustained("low"))
 
     @property
     def at_most(self) -> FloatArray:
-        """The threshold with the weakest rebounds; NaN of one that cannot hop."""
-        weakest = saltation.tabulated(self.hoppers, at_most=True)
-        return np.where(self.can_hop, self._motion(weakest).shields, np.nan)
+        """The threshold of three quarters of the spheres, and twice the way."""
+        return np.maximum(self.entrained, self._sustained("high"))
 
     @property
     def cessation(self) -> FloatArray:
-        """That below which motion ceases once it is under way."""
-        return np.where(self.can_hop, self._usual.cessation, self.steady)
+        """That below which motion ceases once it is under way.
+
+        A grain that hops in the wind keeps the speed that it has won, and goes on below
+        the stress that sets it in motion.
+        """
+        return np.fmin(saltation.tabulated(self.spheres).cessation, self.sustained)
 
     def columns(self) -> dict[str, Any]:
         """Make the columns of both criteria.
@@ -104,9 +93,12 @@ class Criteria:
         return {
             "shields_entrained": self.entrained,
             "shields_sustained": self.sustained,
+            "shields_sustained_low": self.at_least,
             "shields_sustained_high": self.at_most,
             "shields_cessation": self.cessation,
-            "decides": np.where(self.hops_decide, SUSTAINED, ENTRAINED).astype(object),
+            "decides": np.where(self.sustained_decides, SUSTAINED, ENTRAINED).astype(
+                object
+            ),
         }
 
 
@@ -174,7 +166,7 @@ def of_grains(
     gust
         Largest over mean stress of the gusts of the flow. Without gusts, NaN, a grain
         that leaves does so in the steady flow, and one that goes on leaves in a gust of
-        `saltation.PEAK`.
+        `PEAK`.
 
     Returns
     -------
@@ -195,7 +187,7 @@ def of_grains(
     ...     at = of_grains(sand, "bridged", criterion)
     ...     print(at.shields.round(4), at.valid)
     [0.0242] [ True]
-    [0.0327] [ True]
+    [0.0262] [ True]
     """
     leaving = threshold(LAWS[law], grain)
     has_gust = np.isfinite(np.asarray(gust, float))
@@ -206,12 +198,11 @@ def of_grains(
     criteria = None
     valid = leaving.valid
     if criterion == SUSTAINED:
-        peak = np.where(has_gust, gust, saltation.PEAK)
+        peak = np.where(has_gust, gust, PEAK)
         criteria = Criteria(leaving.shields, grain, peak)
         shields = criteria.shields
         ustar = grain.ustar_at(shields)
-        peak = np.where(criteria.can_hop, peak, 1.0)
-        valid = valid & (~criteria.can_hop | np.isfinite(criteria.sustained))
+        valid = valid & np.isfinite(criteria.sustained)
     with np.errstate(invalid="ignore"):
         in_gust = ustar * np.sqrt(peak)
         return Onset(

@@ -233,7 +233,7 @@ def tested_word(table: Any) -> Any:
 
 
 def has_no_law(table: Any, count: int) -> BoolArray:
-    """Tell which thresholds depend on no force law: those that hopping on decides.
+    """Tell which thresholds depend on no force law: those that going on decides.
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""Sustained motion: when a grain that has left its pocket keeps hopping over the bed.
+"""Grains that hop over their bed: when one that is in motion keeps hopping.
+
+This is the threshold of cessation, in air the impact threshold. Whether motion starts
+and is sustained, by rolling and hopping, is that of `rolling`.
 
 A grain hops over a bed of equal grains, under a flow with the profile
 `velocity.law_of_the_wall`: the drag acts on its speed relative to the fluid, the added
@@ -25,7 +28,6 @@ from numpy.typing import ArrayLike
 from orchestrator.physics import velocity
 from orchestrator.physics.constants import SAND_GRAIN
 from orchestrator.physics.grain import Grain
-from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import CLIFT_GAUVIN
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
@@ -61,12 +63,6 @@ ALIKE = 3
 
 A grain with so many goes on.
 """
-REBOUNDS_FROM = 10.0
-"""Stokes number of an impact from which a sphere rebounds in a viscous fluid."""
-LIQUID_BELOW = 100.0
-"""Density of the grain over that of the fluid below which that is a liquid."""
-SETTLING_HALVINGS = 50
-"""Halvings of the logarithm of a settling speed."""
 SETTLED = 1e-4
 """Relative difference up to which two hops are as strong as each other."""
 
@@ -223,11 +219,6 @@ class Gust(NamedTuple):
 
 CALM = Gust()
 """No gust."""
-PEAK = peak_over_mean(0.4, 100)
-"""Stress of the gust that decides, over that of the mean flow: 2.28.
-
-It is the largest of 100 independent stresses of intensity 0.4.
-"""
 STOPS, GOES_ON, ENDLESS = 0, 1, 2
 """What becomes of a grain: it is trapped, goes on, or its trajectory does not end."""
 
@@ -549,8 +540,8 @@ class _Hopping:
 
 
 @dataclass(frozen=True, eq=False)
-class SustainedThresholds:
-    """Shields numbers of the mean flow at which grains go on, arrays of shape (n,).
+class HoppingThresholds:
+    """Shields numbers of the mean flow in which grains hop on, arrays of shape (n,).
 
     A threshold of 0 lies below `LEAST`: such grains go on in any flow. Infinite is one
     that no flow up to `MOST` reaches, NaN one that is not known, since trajectories do
@@ -567,154 +558,6 @@ class SustainedThresholds:
     steady: FloatArray
     cessation: FloatArray
 
-    def initiation(self, peak: ArrayLike = 1.0) -> FloatArray:
-        """Compute the thresholds at which a gust starts motion that goes on after it.
-
-        The gust lasts longer than the grain needs to gain its speed. The mean stress is
-        then the least at which the gust's stress reaches the steady threshold, and the
-        mean flow keeps the grain in motion afterwards.
-
-        Parameters
-        ----------
-        peak
-            Stress of the gust over that of the mean flow.
-
-        Returns
-        -------
-        FloatArray
-            Shields numbers of the mean flow, of the broadcast shape.
-
-        Examples
-        --------
-        >>> of_air = Thresholds(steady=np.array([0.025]), cessation=np.array([0.006]))
-        >>> print(of_air.initiation([1.0, 2.5, 10.0]))
-        [0.025 0.01  0.006]
-        """
-        return np.asarray(np.maximum(self.steady / np.asarray(peak), self.cessation))
-
-
-def settling(grains: Grain) -> FloatArray:
-    """Compute the speed at which grains settle in their fluid at rest.
-
-    The drag is that of Clift and Gauvin, on a level bed's normal.
-
-    Parameters
-    ----------
-    grains
-        The grains.
-
-    Returns
-    -------
-    FloatArray
-        Settling speeds, sqrt(g' d), shape (n,).
-
-    Examples
-    --------
-    >>> sand = Grain.of_numbers([5.3, 127.0, 38.8], [2.65, 2.65, 2208.0])
-    >>> print(settling(sand).round(2))
-    [ 0.41  1.98 38.66]
-    """
-    s = grains.density_ratio
-    viscosity = np.sqrt(s) / grains.galileo
-    low = np.full(len(grains), np.log(1e-12))
-    high = np.full(len(grains), np.log(1e6))
-    for _ in range(SETTLING_HALVINGS):
-        middle = (low + high) / 2
-        speed = np.exp(middle)
-        drag = 18 * viscosity * speed * CLIFT_GAUVIN.factor(speed / viscosity)
-        is_held = drag > s
-        high = np.where(is_held, middle, high)
-        low = np.where(is_held, low, middle)
-    return np.asarray(np.exp((low + high) / 2))
-
-
-def hops(grains: Grain) -> BoolArray:
-    """Say which grains can hop over their bed.
-
-    A sphere that meets a wall in a viscous fluid does not rebound where the Stokes
-    number of the impact, ``s v d/(9 nu)``, is below some 10: the fluid between them
-    takes up its motion (G. G. Joseph et al. 2001, J. Fluid Mech. 433). The normal speed
-    of a hop's impact is at most the settling speed. A grain that cannot rebound even at
-    that rolls, moved by the stress of the moment alone.
-
-    Parameters
-    ----------
-    grains
-        The grains.
-
-    Returns
-    -------
-    BoolArray
-        Whether they can, shape (n,).
-
-    Examples
-    --------
-    0.2 and 1 mm in water, and 0.05 mm in air:
-
-    >>> sand = Grain.of_numbers([11.4, 127.0, 3.47], [2.65, 2.65, 2208.0])
-    >>> print(hops(sand))
-    [False  True  True]
-    """
-    viscosity = np.sqrt(grains.density_ratio) / grains.galileo
-    stokes = grains.density_ratio * settling(grains) / (9 * viscosity)
-    return np.asarray(stokes >= REBOUNDS_FROM)
-
-
-class MotionOnset(NamedTuple):
-    """The mean stress at which grains leave their pockets and go on.
-
-    Attributes
-    ----------
-    shields
-        Shields number of the mean flow, shape (n,).
-    goes_on
-        Whether going on decides; where it does not, leaving does.
-    """
-
-    shields: FloatArray
-    goes_on: BoolArray
-
-
-def motion(
-    leaves: ArrayLike,
-    goes_on: ArrayLike,
-    can_hop: ArrayLike,
-    peak: ArrayLike = PEAK,
-) -> MotionOnset:
-    """Find the mean stress at which grains leave their pockets and go on.
-
-    A grain that can hop leaves in a gust and hops on after it: its threshold is the
-    larger of both mean stresses. One that cannot, goes on where the mean stress itself
-    turns it over the next grain: its threshold is that of leaving without a gust.
-
-    Parameters
-    ----------
-    leaves
-        Shields number that turns a grain over its neighbour, in a steady flow.
-    goes_on
-        Shields number of the mean flow at which it goes on, as `Thresholds.initiation`.
-    can_hop
-        Whether it can hop, as `hops`.
-    peak
-        Stress of the gust over that of the mean flow.
-
-    Returns
-    -------
-    Motion
-        Thresholds and what decides, of the broadcast shape.
-
-    Examples
-    --------
-    >>> found = motion([0.06, 0.06, 0.06], [0.01, 0.03, 0.5], [True, True, False], 2.0)
-    >>> print(found.shields, found.goes_on)
-    [0.03 0.03 0.06] [False  True False]
-    """
-    in_gust = np.asarray(leaves) / np.asarray(peak)
-    further = np.asarray(goes_on)
-    can = np.asarray(can_hop)
-    shields = np.where(can, np.maximum(in_gust, further), leaves)
-    return MotionOnset(shields, can & ~(in_gust > further))
-
 
 FAST = 10.0
 """Height, d, whose mean speed a grain has from which motion is to cease."""
@@ -727,7 +570,7 @@ def thresholds(
     *,
     rebound: Rebound = BEADS,
     steps: int = STEPS,
-) -> SustainedThresholds:
+) -> HoppingThresholds:
     """Find the thresholds of grains in sustained motion, steady and of cessation.
 
     Parameters
@@ -741,7 +584,7 @@ def thresholds(
 
     Returns
     -------
-    Thresholds
+    HoppingThresholds
         The thresholds, arrays of shape (n,).
 
     Examples
@@ -766,7 +609,7 @@ def thresholds(
             steps=steps,
         )
 
-    return SustainedThresholds(least(grains, from_pocket), least(grains, from_motion))
+    return HoppingThresholds(least(grains, from_pocket), least(grains, from_motion))
 
 
 def under_gust(
@@ -788,7 +631,7 @@ def under_gust(
     Returns
     -------
     FloatArray
-        Shields numbers of the mean flow, shape (n,), as in `SustainedThresholds`.
+        Shields numbers of the mean flow, shape (n,), as in `HoppingThresholds`.
 
     Examples
     --------
@@ -866,7 +709,7 @@ SLOPE_NODES_DEG = np.linspace(-30.0, 30.0, 13)
 """Nodes of the table."""
 
 
-def tabulated(grains: Grain, *, at_most: bool = False) -> SustainedThresholds:
+def tabulated(grains: Grain) -> HoppingThresholds:
     """Find the thresholds of grains from the table, or by `thresholds` where it ends.
 
     The thresholds are interpolated linearly: their logarithms over the logarithms of
@@ -876,12 +719,10 @@ def tabulated(grains: Grain, *, at_most: bool = False) -> SustainedThresholds:
     ----------
     grains
         The grains, which rebound as `BEADS`.
-    at_most
-        Whether they rebound as `weakest` says: the upper ends of the thresholds.
 
     Returns
     -------
-    Thresholds
+    HoppingThresholds
         The thresholds, arrays of shape (n,).
 
     Examples
@@ -894,13 +735,13 @@ def tabulated(grains: Grain, *, at_most: bool = False) -> SustainedThresholds:
     """
     is_inside = is_tabulated(grains)
     found = np.full((2, len(grains)), np.nan)
-    found[:, is_inside] = _interpolated(grains.at(is_inside), at_most)
+    found[:, is_inside] = _interpolated(grains.at(is_inside))
     outside = np.flatnonzero(~is_inside)
     if len(outside):
-        beyond = _beyond_table(grains.at(outside), at_most)
+        beyond = _beyond_table(grains.at(outside))
         found[0, outside] = beyond.steady
         found[1, outside] = beyond.cessation
-    return SustainedThresholds(steady=found[0], cessation=found[1])
+    return HoppingThresholds(steady=found[0], cessation=found[1])
 
 
 _AXES = (np.log(GALILEO_NODES), np.log(DENSITY_NODES), SLOPE_NODES_DEG)
@@ -940,77 +781,19 @@ def is_tabulated(grains: Grain) -> BoolArray:
     return is_inside
 
 
-def _interpolated(grains: Grain, at_most: bool) -> FloatArray:
+def _interpolated(grains: Grain) -> FloatArray:
     """Thresholds of grains that the table holds, of shape (2, n)."""
     galileo, density, slope = _points(grains)
     below = np.searchsorted(SLOPE_NODES_DEG, slope, side="right") - 1
     below = np.minimum(below, len(SLOPE_NODES_DEG) - 2)
     ends = SLOPE_NODES_DEG[below], SLOPE_NODES_DEG[below + 1]
-    table = _table(at_most)
+    table = _table()
     gentle, steep = (np.exp(table((galileo, density, end))).T for end in ends)
     part = (slope - ends[0]) / (ends[1] - ends[0])
     return np.asarray(gentle + part * (steep - gentle))
 
 
-def weakest(density_ratio: FloatArray) -> FloatArray:
-    """Restitution of the weakest rebounds that are thought of, a key of `SIMULATED`.
-
-    In a gas it is 0.55, the least that simulations of sand in bulk take; collisions of
-    sand grains have some 0.7 (M. V. Carneiro et al. 2013, arXiv 1212.4603). In a
-    liquid, where it falls with the Stokes number of the impact, it is 0.25.
-
-    Parameters
-    ----------
-    density_ratio
-        Density of the grain over that of the fluid.
-
-    Returns
-    -------
-    FloatArray
-        Restitution, of the same shape.
-
-    Examples
-    --------
-    >>> print(weakest(np.array([2.65, 2208.0])))
-    [0.25 0.55]
-    """
-    return np.where(density_ratio < LIQUID_BELOW, 0.25, 0.55)
-
-
-def weakest_thresholds(grains: Grain) -> SustainedThresholds:
-    """Find the thresholds of grains whose rebounds are those of `weakest`.
-
-    Parameters
-    ----------
-    grains
-        The grains.
-
-    Returns
-    -------
-    Thresholds
-        The thresholds, arrays of shape (n,).
-
-    Examples
-    --------
-    1 mm in water, and 0.25 mm in air:
-
-    >>> sand = Grain.of_numbers([127.0, 38.8], [2.65, 2208.0])
-    >>> print(weakest_thresholds(sand).cessation.round(3))
-    [0.054 0.009]
-    """
-    restitution = weakest(grains.density_ratio)
-    found = SustainedThresholds(
-        np.full(len(grains), np.nan), np.full(len(grains), np.nan)
-    )
-    for value in np.unique(restitution):
-        places = np.flatnonzero(restitution == value)
-        part = thresholds(grains.at(places), rebound=SIMULATED[float(value)])
-        found.steady[places] = part.steady
-        found.cessation[places] = part.cessation
-    return found
-
-
-def _beyond_table(grains: Grain, at_most: bool) -> SustainedThresholds:
+def _beyond_table(grains: Grain) -> HoppingThresholds:
     """The thresholds of grains that the table does not hold, of alike ones once."""
     numbers = (
         grains.galileo,
@@ -1023,14 +806,12 @@ def _beyond_table(grains: Grain, at_most: bool) -> SustainedThresholds:
     rows = [*zip(*(values.tolist() for values in numbers), strict=True)]
     unlike: dict[tuple[float, ...], int] = {}
     places = [unlike.setdefault(row, len(unlike)) for row in rows]
-    found = _of_unlike(tuple(unlike), at_most)
-    return SustainedThresholds(found.steady[places], found.cessation[places])
+    found = _of_unlike(tuple(unlike))
+    return HoppingThresholds(found.steady[places], found.cessation[places])
 
 
 @lru_cache(maxsize=64)  # tables, cards and pictures ask for the same grains
-def _of_unlike(
-    rows: tuple[tuple[float, ...], ...], at_most: bool
-) -> SustainedThresholds:
+def _of_unlike(rows: tuple[tuple[float, ...], ...]) -> HoppingThresholds:
     """The same of grains by the numbers of each."""
     galileo, density_ratio, slope_deg, ratio, fall, relative_size = np.array(rows).T
     grains = Grain.of_numbers(
@@ -1041,7 +822,7 @@ def _of_unlike(
         fall=fall,
         relative_size=relative_size,
     )
-    return weakest_thresholds(grains) if at_most else thresholds(grains)
+    return thresholds(grains)
 
 
 LOG_OF_NOTHING = -1e300
@@ -1049,15 +830,11 @@ LOG_OF_NOTHING = -1e300
 
 
 @cache
-def _table(at_most: bool) -> "RegularGridInterpolator":
-    """Logarithms of the thresholds, steady and of cessation, on the axes of the table.
-
-    They are those by the weakest rebounds, or by the usual ones.
-    """
+def _table() -> "RegularGridInterpolator":
+    """Logarithms of the thresholds, steady and of cessation, on the table's axes."""
     from scipy.interpolate import RegularGridInterpolator  # slow to import
 
-    columns = (2, 3) if at_most else (0, 1)
-    both = np.loadtxt(TABLE, delimiter=",", skiprows=1, usecols=columns)
+    both = np.loadtxt(TABLE, delimiter=",", skiprows=1)
     with np.errstate(divide="ignore"):  # of 0, below `LEAST`
         logarithms = np.maximum(np.log(both), LOG_OF_NOTHING)
     shape = [len(nodes) for nodes in _AXES]

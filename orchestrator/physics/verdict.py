@@ -7,7 +7,6 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
-from orchestrator.physics import saltation
 from orchestrator.physics.beside import (
     COMPARED_WITH,
     FORMULA,
@@ -34,8 +33,6 @@ MOST_CORRECTION = 2.0
 The tested intervals of the usual roughness reach as far: 0.21 to 3.5 in the stress."""
 EXPOSED_FROM = 0.25
 """Part of a grain over the tops of its neighbours from which it is exposed."""
-NO_START = f"not reached: no flow up to a Shields number of {saltation.MOST:g} does it"
-NO_END = "not known: hops have no end"
 NOT_REACHED = "not reached: the grain has not moved"
 """Why a grain has no threshold."""
 COLUMNS: Mapping[str, str] = {
@@ -91,7 +88,7 @@ def of_grain(row: Mapping[Any, Any], of_law: Iterable[Reason]) -> Iterator[Reaso
         The reasons.
     """
     if not math.isfinite(row["reynolds"]) and "count" not in row:
-        yield _not_reached(row)
+        yield Reason("not reached", NOT_REACHED)
     yield from of_law
     standing_out = row["standing_out"]
     if standing_out <= 0:
@@ -101,15 +98,6 @@ def of_grain(row: Mapping[Any, Any], of_law: Iterable[Reason]) -> Iterator[Reaso
         yield Reason("hidden", f"hidden grain: {part}")
     if row["flow_reynolds"] < LAMINAR_BELOW:
         yield Reason("laminar", laminar(row["flow_reynolds"]))
-
-
-def _not_reached(row: Mapping[Any, Any]) -> Reason:
-    """Why a single grain has no threshold."""
-    if row.get("criterion") != SUSTAINED:
-        return Reason("not reached", NOT_REACHED)
-    if math.isinf(row["shields_sustained"]):
-        return Reason("not reached", NO_START)
-    return Reason("not known", NO_END)
 
 
 def of_measurements(row: Mapping[Any, Any], is_closed: bool) -> Iterator[Reason]:

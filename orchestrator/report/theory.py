@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from orchestrator.physics import curves, saltation
+from orchestrator.physics import curves
 from orchestrator.physics.constants import GRAIN_COLUMNS
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import LAWS
@@ -374,8 +374,7 @@ def sustained_curves(rows: pd.DataFrame) -> list[Going]:
     Returns
     -------
     list of Going
-        A curve for each kind of grain that the table of `saltation` holds: others would
-        take seconds each.
+        A curve for each kind of grain.
     """
     found = []
     rows = rows[rows["criterion"] == SUSTAINED]
@@ -385,9 +384,6 @@ def sustained_curves(rows: pd.DataFrame) -> list[Going]:
         ends = group["d_m"].min() / BESIDE, group["d_m"].max() * BESIDE
         d = np.geomspace(*ends, SIZES)
         here = pd.DataFrame([first] * SIZES).assign(d_m=d, z0_m=first["z0_over_d"] * d)
-        here = here[saltation.is_tabulated(Grain.of_table(here))]
-        if here.empty:
-            continue
         grains = Grain.of_table(here)
         at = of_grains(grains, str(first["force_law"]), SUSTAINED, first["gust"])
         bed = LineConditions._make(first[BED].tolist())

@@ -1,7 +1,7 @@
 """The criterion of a scene: what a grain must do to count as moved.
 
 A grain of the paper leaves its pocket. One of a natural sediment leaves it in a gust,
-and goes on after that (`orchestrator.physics.saltation`). Where a scene leaves the
+and goes on after that (`orchestrator.physics.rolling`). Where a scene leaves the
 criterion open, its fluid and its forces decide, whatever its method is.
 """
 
@@ -10,14 +10,15 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orchestrator.physics import saltation
+from orchestrator.physics import rolling
 from orchestrator.physics.grain import Grain
+from orchestrator.physics.gusts import PEAK
 from orchestrator.physics.onset import Criteria
 from orchestrator.study.closed_form import closed_form, single_grain
 from orchestrator.study.parts import GrainBed
 from orchestrator.study.question import why_not_sustained
 from orchestrator.study.scene import Scene
-from orchestrator.types import BoolArray, FloatArray
+from orchestrator.types import FloatArray
 
 ENTRAINED, SUSTAINED, AUTO = "entrained", "sustained", "auto"
 """Words of the field `threshold.criterion`."""
@@ -67,15 +68,15 @@ def peak_of(scene: Scene) -> float:
     float
         That of the scene's gusts, or the usual one.
     """
-    return scene.gust if scene.flow.gusts else saltation.PEAK
+    return scene.gust if scene.flow.gusts else PEAK
 
 
-def hoppers(
+def spheres(
     scene: Scene,
     slopes_deg: ArrayLike,
     sizes: ArrayLike = 1.0,
 ) -> Grain:
-    """Make the grains of a scene as they hop over its bed.
+    """Make the grains of a scene as they roll and hop over its bed.
 
     Parameters
     ----------
@@ -94,20 +95,20 @@ def hoppers(
     """
     grain = single_grain(scene)
     over = np.asarray(sizes, float)
-    hoppers = grain.changed(
+    rolling_grain = grain.changed(
         diameter=grain.diameter * over,
         slope_deg=slopes_deg,
         relative_size=grain.relative_size * over,
     )
-    return hoppers.flat
+    return rolling_grain.flat
 
 
-def hopping_on(
+def sustaining(
     scene: Scene,
     slopes_deg: ArrayLike,
     sizes: ArrayLike,
-) -> tuple[FloatArray, BoolArray]:
-    """Find the mean stresses at which the grains of a bed hop on after a gust.
+) -> FloatArray:
+    """Find the mean stresses at which the grains of a bed go on after a gust.
 
     Parameters
     ----------
@@ -120,26 +121,23 @@ def hopping_on(
 
     Returns
     -------
-    shields, can_hop
-        Shields numbers of each grain by its own diameter, and whether it can hop, shape
-        (n,).
+    FloatArray
+        Shields numbers of each grain by its own diameter, shape (n,).
     """
     pairs = np.round(np.column_stack(np.broadcast_arrays(slopes_deg, sizes)), 6)
     unlike, place = np.unique(pairs, axis=0, return_inverse=True)
     rows = tuple((float(slope), float(size)) for slope, size in unlike)
-    shields, can_hop = _initiation(scene, rows)
-    return shields[place.ravel()], can_hop[place.ravel()]
+    return _initiation(scene, rows)[place.ravel()]
 
 
 @lru_cache(maxsize=64)
 def _initiation(
     scene: Scene,
     rows: tuple[tuple[float, float], ...],
-) -> tuple[FloatArray, BoolArray]:
+) -> FloatArray:
     """The same for rows of slope and size; a pile asks for them several times."""
-    grains = hoppers(scene, *np.array(rows).T)
-    shields = saltation.tabulated(grains).initiation(peak_of(scene))
-    return shields, saltation.hops(grains)
+    grains = spheres(scene, *np.array(rows).T)
+    return rolling.sustained(grains).initiation(peak_of(scene))
 
 
 def of_single_grain(scene: Scene) -> Criteria:
@@ -156,4 +154,4 @@ def of_single_grain(scene: Scene) -> Criteria:
         The stresses, arrays of shape (1,).
     """
     steady = np.atleast_1d(closed_form(scene).shields) * scene.gust
-    return Criteria(steady, hoppers(scene, scene.bed.slope_deg), peak_of(scene))
+    return Criteria(steady, spheres(scene, scene.bed.slope_deg), peak_of(scene))

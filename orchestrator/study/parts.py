@@ -564,10 +564,10 @@ class ThresholdPart(Part):
     criterion: Literal["auto", "entrained", "sustained"] = field("auto")
     """what a grain must do
     - auto: entrained in the paper's gas (`fluid.kind`); in every other fluid sustained,
-      or entrained where a field of the scene rules hops out: a mixture, gusts, shared
+      or entrained where a field of the scene rules it out: a mixture, gusts, shared
       stress, a bed that changes, the laws of the paper, a single grain by DEM
     - entrained: leave its pocket in the flow, as in the paper
-    - sustained: leave it in a gust of 2.28 times the mean stress, and hop on after"""
+    - sustained: leave it in a gust of 2.28 times the mean stress, and go on after it"""
     fractions: Annotated[tuple[Fraction, ...], List] = _pile(
         (0.1, 0.3, 0.5, 0.7), symbol="n/N", column="-", min_length=1
     )

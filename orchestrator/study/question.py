@@ -211,7 +211,7 @@ def why_not_sustained(question: Question) -> str:
     if question.threshold.update > 0:
         return (
             "on a bed that changes (threshold.update) stress and slope of a grain "
-            "are of one round, and its hops pass over the bed of the next"
+            "are of one round, and it goes on over the bed of the next"
         )
     return ""
 

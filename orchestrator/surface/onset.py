@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from orchestrator.physics import saltation
 from orchestrator.physics.constants import SAND_GRAIN
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import LAWS
@@ -143,9 +142,8 @@ def sustained(
 ) -> FloatArray:
     """Find the local friction velocity at which a grain leaves in a gust and goes on.
 
-    It is that of the mean flow, whose gusts have `saltation.PEAK` times its stress, on
-    the slope along the stress, beyond the ends of the table of thresholds that of its
-    end. Where a grain cannot hop it is that at which the grain leaves without a gust.
+    It is that of the mean flow, whose gusts have `gusts.PEAK` times its stress, on the
+    slope along the stress.
 
     Parameters
     ----------
@@ -159,15 +157,13 @@ def sustained(
     Returns
     -------
     FloatArray
-        Friction velocities, m/s, shape (F,): infinite where no flow makes it hop on,
-        NaN where that is not known.
+        Friction velocities, m/s, shape (F,): NaN where that is not known.
     """
-    ends = saltation.SLOPE_NODES_DEG
-    along = np.clip(slope_along_deg(slope_deg, heading_deg), ends[0], ends[-1])
-    # it hops over a bed of identical grains
-    hopping = grain.changed(slope_deg=along, roughness=grain.diameter / SAND_GRAIN)
-    both = Criteria(hopping.shields(leaving), hopping)
-    return hopping.ustar_at(both.shields)
+    along = slope_along_deg(slope_deg, heading_deg)
+    # it goes over a bed of identical grains
+    going = grain.changed(slope_deg=along, roughness=grain.diameter / SAND_GRAIN)
+    both = Criteria(going.shields(leaving), going)
+    return going.ustar_at(both.shields)
 
 
 def wind_of(

@@ -209,7 +209,7 @@ def with_laws(
     -------
     dict of str to ndarray
         The columns with the range of the laws that hold, of those that take part in
-        intervals; none where hopping on decides, which no law changes, or where the
+        intervals; none where going on decides, which no law changes, or where the
         laws agree.
     """
     own = Interval(

@@ -49,6 +49,7 @@ ALONE: Row = {
     "criterion": ENTRAINED,
     "shields_entrained": nan,
     "shields_sustained": nan,
+    "shields_sustained_low": nan,
     "shields_sustained_high": nan,
     "shields_cessation": nan,
     "decides": ENTRAINED,
@@ -218,16 +219,17 @@ SINGLE_GRAIN: Mapping[str, str] = {
     ),
     **phrases("criterion"),
     "shields_entrained": (
-        "Shields number of the mean flow whose gust turns the grain over its "
-        "neighbour; of a grain that cannot hop that of the flow itself"
+        "Shields number of the mean flow whose gust turns the grain over its neighbour"
     ),
     "shields_sustained": (
-        "Shields number of the mean flow from which the grain hops on after the gust; "
-        "empty of a grain that cannot hop"
+        "Shields number of the mean flow from which the grain rolls and hops on after "
+        "the gust"
+    ),
+    "shields_sustained_low": (
+        "lower end of the threshold: of a quarter of the grains, and half of the way"
     ),
     "shields_sustained_high": (
-        "the threshold with the weakest rebounds of sand; empty of a grain that cannot "
-        "hop"
+        "upper end of the threshold: of three quarters of the grains, and twice the way"
     ),
     "shields_cessation": (
         "Shields number below which motion ceases once it is under way"
@@ -675,8 +677,8 @@ def pile_grain(answer: Answer) -> Row:
         "ustar0_m_s": threshold.of_grains(motion).value,
     }
     if pile.is_sustained:
-        by_hops = pile.hops_decide(answer.cases)
-        columns["decides"] = np.where(by_hops, SUSTAINED, ENTRAINED)
+        by_sustained = pile.sustained_decides(answer.cases)
+        columns["decides"] = np.where(by_sustained, SUSTAINED, ENTRAINED)
     if pile.pouring:
         columns["size_over_d"] = packing.sizes[counted]
         columns["pivot_deg"] = pile.pivot_angles_deg
@@ -920,8 +922,8 @@ def _decided(answer: Answer) -> Row:
     """The column of which criterion held most of the counted grains longer."""
     if not answer.pile.is_sustained:
         return {"criterion": ENTRAINED, "decides": ENTRAINED}
-    by_hops = answer.pile.hops_decide(answer.cases)
-    decides = SUSTAINED if by_hops.mean() > 0.5 else ENTRAINED
+    by_sustained = answer.pile.sustained_decides(answer.cases)
+    decides = SUSTAINED if by_sustained.mean() > 0.5 else ENTRAINED
     return {"criterion": SUSTAINED, "decides": decides}
 
 

@@ -14,8 +14,9 @@ from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.pile_case import flows
 from orchestrator.grains.threshold import at_size, classes, sampled, within
-from orchestrator.physics import saltation
+from orchestrator.physics import rolling
 from orchestrator.physics.grain import Grain
+from orchestrator.physics.gusts import PEAK
 from orchestrator.report.figures import bed, pivots
 from orchestrator.report.results import Results
 from orchestrator.study import study
@@ -323,7 +324,7 @@ def test_grains_of_poured_beds_leave_in_a_gust_and_go_on_by_their_own_sizes(
     leaves = Pile(scene, cases).motion(cases).flows
     pile = Pile(changed(scene, {"threshold.criterion": "sustained"}), cases)
     both = pile.motion(cases).flows
-    # the flow at which one grain of each size hops on, over its local friction velocity
+    # the flow at which one grain of each size goes on, over its local friction velocity
     sizes = pile.packing.sizes[pile.packing.windward]
     x, z = pile.tangents[pile.packing.windward].T
     ratio = np.abs(pile.speed(cases))
@@ -340,16 +341,15 @@ def test_grains_of_poured_beds_leave_in_a_gust_and_go_on_by_their_own_sizes(
             roughness=scene.bed.roughness,
             relative_size=size,
         )
-        assert saltation.hops(grain).all()
-        shields = saltation.tabulated(grain).initiation(saltation.PEAK)[0]
+        shields = rolling.sustained(grain).initiation(PEAK)[0]
         further.append(np.sqrt(shields * 1.65 * 9.81 * 1e-3 * size) / over)
         if len(further) == 5:
             break
-    in_gust = leaves[:5] / np.sqrt(saltation.PEAK)
+    in_gust = leaves[:5] / np.sqrt(PEAK)
     expected = np.maximum(in_gust, further)
     np.testing.assert_allclose(both[:5], expected, rtol=1e-4)
-    by_hops = pile.hops_decide(cases)
-    np.testing.assert_array_equal(by_hops[:5], in_gust < further)
+    by_sustained = pile.sustained_decides(cases)
+    np.testing.assert_array_equal(by_sustained[:5], in_gust < further)
 
 
 @pytest.mark.parametrize("name", ["mixed", "strip"])

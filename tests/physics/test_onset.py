@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from orchestrator.physics import saltation
+from orchestrator.physics import rolling
 from orchestrator.physics.beside import ENTRAINED, SUSTAINED
 from orchestrator.physics.grain import Grain
+from orchestrator.physics.gusts import PEAK
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.onset import against_law, of_grains
 
@@ -27,17 +28,11 @@ def test_a_grain_that_goes_on_needs_the_larger_of_two_mean_stresses(law: str) ->
     leaving = of_grains(SAND, law, ENTRAINED)
     both = of_grains(SAND, law, SUSTAINED)
     assert both.criteria is not None
-    can = saltation.hops(SAND)
-    assert can.any()
-    assert not can.all()
-    hopping = saltation.tabulated(SAND).initiation(saltation.PEAK)
-    expected = np.maximum(leaving.shields / saltation.PEAK, hopping)
-    assert both.shields[can] == pytest.approx(expected[can])
-    # without hops the mean stress has to turn it over
-    assert both.shields[~can] == pytest.approx(leaving.shields[~can])
+    going = rolling.sustained(SAND).initiation(PEAK)
+    in_gust = leaving.shields / PEAK
+    assert both.shields == pytest.approx(np.maximum(in_gust, going))
     decides = both.criteria.columns()["decides"]
-    is_further = hopping >= leaving.shields / saltation.PEAK
-    assert ((decides == SUSTAINED) == (can & is_further)).all()
+    assert ((decides == SUSTAINED) == (going >= in_gust)).all()
 
 
 def test_gusts_lower_the_mean_stress_and_not_the_forces() -> None:

@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.physics import saltation, verdict
+from orchestrator.physics import verdict
 from orchestrator.physics.grain import Grain
-from orchestrator.physics.gusts import peak_over_mean
+from orchestrator.physics.gusts import PEAK, peak_over_mean
 from orchestrator.physics.reported import in_units
 from orchestrator.physics.threshold import thresholds_of
 from orchestrator.physics.velocity import measurable_speeds
@@ -224,7 +224,7 @@ def test_the_answer_of_a_picture_is_that_of_the_card() -> None:
     steady = thresholds_of("bridged", Grain.of_table(asked))
     assert leaves == pytest.approx(float(steady.friction_velocity))
     # a gust of 2.28 times the mean stress turns it over
-    gust = leaves / math.sqrt(saltation.PEAK)
+    gust = leaves / math.sqrt(PEAK)
     assert goes_on == pytest.approx(gust)
     assert holds
     peak = peak_over_mean(0.4, 100)

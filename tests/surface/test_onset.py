@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestrator.physics import saltation
+from orchestrator.physics import rolling
 from orchestrator.physics.grain import Grain
+from orchestrator.physics.gusts import PEAK
 from orchestrator.physics.threshold import thresholds_of
 from orchestrator.surface import onset
 from orchestrator.surface.onset import Shares
@@ -58,19 +59,10 @@ def test_grains_go_on_by_the_slope_along_the_stress() -> None:
     leaving = onset.entrained(SAND, "bridged", slopes, headings)
     found = onset.sustained(SAND, leaving, slopes, headings)
     grains = SAND.changed(slope_deg=[20.0, 0.0, -20.0])
-    going = saltation.tabulated(grains).initiation(saltation.PEAK)
+    going = rolling.sustained(grains).initiation(PEAK)
     # the gust must turn the grain over its neighbours, and it must go on after that
-    shields = np.maximum(leaving**2 / excess / saltation.PEAK, going)
+    shields = np.maximum(leaving**2 / excess / PEAK, going)
     assert found == pytest.approx(np.sqrt(shields * excess))
-
-
-def test_a_grain_that_cannot_hop_has_no_gust() -> None:
-    silt = SAND.changed(
-        diameter=1e-4, roughness=3e-6, fluid_density=1000.0, viscosity=1e-6
-    )
-    slopes = np.array([0.0, 20.0])
-    leaving = onset.entrained(silt, "bridged", slopes, slopes)
-    assert onset.sustained(silt, leaving, slopes, slopes) == pytest.approx(leaving)
 
 
 def test_a_face_without_stress_never_moves() -> None:

@@ -7,7 +7,6 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
-from orchestrator.physics import saltation
 from orchestrator.physics.beside import by_formula
 from orchestrator.physics.fluids import is_gas
 from orchestrator.physics.grain import Grain
@@ -25,12 +24,9 @@ from orchestrator.report.style import (
     Look,
 )
 from orchestrator.report.subjects import ReportedQuantity
-from orchestrator.study.criterion import SUSTAINED
 from orchestrator.tables.quoted import of_rows
 from orchestrator.types import FloatArray
 
-FEW = 13
-"""Sizes of the curve of a grain in sustained motion where no table holds it."""
 CAPTION = (
     "By law: orange, the answer; blue discs, other laws that hold; grey rings, laws "
     "outside their range. By size: the same law, each size on its like. Dashed: what "
@@ -77,10 +73,6 @@ def grain_panels(row: pd.Series) -> Canvas:
     """
     told = single.quantity_of_row(row)
     here = _other_sizes(row, 61)
-    is_tabulated = saltation.is_tabulated(Grain.of_table(here))
-    if row["criterion"] == SUSTAINED and not is_tabulated.all():
-        # each size takes a tenth of a second
-        here = _other_sizes(row, FEW)
     d = here["d_m"].to_numpy()
     found = of_rows(here)
     ustar = np.where(found["holds"], found["ustar"], np.nan)

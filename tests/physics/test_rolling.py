@@ -1,0 +1,88 @@
+"""Sustained motion: the table of spheres that roll and hop, its curves, and what made it."""
+
+import numpy as np
+import pytest
+
+from orchestrator.physics import rolling
+from orchestrator.physics.beside import SUSTAINED
+from orchestrator.physics.grain import Grain
+from orchestrator.physics.gusts import PEAK
+from orchestrator.physics.onset import Criteria, of_grains
+
+FLUIDS = {
+    "water": {"fluid_density": 1000.0, "viscosity": 1e-6},
+    "air": {"fluid_density": 1.2, "viscosity": 1.5e-5},
+    "Mars": {"fluid_density": 0.02, "viscosity": 6.5e-4, "gravity": 3.71},
+    "Titan": {"fluid_density": 5.3, "viscosity": 1.2e-6, "gravity": 1.35},
+}
+"""Of Titan the grains are of ice."""
+DENSITY = {"Titan": 950.0}
+STEP = 1.05
+"""No threshold is further from that of a grain 1 % larger."""
+SIZES = np.exp(np.arange(0, np.log(400), 0.01)) * 5e-5
+"""From 0.05 to 20 mm, by 1 %."""
+
+
+def sized(fluid: str, diameter: np.ndarray) -> Grain:
+    """Quartz, or on Titan ice, in a fluid."""
+    return Grain(
+        diameter=diameter,
+        density=DENSITY.get(fluid, 2650.0),
+        entrainment_angle_deg=60.0,
+        **FLUIDS[fluid],
+    )
+
+
+def steps(shields: np.ndarray) -> float:
+    """Largest factor between two thresholds that follow each other."""
+    return float(np.exp(np.abs(np.diff(np.log(shields))).max()))
+
+
+@pytest.mark.parametrize("fluid", FLUIDS)
+def test_the_threshold_has_no_step_from_size_to_size(fluid: str) -> None:
+    grains = sized(fluid, SIZES)
+    found = of_grains(grains, "bridged-gravel", SUSTAINED)
+    assert len(SIZES) > 200
+    assert found.criteria is not None
+    for shields in (found.shields, found.criteria.at_least, found.criteria.at_most):
+        assert steps(shields) < STEP
+
+
+def test_the_threshold_has_no_step_from_density_to_density() -> None:
+    ratios = np.exp(np.arange(np.log(1.2), np.log(2200), 0.01))
+    for galileo in (0.5, 5.0, 40.0, 300.0, 3000.0, 5e4):
+        grains = Grain.of_numbers(np.full(len(ratios), galileo), ratios)
+        at = rolling.sustained(grains).initiation(PEAK)
+        assert steps(at) < STEP
+
+
+def test_an_easier_criterion_never_has_a_higher_threshold() -> None:
+    random = np.random.default_rng(3)
+    count = 2000
+    grains = Grain.of_numbers(
+        np.exp(random.uniform(np.log(0.1), np.log(3e5), count)),
+        np.exp(random.uniform(np.log(1.05), np.log(1e6), count)),
+        slope_deg=random.uniform(-35, 35, count),
+        ratio=np.exp(random.uniform(np.log(1 / 300), np.log(0.3), count)),
+        relative_size=np.exp(random.uniform(-1, 1, count)),
+    )
+    steady = np.exp(random.uniform(np.log(1e-3), 0, count))
+    criteria = Criteria(steady, grains)
+    # leaving alone is easier than leaving and going on, and so is going on alone
+    assert (criteria.shields >= criteria.entrained).all()
+    assert (criteria.shields >= criteria.sustained).all()
+    # a quarter of the spheres and half of the way are less than a half and the whole
+    assert (criteria.at_least <= criteria.shields).all()
+    assert (criteria.shields <= criteria.at_most).all()
+    # a larger gust, or a way down, is easier
+    assert (Criteria(steady, grains, 4.0).shields <= criteria.shields).all()
+    few = Criteria(steady[:20], grains.at(slice(20)))
+    assert (few.cessation <= few.shields).all()
+
+
+def test_a_bed_that_falls_has_less_and_one_that_rises_has_more() -> None:
+    slopes = np.linspace(-30, 30, 61)
+    for galileo, ratio in ((20.0, 2.65), (127.0, 2.65), (1e4, 2.65), (39.0, 2208.0)):
+        grains = Grain.of_numbers(galileo, ratio, slope_deg=slopes)
+        at = rolling.sustained(grains).initiation(PEAK)
+        assert (np.diff(at) > 0).all()
