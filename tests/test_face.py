@@ -139,7 +139,7 @@ def test_the_page_opens_files_as_it_says(
     exec(code, {})
     *_, counted, columns = capsys.readouterr().out.splitlines()
     assert int(counted.split()[0]) > 1000
-    assert columns == "['column', 'meaning']"
+    assert columns == "['material', 'ustar_m_s', 'z0_m', 'sure']"
 
 
 def test_the_index_of_what_is_given_is_that_of_the_answer() -> None:

@@ -17,7 +17,7 @@ from orchestrator.calculator.printed import as_json, as_text, print_csv
 from orchestrator.command import Parser
 from orchestrator.errors import InputError
 from orchestrator.physics.fluids import KINDS, PAPER, STANDARD_DEG_C
-from orchestrator.study.units import meant, number_of
+from orchestrator.study.units import meant, number
 
 OPTIONS = {
     name: f"--{name.removesuffix('_deg').replace('_', '-')}"
@@ -74,12 +74,12 @@ def options(command: Parser) -> None:
     text += f"these: {PAPER}"
     command.add_argument("--fluid", metavar="NAME", help=text)
     text = f"of that fluid, deg C, one number; default {STANDARD_DEG_C:g}"
-    command.add_argument("--temperature", type=number_of, metavar="T", help=text)
+    command.add_argument("--temperature", type=number, metavar="T", help=text)
     command.add_argument("--law", default="auto", metavar="NAME", help=LAW_HELP)
     command.add_argument(
         "--criterion", default=BY_FLUID, metavar="NAME", help=CRITERION_HELP
     )
-    command.add_argument(BED_SLOPE, type=number_of, metavar="S", help=BED_SLOPE_HELP)
+    command.add_argument(BED_SLOPE, type=number, metavar="S", help=BED_SLOPE_HELP)
     form = command.add_mutually_exclusive_group()
     text = "an object for each law by its name"
     form.add_argument("--json", action="store_true", help=text)
@@ -199,7 +199,7 @@ def values(name: str, text: str) -> list[Value]:
         return [text]
     try:
         numbers = [_end(end, is_part) for end in ends[:2]]
-        count = number_of(ends[2]) if len(ends) == 3 else 0.0
+        count = number(ends[2]) if len(ends) == 3 else 0.0
     except (ValueError, IndexError, ZeroDivisionError):
         what = f"{text!r} is neither a number nor a range"
         raise InputError(what, OPTIONS[name], meant(text) or FORM) from None
@@ -226,5 +226,5 @@ def values(name: str, text: str) -> list[Value]:
 def _end(text: str, is_part: bool) -> float:
     """A number, or the part of the diameter that a text such as ``d/30`` is."""
     if is_part:
-        return 1 / number_of(text.split("d/")[1])
-    return number_of(text)
+        return 1 / number(text.split("d/")[1])
+    return number(text)

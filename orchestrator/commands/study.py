@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from orchestrator import guests
 from orchestrator.command import Command, Parser, add_run_options
 from orchestrator.runs.cluster import SYSTEMS, Queue
-from orchestrator.study.units import number_of
+from orchestrator.study.units import number
 
 if TYPE_CHECKING:
     from orchestrator.study.own_errors import OwnErrors
@@ -19,7 +19,7 @@ def _options(command: Parser) -> None:
     add_run_options(command, "first-look", of="file")
     text = "accepted relative error of a threshold, such as 0.05; the fastest models "
     text += "known to be within it are taken"
-    command.add_argument("--tolerance", type=number_of, metavar="X", help=text)
+    command.add_argument("--tolerance", type=number, metavar="X", help=text)
     text = "directory of a ladder, whose numerical errors are taken in place of those "
     text += "of the package"
     command.add_argument("--errors", type=Path, metavar="DIR", help=text)

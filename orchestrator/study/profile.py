@@ -32,7 +32,7 @@ from orchestrator.study.heads import (
 from orchestrator.study.noise import needed_smoothing
 from orchestrator.study.shapes import SHAPES
 from orchestrator.study.source import decoded, read_bytes
-from orchestrator.study.units import number_of
+from orchestrator.study.units import number
 from orchestrator.types import FloatArray
 
 LARGEST, LARGEST_NUMBER = 20 * 2**20, 1e5  # bytes of a file, and largest number, m
@@ -544,7 +544,7 @@ def _cell(row: Mapping[str | None, Any], name: str) -> float:
     if text is None or not text.strip():
         raise ValueError(f"the cell of {name} is empty")
     try:
-        value = number_of(text)
+        value = number(text)
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
     if not abs(value) <= largest:

@@ -140,7 +140,7 @@ largest dunes are 500 m high."""
 WIDEST = 0.5  # diameter in a sieve table from which it is likelier in millimetres, m
 
 
-def number_of(text: str) -> float:
+def number(text: str) -> float:
     """The number that a text is, in the digits 0 to 9 with a decimal point.
 
     Python takes more for a number: digits of other scripts, and 1_0 for 10.

@@ -26,7 +26,7 @@ from orchestrator.study.heads import (
     more_cells,
     name_of,
 )
-from orchestrator.study.units import number_of
+from orchestrator.study.units import number
 from orchestrator.surface.heights import FEWEST, MOST_NODES, Raster
 from orchestrator.types import FloatArray, IntArray
 
@@ -226,7 +226,7 @@ class _Lines:
                 return InputError(what, self.place(place), POINT_REMEDY)
             for column in layout.columns:
                 try:
-                    number_of(cells[column])
+                    number(cells[column])
                 except ValueError as error:
                     return InputError(str(error), self.place(place), POINT_REMEDY)
         return InputError("its lines are no points", self.where, POINT_REMEDY)
@@ -307,7 +307,7 @@ def _begins(cell: str) -> bool:
 def _is_number(cell: str) -> bool:
     """Whether a cell is a number, which may have a decimal comma."""
     try:
-        number_of(cell.replace(",", "."))
+        number(cell.replace(",", "."))
     except ValueError:
         return False
     return True

@@ -16,7 +16,7 @@ from orchestrator.errors import InputError
 from orchestrator.extras import imported
 from orchestrator.study.heads import METRE
 from orchestrator.study.source import decoded, read_bytes
-from orchestrator.study.units import number_of
+from orchestrator.study.units import number
 from orchestrator.surface.heights import (
     FEWEST,
     MOST_NODES,
@@ -346,7 +346,7 @@ def _widths(lines: list[str], before: int, word: str, where: str) -> list[int]:
 def _number(word: str, where: str) -> float:
     """The number that a word is; an `InputError` for any other word."""
     try:
-        return number_of(word)
+        return number(word)
     except ValueError:
         remedy = "numbers with a decimal point, spaces between them"
         raise InputError(f"{word!r} is no number", where, remedy) from None

@@ -11,7 +11,7 @@ import pandas as pd
 from orchestrator.errors import InputError
 from orchestrator.runs.files import digest_text
 from orchestrator.study.heads import more_cells
-from orchestrator.study.units import number_of
+from orchestrator.study.units import number
 from orchestrator.types import BoolArray, FloatArray
 
 COLUMNS = ("from_deg", "speed_m_s", "share")
@@ -207,7 +207,7 @@ def _rows(text: str, where: str) -> list[tuple[float, float, float]]:
             cells = len(header) + len(row[None])
             raise InputError(more_cells(cells, len(header)), place, remedy)
         try:
-            direction, speed, share = [number_of(row[name] or "") for name in COLUMNS]
+            direction, speed, share = [number(row[name] or "") for name in COLUMNS]
         except ValueError as error:
             raise InputError(str(error), place, remedy) from None
         _check(direction, speed, share, place)

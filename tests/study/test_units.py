@@ -23,7 +23,7 @@ PILE = "bed = { kind = 'pile', slope_deg = 15.0 }\n"
 
 @pytest.mark.parametrize("text", ["1", "-1.5", ".5", "5.", "1e-3", " 2E5 ", "+3"])
 def test_numbers_are_those_of_python(text: str) -> None:
-    assert units.number_of(text) == float(text)
+    assert units.number(text) == float(text)
 
 
 NUMBERS = {
@@ -45,7 +45,7 @@ NUMBERS = {
 @pytest.mark.parametrize("text", NUMBERS)
 def test_other_texts_are_no_numbers(text: str) -> None:
     with pytest.raises(ValueError, match=NUMBERS[text]):
-        units.number_of(text)
+        units.number(text)
     with pytest.raises(ValueError, match=r"whole number|no number"):
         units.whole_number(text)
 
