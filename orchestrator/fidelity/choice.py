@@ -47,7 +47,18 @@ class Way:
     cost_s: float
 
     def error_at(self, fraction: float) -> Error:
-        """Find its error at a fraction."""
+        """Find its error at a fraction.
+
+        Parameters
+        ----------
+        fraction
+            Fraction n/N, of those measured or between them.
+
+        Returns
+        -------
+        Error
+            As `Known.at`.
+        """
         return self.known.at(fraction)
 
 

@@ -48,6 +48,11 @@ def is_gas(density: float) -> bool:
     -------
     bool
         Whether it is lighter than any liquid.
+
+    Examples
+    --------
+    >>> is_gas(1.2), is_gas(1000.0)
+    (True, False)
     """
     return bool(density < GAS_BELOW)
 
