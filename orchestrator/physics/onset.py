@@ -187,7 +187,7 @@ def of_grains(
     ...     at = of_grains(sand, "bridged", criterion)
     ...     print(at.shields.round(4), at.valid)
     [0.0242] [ True]
-    [0.0262] [ True]
+    [0.0269] [ True]
     """
     leaving = threshold(LAWS[law], grain)
     has_gust = np.isfinite(np.asarray(gust, float))

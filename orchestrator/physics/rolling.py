@@ -107,7 +107,7 @@ def sustained(grains: Grain, end: End = "middle") -> Sustained:
 
     >>> sand = Grain.of_numbers([127.0, 38.8], [2.65, 2208.0])
     >>> print(sustained(sand).initiation(2.28).round(3))
-    [0.026 0.011]
+    [0.027 0.011]
     """
     table, ends = _level(end)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -61,7 +61,7 @@ def value_text(column: str, value: Any) -> str:
 
     Examples
     --------
-    >>> plain("d_m", 7e-4)
+    >>> value_text("d_m", 7e-4)
     'd = 0.7 mm'
     """
     info = info_of(column)
@@ -243,7 +243,7 @@ def ratio_in_words(ratio: float, length: str) -> str:
 
     Examples
     --------
-    >>> ratio_of(1 / 30, "d"), ratio_of(2.5, "h")
+    >>> ratio_in_words(1 / 30, "d"), ratio_in_words(2.5, "h")
     ('d/30', '2.5 h')
     """
     whole = round(1 / ratio)

@@ -130,7 +130,7 @@ def findings_text(findings: Sequence[Finding]) -> str:
 
     Examples
     --------
-    >>> print(text([Finding("disk", True, "2.0 GiB free here")]))
+    >>> print(findings_text([Finding("disk", True, "2.0 GiB free here")]))
     ok   disk         2.0 GiB free here
     """
     lines = []
