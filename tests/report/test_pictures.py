@@ -72,6 +72,8 @@ method.kind = "dem"
 bed = { kind = "flat", length = 0.01, roughness = "d/30" }
 """
 Studies = pytest.TempPathFactory
+# meshes as coarse as these are warned of
+pytestmark = pytest.mark.filterwarnings("ignore:.*cells_per_face")
 
 
 @pytest.fixture(scope="module")

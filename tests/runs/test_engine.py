@@ -160,8 +160,9 @@ def test_an_exit_code_is_a_failure_though_there_are_results(
 def test_a_solver_beyond_its_time_is_a_failure(tmp_path: Path) -> None:
     """Whatever it has written so far; what it left is not taken for an answer."""
     slow = Sleeps(1.0)
+    limit_s = 0.2
     with pytest.raises(SolverError, match=r"did not end within 0\.2 s"):
-        engine.execute(slow, tmp_path, limit_s=0.2)
+        engine.execute(slow, tmp_path, limit_s=limit_s)
     assert not case.done_state(slow, tmp_path)
 
 

@@ -2,12 +2,12 @@
 
 import os
 import signal
-import time
 from pathlib import Path
 
 import pytest
 
 from orchestrator.runs import processors, second
+from tests.waiting import pause, until
 
 
 @pytest.fixture(autouse=True)
@@ -18,7 +18,7 @@ def _two_processors(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_each_piece_is_done_in_its_place(tmp_path: Path) -> None:
     def work(number: int) -> tuple[int, int]:
         with (tmp_path / str(number)).open("x"):
-            time.sleep(0.02)
+            pause()
         return number, os.getpid()
 
     found = second.shared(work, 9)
@@ -30,10 +30,8 @@ def test_two_processes_share_them(tmp_path: Path) -> None:
     def work(number: int) -> int:
         """Pieces 0 and 1 wait for each other."""
         (tmp_path / str(number)).touch()
-        until = time.monotonic() + 60
-        while number < 2 and not (tmp_path / str(1 - number)).exists():
-            assert time.monotonic() < until
-            time.sleep(0.01)
+        if number < 2:
+            until((tmp_path / str(1 - number)).exists)
         return os.getpid()
 
     assert len({*second.shared(work, 2)}) == 2
@@ -54,8 +52,7 @@ def test_pieces_of_a_process_that_dies_are_done(tmp_path: Path) -> None:
         if os.getpid() != first:
             (tmp_path / "died").touch()
             os.kill(os.getpid(), signal.SIGKILL)
-        while not (tmp_path / "died").exists():
-            time.sleep(0.01)
+        until((tmp_path / "died").exists)
         return number
 
     assert second.shared(work, 5) == [*range(5)]
@@ -66,11 +63,10 @@ def test_a_failure_here_ends_the_second_process(tmp_path: Path) -> None:
 
     def work(number: int) -> int:
         if os.getpid() == first:
-            while not (tmp_path / "begun").exists():
-                time.sleep(0.01)
+            until((tmp_path / "begun").exists)
             raise MemoryError
         (tmp_path / "begun").write_text(str(os.getpid()))
-        time.sleep(600)
+        signal.pause()
         return number
 
     with pytest.raises(MemoryError):

@@ -12,6 +12,9 @@ from orchestrator.errors import InputError
 from orchestrator.stockpile import erosion
 from orchestrator.study import study
 
+# meshes as coarse as these are warned of
+pytestmark = pytest.mark.filterwarnings("ignore:.*cells_per_face")
+
 WINDS = "erosion = { fastest_mile = [10.0, 20.0], threshold = 0.6 }"
 PILE = 'bed.kind = "triangle"\nbed.slope_deg = 30.0\n'
 

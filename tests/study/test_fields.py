@@ -31,6 +31,7 @@ UNCHANGEABLE = (
     "bed.smoothing",
     "bed.obstacles",
     "flow.towards",  # with the profile that is read
+    "method.flow.between",  # chosen within a tolerance alone
 )
 NEEDED: dict[str, dict[str, Any]] = {
     "bed.windward": {"bed.shape": "dune"},
