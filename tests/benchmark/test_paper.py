@@ -19,7 +19,7 @@ from tests.benchmark.conftest import ROOT
 from tests.waiting import HANGS_S
 
 # the preset has ramps, which are warned of
-pytestmark = pytest.mark.filterwarnings("ignore:.*load_increment")
+pytestmark = pytest.mark.filterwarnings("ignore:.*load_increment", "ignore:.*cohesion")
 
 FOLDER = ROOT / "benchmark" / "paper"
 
