@@ -172,7 +172,7 @@ LINES = EDITED.splitlines(keepends=True)
 
 
 def _is_finished(file: Path, out: Path, tolerance: float | None = None) -> bool:
-    options = Namespace(source=str(file), out=out, tolerance=tolerance)
+    options = Namespace(source=str(file), out=out, tolerance=tolerance, errors=None)
     return bool(answer_finished(options))
 
 
