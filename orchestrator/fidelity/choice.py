@@ -17,7 +17,6 @@ from dataclasses import dataclass
 
 from orchestrator.fidelity.fidelities import Fidelity
 from orchestrator.fidelity.known import Known
-from orchestrator.fidelity.measured import Error
 from orchestrator.grains.pile import Pile
 from orchestrator.study.scene import Scene
 
@@ -45,21 +44,6 @@ class Way:
     answer: Scene
     known: Known
     cost_s: float
-
-    def error_at(self, fraction: float) -> Error:
-        """Find its error at a fraction.
-
-        Parameters
-        ----------
-        fraction
-            Fraction n/N, of those measured or between them.
-
-        Returns
-        -------
-        Error
-            As `Known.at`.
-        """
-        return self.known.at(fraction)
 
 
 def cost_s(answer: Scene) -> float:
@@ -128,7 +112,7 @@ def _buys(dearer: Way, cheaper: Sequence[Way]) -> bool:
     if any(dearer.known.total > one.known.total for one in cheaper):
         return False
     return any(
-        all(dearer.error_at(at).total < one.error_at(at).error for one in cheaper)
+        all(dearer.known.at(at).total < one.known.at(at).error for one in cheaper)
         for at in dearer.known.fractions
     )
 
@@ -150,9 +134,9 @@ def chosen(offers: Sequence[Way], most: float) -> Way:
         the dearest, which has the smallest largest error, where none is.
     """
     fractions = offers[0].known.fractions
-    best = {at: min(one.error_at(at).total for one in offers) for at in fractions}
+    best = {at: min(one.known.at(at).total for one in offers) for at in fractions}
     for way in offers:
-        if all(way.error_at(at).total <= max(most, best[at]) for at in fractions):
+        if all(way.known.at(at).total <= max(most, best[at]) for at in fractions):
             return way
     return offers[-1]
 
@@ -172,7 +156,7 @@ def beyond(way: Way, most: float) -> list[float]:
     list of float
         The fractions.
     """
-    return [at for at in way.known.fractions if way.error_at(at).total > most]
+    return [at for at in way.known.fractions if way.known.at(at).total > most]
 
 
 def in_words(way: Way, ways: Sequence[Way], most: float) -> str:
@@ -205,14 +189,14 @@ def in_words(way: Way, ways: Sequence[Way], most: float) -> str:
 def _help(way: Way, ways: Sequence[Way], missed: Sequence[float], most: float) -> str:
     """What would bring the missed fractions within the tolerance."""
     within = [
-        one for one in ways if all(one.error_at(at).total <= most for at in missed)
+        one for one in ways if all(one.known.at(at).total <= most for at in missed)
     ]
     if within:
         one = min(within, key=lambda each: each.cost_s)
         return f"{one.fidelity.name} would meet it there, at a higher cost"
-    uncertainties = [way.error_at(at).uncertainty or 0.0 for at in missed]
+    uncertainties = [way.known.at(at).uncertainty or 0.0 for at in missed]
     if min(uncertainties) > most:
         least = min(uncertainties)
         return f"the reference itself is known to {least:.1%} there: no DEM is better"
-    least = math.ceil(1e3 * max(way.error_at(at).total for at in missed)) / 1e3
+    least = math.ceil(1e3 * max(way.known.at(at).total for at in missed)) / 1e3
     return f"tolerance = {least:g} is met everywhere"

@@ -31,7 +31,6 @@ FAMILIES = {
     "rows and slight gaps": ("aligned", "disordered up to 0.02 d"),
 }
 """Classes of grains, without the ends of their names, that may be pooled."""
-PLACE = ["part", "rung", "fraction"]
 COLUMNS = [
     "part",
     "rung",

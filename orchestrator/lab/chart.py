@@ -117,6 +117,12 @@ def sections(found: Sequence[Kind], table: pd.DataFrame, study: str) -> list[Sec
     return made
 
 
+def _share_text(row: pd.Series) -> str:
+    """The share of a choice's thresholds that are near the reference, in words."""
+    thresholds = number(int(row["thresholds"]), "threshold")
+    return f"{_percent(row[column(AIM)])} of {thresholds} within {_percent(AIM)}"
+
+
 def _listed(rows: pd.DataFrame) -> pd.DataFrame:
     """The choices of a kind, by cost, with heads for a page."""
     shown = rows.sort_values("core_s", kind="stable")
@@ -138,12 +144,10 @@ def _card(rows: pd.DataFrame) -> Card:
         ]
     numbers = []
     for name, row in shown:
-        share = f"{_percent(row[column(AIM)])} of {thresholds} within {_percent(AIM)}"
         meaning = f"of one core{name}"
-        numbers.append(Number(float(row["core_s"]), "s", meaning, share))
-    is_cheaper = best["choice"] != REFERENCES
+        numbers.append(Number(float(row["core_s"]), "s", meaning, _share_text(row)))
     worth = Worth("good", "usable", TEXTS["advice"])
-    if not is_cheaper:
+    if best["choice"] == REFERENCES:
         worth = Worth(
             "care", f"only the reference has {_percent(SHARE)} within", TEXTS["advice"]
         )
@@ -175,8 +179,7 @@ def advice(kind: Kind, rows: pd.DataFrame, study: str) -> list[str]:
         Lines of a study file, or the command that answers it.
     """
     best = recommended(rows)
-    thresholds = number(int(best["thresholds"]), "threshold")
-    share = f"{_percent(best[column(AIM)])} of {thresholds} within {_percent(AIM)}"
+    share = _share_text(best)
     head = f"# {kind.name}: {share} of the reference, {best['core_s']:.2g} core-s"
     if best["choice"] == REFERENCES:
         return [head, *_blocks(kind.reference)]

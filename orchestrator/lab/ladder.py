@@ -87,8 +87,6 @@ COLUMN_HEADS = {
     "cost_core_s": "core-s",
 }
 """Heads of the columns of the tables of the page."""
-KNOWN_BY = ["part", "rung", "scene_class", "fraction"]
-"""Columns by which known errors are looked up."""
 PAIR = ["flow_rung", "grain_rung"]
 """Columns that name a pair of rungs."""
 

@@ -78,7 +78,7 @@ def read_map(path: Path) -> StabilityMap:
 
     Returns
     -------
-    Map
+    StabilityMap
         The map.
     """
     data = tomllib.loads(path.read_text(encoding="utf-8"))

@@ -47,8 +47,8 @@ def told_answers(maps: Iterable[StabilityMap], table: pd.DataFrame) -> pd.DataFr
     for one in maps:
         places = {(_key(place.x), _key(place.y)): place for place in one.places}
         of_map = wrong[wrong["map"] == one.name]
+        is_read_at_several = one.fractions != (None,)
         for row in of_map.to_dict("records"):
-            is_read_at_several = "fractions" in one.data["x"]
             x = None if is_read_at_several else row["x"]
             fraction = float(row["x"]) if is_read_at_several else None
             place = places[_key(x), _key(row["y"])]

@@ -23,7 +23,7 @@ from orchestrator.lab.sphere import speed_of, sphere
 from orchestrator.lab.strips import PERCENTILES, ROUGH, Strips
 from orchestrator.physics import rolling
 from orchestrator.physics.constants import GAS_BELOW
-from orchestrator.physics.curves import shao_lu, soulsby_whitehouse
+from orchestrator.physics.curves import of_medium
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import CLIFT_GAUVIN, LAWS
@@ -126,10 +126,7 @@ def by_formulas(beds: pd.DataFrame) -> FloatArray:
         Shields numbers by Soulsby and Whitehouse in a liquid and by Shao and Lu in a
         gas, of shape (rows,), also beyond what they were fitted to.
     """
-    grains = measured_grains(beds)
-    in_liquid = soulsby_whitehouse(grains.dimensionless_diameter)
-    in_gas = grains.shields(shao_lu(grains))
-    return np.where(grains.fluid_density < GAS_BELOW, in_gas, in_liquid)
+    return of_medium(measured_grains(beds))
 
 
 def by_constants(beds: pd.DataFrame) -> FloatArray:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.physics.constants import GAS_BELOW, LIFT_COEFFICIENT
-from orchestrator.physics.curves import shao_lu, soulsby_whitehouse
+from orchestrator.physics.curves import of_medium
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.measured import VISUAL
 from orchestrator.types import BoolArray, FloatArray
@@ -190,9 +190,7 @@ def by_formula(grain: Grain) -> FloatArray:
     is_of_gas &= _is_within(grain.viscosity, VISCOSITY_OF_AIR)
     fitted = np.where(is_gas, is_of_gas, is_of_liquid)
     fitted &= _is_alike(grain.density_ratio, is_gas)
-    in_gas = grain.shields(shao_lu(grain))
-    theta = np.where(is_gas, in_gas, soulsby_whitehouse(dstar))
-    return np.where(fitted, theta, np.nan)
+    return np.where(fitted, of_medium(grain), np.nan)
 
 
 def measured_level_ustar(table: Any) -> FloatArray:

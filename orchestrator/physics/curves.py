@@ -11,6 +11,7 @@ from typing import Literal
 
 import numpy as np
 
+from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.physics.grain import Grain
 from orchestrator.types import FloatArray
 
@@ -348,3 +349,30 @@ def slope_factor_on_ustar(
     alpha = np.radians(slope_deg)
     factor = np.cos(alpha) + np.sin(alpha) / np.tan(np.radians(friction_angle_deg))
     return np.asarray(np.sqrt(factor))
+
+
+def of_medium(grain: Grain) -> FloatArray:
+    """Find the threshold on a level bed by the formula of the grains' medium.
+
+    It is that of Soulsby and Whitehouse in a liquid and that of Shao and Lu in a gas,
+    also beyond what they were fitted to.
+
+    Parameters
+    ----------
+    grain
+        The grains in their fluids.
+
+    Returns
+    -------
+    FloatArray
+        Shields numbers, of the shape of the grains.
+
+    Examples
+    --------
+    >>> fluids = {"fluid_density": [1000.0, 1.2], "viscosity": [1e-6, 1.5e-5]}
+    >>> print(of_medium(Grain(diameter=1e-3, density=2650.0, **fluids)).round(4))
+    [0.0314 0.0124]
+    """
+    in_liquid = soulsby_whitehouse(grain.dimensionless_diameter)
+    in_gas = grain.shields(shao_lu(grain))
+    return np.where(grain.fluid_density < GAS_BELOW, in_gas, in_liquid)

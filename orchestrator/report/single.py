@@ -107,7 +107,7 @@ def quantity_of_row(row: Row) -> ReportedQuantity:
 
     Returns
     -------
-    Quantity
+    ReportedQuantity
         Of a wind its speed, of other flows with a depth the mean velocity, else the
         stress.
     """

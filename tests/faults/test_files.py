@@ -14,6 +14,9 @@ from orchestrator.runs.files import RECORD, digest_file
 from orchestrator.study import study
 from tests.faults.bench import Bench, tables
 
+# the mesh of the small study is so coarse that it is warned of
+pytestmark = pytest.mark.filterwarnings("ignore:method.flow.cells_per_face")
+
 
 def _truncated(share: float) -> Callable[[Path], None]:
     return lambda path: os.truncate(path, int(path.stat().st_size * share))

@@ -24,6 +24,9 @@ from orchestrator.study import study
 from tests.conftest import Command, Mount
 from tests.faults.bench import HEAD, PILE, Bench, tables, undisturbed
 
+# the mesh of the small study is so coarse that it is warned of
+pytestmark = pytest.mark.filterwarnings("ignore:method.flow.cells_per_face")
+
 
 def _lose_cases(out: Path) -> None:
     shutil.rmtree(out / "cases")

@@ -19,6 +19,9 @@ from tests.faults.bench import (
 )
 from tests.waiting import until
 
+# the mesh of the small study is so coarse that it is warned of
+pytestmark = pytest.mark.filterwarnings("ignore:method.flow.cells_per_face")
+
 
 @pytest.mark.parametrize("size", ["16k", "300k", "900k"])
 def test_a_full_disk(pile: Bench, disk: Mount, size: str) -> None:

@@ -150,7 +150,7 @@ def test_the_laws_hold_whatever_was_measured(
     for offer in offers:
         for way in ways:
             beaten = way.cost_s < offer.cost_s and all(
-                way.error_at(at).total <= offer.error_at(at).total for at in FRACTIONS
+                way.known.at(at).total <= offer.known.at(at).total for at in FRACTIONS
             )
             assert not beaten
     if _met(tight, min(one, other)) == len(FRACTIONS):
