@@ -68,12 +68,16 @@ def test_each_criterion_has_a_curve_of_its_own_with_its_name(tmp_path: Path) -> 
 
 
 @pytest.mark.long
-def test_beds_that_no_table_holds_have_the_curve_of_their_pockets(
+def test_beds_of_another_roughness_have_the_curve_of_sustained_motion(
     tmp_path: Path,
 ) -> None:
     made = results(tmp_path, '["sustained"]', roughness="d/10")
-    assert theory.sustained_curves(made.joined("single_grain")) == []
+    (of_bed,) = theory.sustained_curves(made.joined("single_grain"))
+    (of_usual,) = theory.sustained_curves(
+        results(tmp_path, '["sustained"]').joined("single_grain")
+    )
+    assert (of_bed.tau > of_usual.tau).all()
     (figure,) = overview.draw(made)
     (ax,) = axes_of(figure)
     (name,) = curves(ax)
-    assert theory.LEAVING in name
+    assert theory.GOING in name
