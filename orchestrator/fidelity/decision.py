@@ -518,8 +518,9 @@ def checks(answers: Iterable[Decision]) -> dict[str, Decision]:
 
     Of each group it is the pile that DEM, as the scene is written, answers in the least
     time. A check is the answer of the same scene with ``method.kind = "dem"``, by the
-    same criterion of motion. A group is not checked where that would cost more than its
-    answers save: one that is checked costs no more than as it is written.
+    same criterion of motion. A group is checked only where that costs less than all its
+    scenes as they are written: a scene by itself is therefore never checked, since DEM
+    would then answer it at the same cost.
 
     Parameters
     ----------
@@ -546,10 +547,10 @@ def checks(answers: Iterable[Decision]) -> dict[str, Decision]:
 
 
 def _is_worth(check: Scene, members: Iterable[Decision]) -> bool:
-    """Whether answers with their check cost no more than all of them as written."""
+    """Whether answers with their check cost less than all of them as written."""
     spent = choice.runs_of(check)
     saved: dict[str, float] = {}
     for one in members:
         spent |= choice.runs_of(one.scene)
         saved |= choice.runs_of(written(one.asked))
-    return sum(spent.values()) <= sum(saved.values()) * (1 + 1e-9)
+    return sum(spent.values()) < sum(saved.values()) * (1 - 1e-9)

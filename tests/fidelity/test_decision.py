@@ -264,6 +264,15 @@ def test_what_dem_does_not_know_is_answered_by_a_method_that_does(
         assert answer.error_estimate is None
 
 
+def test_a_pile_whose_flow_is_that_of_dem_is_not_checked_alone(pile: MakePile) -> None:
+    """Its check would answer it by DEM at the cost of the scene as it is written."""
+    coarse = {"method.flow.cells_per_face": 20, "bed.slope_deg": 10.0}
+    answer = decide(pile(coarse), 0.5)
+    assert answer.is_unchecked
+    assert answer.scene.method.flow == answer.asked.method.flow
+    assert not checks([answer])
+
+
 def test_one_pile_of_each_kind_is_checked_by_dem(pile: MakePile) -> None:
     """The one that DEM answers fastest, whatever the order, and as it is written."""
     eq10 = {"forces.stress": "eq10", "forces.law": "high"}
