@@ -25,7 +25,7 @@ test-long: lint  ## run the tests that install, queue, or run whole studies: min
 test-faults: lint  ## kill, harm and starve a small study, and count what it survives: minutes
 	$(PYTHON) -m pytest $(PARALLEL) tests/faults $(ARGS)
 
-calibration: setup  ## measure known errors, maps and intervals anew, for the package and its docs
+calibration: setup  ## measure numerical errors, maps and intervals anew, for the package and its docs
 	$(PYTHON) -m orchestrator ladder
 	$(PYTHON) -m orchestrator stability
 	$(PYTHON) -m orchestrator budget

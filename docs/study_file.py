@@ -133,7 +133,7 @@ FIDELITIES = f"""## Fidelities
 
 `method.fidelity` names a fidelity, a set of numbers for flow and grains: `fidelity = "paper"` is
 the same as writing its numbers. A number that the file writes itself stands before that of the
-fidelity. With `"{AUTO}"`, the default, the program chooses one by known errors
+fidelity. With `"{AUTO}"`, the default, the program chooses one by numerical errors
 ([ladder.md](ladder.md)). A single grain takes the numbers of the grains alone, and over a level bed
 no flow is solved.
 

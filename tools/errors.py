@@ -1,4 +1,4 @@
-"""The picture docs/ladder.png and the tables of docs/ladder.md: known errors.
+"""The picture docs/ladder.png and the tables of docs/ladder.md: numerical errors.
 
 python tools/errors.py
 
@@ -57,7 +57,7 @@ NAMES = {
     },
 }
 """Names of the classes, in the order of the page."""
-FEWEST = 10  # scenes of a class with a known error
+FEWEST = 10  # scenes of a class with a known numerical error
 
 
 def tables() -> str:

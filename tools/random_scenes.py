@@ -125,14 +125,16 @@ def rows(folder: Path) -> Iterator[Row]:
         off = (found["shields"] / found["shields_dem"] - 1).abs()
         table = found.assign(off=off)
         for packing, part in [("all", table), *table.groupby("packing")]:
-            known = part[part["known_error"].notna()]
-            within = known[known["known_error"] <= tolerance]
+            known = part[part["numerical_error"].notna()]
+            within = known[known["numerical_error"] <= tolerance]
             yield {
                 "tolerance": tolerance,
                 "packing": packing,
                 "thresholds": len(part),
                 "error_known": len(known),
-                "within_the_error": int((known["off"] <= known["known_error"]).sum()),
+                "within_the_error": int(
+                    (known["off"] <= known["numerical_error"]).sum()
+                ),
                 "known_within_the_tolerance": len(within),
                 "within_the_tolerance_of_dem": int((within["off"] <= tolerance).sum()),
                 "largest_difference_of_these": within["off"].max(),

@@ -1,1 +1,1 @@
-"""How a scene is answered, and how well: fidelities, known errors, limits."""
+"""How a scene is answered, and how well: fidelities, numerical errors, limits."""

@@ -89,7 +89,7 @@ def offered(ways: Iterable[Way], most_s: float) -> list[Way]:
     Parameters
     ----------
     ways
-        Ways to answer one scene, of known errors.
+        Ways to answer one scene, of known numerical errors.
     most_s
         The cost of the scene as it is written, s.
 

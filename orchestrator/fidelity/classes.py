@@ -1,4 +1,4 @@
-"""Classes of scenes: a known error was measured on one class and holds for it alone.
+"""Classes of scenes: a numerical error was measured on one class alone.
 
 The error of a fidelity has two parts, that of the flow and that of the grains. Each
 part has its classes: the flow does not depend on the packing, nor the grains on what is
@@ -15,7 +15,7 @@ from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 
 FLOW, GRAINS = "flow", "grains"
-"""The two parts of a known error."""
+"""The two parts of a numerical error."""
 BY_DEM = "grains by DEM"
 """Part of the domain of what moves grains in time: a smaller one than that of pivots
 and peeling, which were compared with DEM on more piles."""

@@ -40,7 +40,7 @@ ALONG = f"{LONG_BED}: closed form along the bed, checked where motion starts"
 HOPS = "sustained motion: entrainment has a closed form, rolling and hopping a table"
 ENDLESS = "the rows of the bed have no end: closed form along the bed"
 NOT_MET = "the tolerance cannot be met, no error is known"
-NONE_CHEAPER = "no fidelity of a known error is cheaper than the scene as written"
+NONE_CHEAPER = "no fidelity whose error is known is cheaper than the scene as written"
 KEPT = ("method.flow.speed", "method.flow.viscosity")
 """Numbers of the solve that every fidelity keeps: u*/U_e is the same at each of them
 (docs/flow.md). Their values do not ask for DEM."""
@@ -75,12 +75,12 @@ class Decision:
     fidelity
         The fidelity of the answer; None for a single grain.
     known
-        The known error of tau_c.
+        The numerical error of tau_c.
     why
         The reason, in words.
     is_chosen
-        Whether the fidelity was chosen by its known error, in place of what the scene
-        has written.
+        Whether the fidelity was chosen by its numerical error, in place of what the
+        scene has written.
     """
 
     asked: Scene
@@ -92,14 +92,14 @@ class Decision:
 
     @property
     def error_estimate(self) -> float | None:
-        """The known error with its uncertainty, at the fraction where it is largest.
+        """The numerical error with its uncertainty, where it is largest.
 
         None where it is not known.
         """
         return _if_known(self.known.total)
 
     def error_at(self, fraction: float) -> float | None:
-        """Find the known error of one threshold of the scene.
+        """Find the numerical error of one threshold of the scene.
 
         Parameters
         ----------
@@ -109,7 +109,7 @@ class Decision:
         Returns
         -------
         float or None
-            The known error with its uncertainty; None where it is not known, or was
+            The numerical error with its uncertainty; None where it is not known, or was
             measured at other fractions.
         """
         if not has_measured(self.scene, fraction):
@@ -349,7 +349,7 @@ def on_fidelity(
     why
         The reason, in words.
     is_chosen
-        Whether it was chosen by its known error.
+        Whether it was chosen by its numerical error.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The domain of the known errors: over which scenes they were measured.
+"""The domain of the numerical errors: over which scenes they were measured.
 
 ``calibration/domain.csv`` has the values that the measured scenes of each class had of
 each quantity: numbers from the least to the most, or words. `orchestrator ladder`

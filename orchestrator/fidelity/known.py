@@ -1,7 +1,8 @@
 """Numerical errors of the fidelities: what is known of a pile.
 
-A class has a known error where at least `LEAST_SCENES` scenes were measured, and a
-scene of it where it is within what they were (`orchestrator.fidelity.domain`).
+A class has a known numerical error where at least `LEAST_SCENES` scenes were
+measured, and a scene of it where it is within what they were
+(`orchestrator.fidelity.domain`).
 """
 
 from collections.abc import Iterable
@@ -34,7 +35,7 @@ UNBOUND = 10.0  # a rung that was off by so many times a threshold says nothing 
 
 @dataclass(frozen=True)
 class Known:
-    """Known error of a pile.
+    """Numerical error of a pile.
 
     Attributes
     ----------
@@ -85,7 +86,7 @@ UNKNOWN = Known(None)
 
 
 def known(fidelity: Fidelity, scene: Scene) -> Known:
-    """Known error of a fidelity on a pile, at each of its fractions.
+    """Numerical error of a fidelity on a pile, at each of its fractions.
 
     Parameters
     ----------
@@ -128,7 +129,7 @@ def _is_by_dem(fidelity: Fidelity, scene: Scene) -> bool:
 
 
 def _of_flow(scene: Scene) -> Known:
-    """Known error of the closed form along the bed line of a pile whose grains go on.
+    """Numerical error of the closed form along the bed line, in sustained motion.
 
     Places along the line are exact; over a level bed so is the flow.
     """
@@ -139,7 +140,7 @@ def _of_flow(scene: Scene) -> Known:
 
 
 def _of(keys: Iterable[tuple[str, str, str]], scene: Scene) -> Known:
-    """Known error of the rungs of a pile on their classes."""
+    """Numerical error of the rungs of a pile on their classes."""
     table = measured.errors()
     parts = []
     for key in keys:

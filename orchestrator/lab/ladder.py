@@ -138,7 +138,7 @@ class Ladder(Experiment):
         compared = rung_errors(measured)
         if compared.empty:
             return None
-        known = known_errors(measured)
+        known = numerical_errors(measured)
         done = [pair for key, pair in self.pairs.items() if runs.are_done(key)]
         shares = choices.shares(self.kinds, runs)
         tables = {
@@ -328,7 +328,7 @@ def _compared(
     return rows.assign(**columns)
 
 
-def known_errors(points: pd.DataFrame) -> pd.DataFrame:
+def numerical_errors(points: pd.DataFrame) -> pd.DataFrame:
     """Find the numerical error of each rung, by class and fraction.
 
     Parameters
@@ -377,7 +377,7 @@ def scene_errors(points: pd.DataFrame) -> pd.DataFrame:
 def measured_domain(
     pairs: Iterable[Decision], beside: Iterable[Scene] = ()
 ) -> pd.DataFrame:
-    """Find over which scenes the known errors of some pairs of rungs were measured.
+    """Find over which scenes the numerical errors of some pairs of rungs were measured.
 
     They are the scenes of which the reference is there.
 
@@ -460,7 +460,7 @@ def _section(known: pd.DataFrame) -> Section:
 
 
 def _tables_of_rungs(known: pd.DataFrame) -> list[pd.DataFrame]:
-    """What each rung is, and its known errors, %."""
+    """What each rung is, and its numerical errors, %."""
     rows = []
     for part, rungs in RUNGS.items():
         rows += [(part, each.name, each.meaning) for each in rungs]

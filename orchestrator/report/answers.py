@@ -48,7 +48,7 @@ NONE = Card(
     Worth("bad", "no answer yet", "No case has given a result."),
 )
 """The card of a study without results."""
-NUMBERS = "load steps, count and the known error of the method"
+NUMBERS = "load steps, count and the numerical error of the method"
 """What the numerical interval of a share of a bed is of."""
 
 
@@ -219,7 +219,7 @@ def _numbers_of_bed(
 
 def _first_motion(row: pd.Series, pile: Pile, told: ReportedQuantity) -> Number:
     """The flow that moves the first grains, with its interval."""
-    of_what = single.interval_of(row, "load step and the known error of the method")
+    of_what = single.interval_of(row, "load step and the numerical error of the method")
     meaning = f"{told.name} that moves the first grains"
     place = single.place_of_quantity(told, row)
     if crest.has_sharp_crest(pile.scene):
@@ -228,12 +228,12 @@ def _first_motion(row: pd.Series, pile: Pile, told: ReportedQuantity) -> Number:
 
 
 def _place(row: pd.Series, pile: Pile, results: Results) -> Number:
-    """Where motion starts, and where else it may within the known error."""
+    """Where motion starts, and where else it may within the numerical error."""
     line = pile.model.line
     crest = float(line.crest[0])
     x = float(row["first_x_m"])
     low, high = _places(row, results)
-    of_what = "places whose threshold is within the known error of the lowest"
+    of_what = "places whose threshold is within the numerical error of the lowest"
     profile = pile.bed.profile
     if profile:
         top = place_of_file(float(profile.place(crest)), profile)
@@ -261,9 +261,9 @@ def _place(row: pd.Series, pile: Pile, results: Results) -> Number:
 
 
 def _places(row: pd.Series, results: Results) -> tuple[float, float]:
-    """Ends of the places at which motion may start within the known error, m."""
+    """Ends of the places at which motion may start within the numerical error, m."""
     grains = results.tables.get("pile_grain", pd.DataFrame())
-    error = single.known_number(row["first_known_error"])
+    error = single.known_number(row["first_numerical_error"])
     if grains.empty or math.isnan(error):
         return math.nan, math.nan
     here = grains[grains["scene_id"] == row["scene_id"]]
@@ -364,7 +364,7 @@ def _first_of_several(
 
 
 def _no_difference(shown: pd.DataFrame, told: ReportedQuantity) -> str:
-    """That the known errors hide the difference of several beds; empty if they do not.
+    """That numerical errors hide the difference of several beds; empty if not.
 
     Unknown errors show no difference and hide none.
     """
@@ -376,7 +376,7 @@ def _no_difference(shown: pd.DataFrame, told: ReportedQuantity) -> str:
         return ""
     return (
         f"The beds show no difference: the least and the most {told.name} are "
-        f"{percent(apart)} apart in stress, less than their known errors together, "
+        f"{percent(apart)} apart in stress, less than their numerical errors together, "
         f"{percent(error)}."
     )
 

@@ -628,4 +628,4 @@ def fidelities(results: Results) -> pd.DataFrame | None:
     if not rows:
         return None
     head = ("fidelity", "description", "reason", "beds")
-    return pd.DataFrame(rows, columns=[*head, "known error of θ_c, at most, %"])
+    return pd.DataFrame(rows, columns=[*head, "numerical error of θ_c, at most, %"])

@@ -13,7 +13,7 @@ from orchestrator.errors import InputError
 from orchestrator.study.fields import FIDELITY
 
 AUTO = "auto"
-"""Leaves the fidelity to the program, which chooses by known errors."""
+"""Leaves the fidelity to the program, which chooses by numerical errors."""
 FLOW = "method.flow."
 """Beginning of the names of the fields of the flow."""
 Fields = Mapping[str, Any]

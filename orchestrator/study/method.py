@@ -175,8 +175,8 @@ class Method(Part):
     )
     """how the threshold is found: DEM, peeling (pivots that free one another), the
     pivot of each grain by itself, or the closed form along the bed line, without grains
-    and for any length; left open, the program chooses one by known errors and by what
-    each method knows"""
+    and for any length; left open, the program chooses one by numerical errors and by
+    what each method knows"""
     flow: FlowMethod = FlowMethod()
     grains: GrainMethod = GrainMethod()
 

@@ -16,8 +16,8 @@ Contradictions = dict[tuple[str, float], str]
 AGREEMENT: Mapping[str, str] = {
     **several("shields_numerical_low", "shields_numerical_high"),
     "agree": (
-        "whether the interval of shields, which holds the known error, and that of DEM "
-        "overlap"
+        "whether the interval of shields, which holds the numerical error, and that of "
+        "DEM overlap"
     ),
 }
 """Columns that `with_agreement` adds."""
@@ -32,8 +32,8 @@ def with_agreement(checks: pd.DataFrame, thresholds: pd.DataFrame) -> pd.DataFra
         A row for each pile and fraction that DEM checks, with ``shields_dem_low`` and
         ``shields_dem_high``.
     thresholds
-        The answers with their numerical intervals, which hold the known error of the
-        fidelity.
+        The answers with their numerical intervals, which hold the numerical error of
+        the fidelity.
 
     Returns
     -------

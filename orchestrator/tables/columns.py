@@ -26,13 +26,13 @@ SEVERAL: Mapping[str, str] = {
     ),
     "shields_dem_low": (
         "lower end of the interval of shields_dem: load step and count; in the table "
-        "check without the known error of DEM, which that of the answer holds"
+        "check without the numerical error of DEM, which that of the answer holds"
     ),
     "shields_dem_high": "upper end of the interval of shields_dem: load step and count",
     "shields_numerical_low": (
         "lower end of the numerical interval of shields: load increment, count, "
-        "scatter, known error; empty where no error is known; of a fraction that was "
-        "not reached, above the last flow"
+        "scatter, numerical error; empty where no error is known; of a fraction that "
+        "was not reached, above the last flow"
     ),
     "shields_numerical_high": (
         "upper end of the numerical interval of shields; empty where no error is "

@@ -551,7 +551,7 @@ class Answer:
         return self.pile.model.error(self.cases)
 
     def error_at(self, fraction: float) -> float | None:
-        """Find the known error at a fraction, with that of a flow between others.
+        """Find the numerical error at a fraction, with that of a flow between others.
 
         Parameters
         ----------
@@ -747,7 +747,7 @@ PILE_THRESHOLD: Mapping[str, str] = {
         "over its bed at this threshold, z0 + nu/(9 u*) where it is not rough: 6 % at "
         "most for each e-fold from the z0 of the solve; the interval holds it"
     ),
-    "known_error": (
+    "numerical_error": (
         "known relative error of the threshold at this fraction, of two measured "
         "fractions beside it the larger; empty where none was measured: of such beds, "
         "or at such fractions"
@@ -826,7 +826,7 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
             "shields": value,
             "shields_numerical_low": low,
             "shields_numerical_high": high,
-            "known_error": error,
+            "numerical_error": error,
             "smooth_bed": smooth,
             "shields_model_low": value * (1 - model.low),
             "shields_model_high": value * (1 + model.high),
@@ -858,12 +858,12 @@ STARTS: Mapping[str, str] = {
     "first_ustar0_m_s": "undisturbed friction velocity at which motion starts there",
     "first_ustar0_numerical_low_m_s": (
         "lower end of the numerical interval of first_ustar0_m_s, which holds its load "
-        "step and the known error of the method"
+        "step and the numerical error of the method"
     ),
     "first_ustar0_numerical_high_m_s": (
-        "upper end of this interval; empty where the known error leaves it open"
+        "upper end of this interval; empty where the numerical error leaves it open"
     ),
-    "first_known_error": (
+    "first_numerical_error": (
         "known relative error of the flow at which motion starts; empty where none was "
         "measured at so small a fraction"
     ),
@@ -888,7 +888,7 @@ def _starts(answer: Answer) -> Row:
         "first_ustar0_m_s": first_ustar0,
         "first_ustar0_numerical_low_m_s": low,
         "first_ustar0_numerical_high_m_s": high,
-        "first_known_error": error,
+        "first_numerical_error": error,
         "pivot_x_m": float(bed.place(pivot_x)),
         "pivot_first_m_s": pivot_ustar0,
     }
@@ -897,8 +897,8 @@ def _starts(answer: Answer) -> Row:
 def _first_interval(answer: Answer, error: float | None) -> tuple[float, float]:
     """Ends of the friction velocity at which motion starts, m/s.
 
-    They hold the load step in which it starts, and what is within the known error of
-    that load step; they are not known without a known error.
+    They hold the load step in which it starts, and what is within the numerical error
+    of that load step; they are not known without a known numerical error.
     """
     _, ustar0 = answer.first
     if error is None or np.isnan(ustar0):
@@ -937,9 +937,9 @@ def _interval(
 ) -> tuple[float, float]:
     """Ends of the interval of a Shields number; an end that is not known is NaN.
 
-    It holds load steps and count, at least what is within the known error of the
+    It holds load steps and count, at least what is within the numerical error of the
     threshold, and how far the z0 of the flow is from that of a bed that is not rough
-    (`smooth`). It is not known without a known error.
+    (`smooth`). It is not known without a known numerical error.
     """
     if error is None:
         return np.nan, np.nan
@@ -965,7 +965,7 @@ BETWEEN: Mapping[str, str] = {
     "between_error": (
         "relative error of the stress of a flow that is not solved and lies between "
         "solved ones of other roughness (solved_z0_m): the largest where one of these "
-        "is left out; known_error contains it"
+        "is left out; numerical_error contains it"
     ),
 }
 """Column of a flow that lies between others."""

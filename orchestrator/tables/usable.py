@@ -281,13 +281,13 @@ def _reasons_of_pile(
         share = f"{row['share_carried_off']:.0%} of the moved grains"
         yield Reason("carried off", f"lift carried off {share}")
     yield from _reasons_of_bed(row)
-    error = row["known_error"]
+    error = row["numerical_error"]
     if pd.isna(error):
         what = "the error of its fidelity on such a bed is not known"
         remedy = "run `orchestrator convergence` on the study file, which estimates it"
         yield Reason("error not known", what, remedy)
     elif tolerance and error > tolerance * (1 + 1e-9):
-        what = f"known error {error:.1%} is above the tolerance of {tolerance:.3g}"
+        what = f"numerical error {error:.1%} is above the tolerance of {tolerance:.3g}"
         yield Reason("tolerance", what)
     if row["fraction"] * row["count"] < 1 - 1e-9:
         what = f"{row['fraction']:.3g} of {row['count']:.0f} grains is less than one"
@@ -352,8 +352,8 @@ def _open_ends(row: Mapping[Any, Any]) -> Iterator[Reason]:
     if np.isnan(low) or not np.isnan(high) or np.isnan(row["shields"]):
         return
     remedy = ""
-    if row["known_error"] >= 1:
-        why = f"the known error is {row['known_error']:.0%}"
+    if row["numerical_error"] >= 1:
+        why = f"the numerical error is {row['numerical_error']:.0%}"
     elif row.get("scatter", 0.0) >= 1:
         why = f"the scatter over seeds is {row['scatter']:.0%}"
     else:

@@ -1,4 +1,4 @@
-"""The domain of known errors: what the calibration varied, and nothing beside it."""
+"""The domain of numerical errors: what the calibration varied, nothing beside it."""
 
 import runpy
 from collections import Counter

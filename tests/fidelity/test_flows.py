@@ -115,9 +115,9 @@ def test_answers_between_flows_are_those_of_solved_ones(tmp_path: Path) -> None:
     off = (found["shields"] / sound["shields"] - 1).abs()
     assert (off[put] < found["between_error"][put]).all()
     assert (off[~put] == 0).all()
-    # the known error contains it
-    larger = found["known_error"] > sound["known_error"]
-    assert larger[put & sound["known_error"].notna()].all()
+    # the numerical error contains it
+    larger = found["numerical_error"] > sound["numerical_error"]
+    assert larger[put & sound["numerical_error"].notna()].all()
     scenes = pd.read_csv(tmp_path / "between/tables/scenes.csv")
     counts = scenes["flow_case"].str.count("flow-")
     assert sorted(counts) == [1, 1, 1, 1, 1, 5, 5, 5]

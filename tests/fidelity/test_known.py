@@ -1,4 +1,4 @@
-"""Known errors: to which class a scene belongs, and what holds for it."""
+"""Numerical errors: to which class a scene belongs, and what holds for it."""
 
 import math
 import shutil
@@ -107,7 +107,7 @@ def test_between_two_fractions_the_larger_error_holds(pile: MakePile) -> None:
     assert found.at(0.2).total >= max(lower, upper)
 
 
-def test_a_class_of_fewer_than_ten_scenes_has_no_known_error(
+def test_a_class_of_fewer_than_ten_scenes_has_no_known_numerical_error(
     monkeypatch: pytest.MonkeyPatch, pile: MakePile, tmp_path: Path
 ) -> None:
     table = pd.read_csv(FOLDER / "errors.csv")
@@ -207,7 +207,7 @@ def test_every_measured_class_has_its_reference_and_every_fidelity() -> None:
     ],
     ids=str,
 )
-def test_a_known_error_holds_for_what_was_measured(
+def test_a_numerical_error_holds_for_what_was_measured(
     fields: dict[str, object], pile: MakePile
 ) -> None:
     paper = named("paper")

@@ -50,8 +50,8 @@ def test_cheap_answers_are_checked_by_one_pile_by_dem(tmp_path: Path) -> None:
     assert check["scene_id"].nunique() == 1
     assert len(list((tmp_path / "cases").glob("pile-*"))) == 1
     assert check["agree"].all()
-    # the intervals contain the known error, as a factor both ways
-    value, factor = answers["shields"], 1 + answers["known_error"] - 1e-8
+    # the intervals contain the numerical error, as a factor both ways
+    value, factor = answers["shields"], 1 + answers["numerical_error"] - 1e-8
     assert (answers["shields_numerical_high"] >= value * factor).all()
     assert (answers["shields_numerical_low"] <= value / factor).all()
 
@@ -111,7 +111,7 @@ def test_a_run_on_chosen_levels_that_fails_names_the_next_step(tmp_path: Path) -
         assert len(list((tmp_path / method / "cases").glob("flow-*"))) == 1
 
 
-def test_gusts_have_no_known_error(tmp_path: Path) -> None:
+def test_gusts_have_no_known_numerical_error(tmp_path: Path) -> None:
     text = """
         grain = { diameter = 1e-3 }
         flow.gusts = { intensity = 0.4, events = 100 }

@@ -67,8 +67,8 @@ def test_a_slow_pile_follows_the_pivot_law_at_each_grains_own_stress(
             rows["shields_numerical_low"], rows["shields_numerical_high"]
         )
     ).all()
-    # the known error is relative to the reference, which may be as much larger
-    low, high = within(rows["shields"], rows["known_error"])
+    # the numerical error is relative to the reference, which may be as much larger
+    low, high = within(rows["shields"], rows["numerical_error"])
     assert (rows["shields_numerical_low"] <= low * (1 + 1e-12)).all()
     assert (rows["shields_numerical_high"] >= high * (1 - 1e-12)).all()
     assert (grains["moved_in_load_step"] > 0).sum() == curve["moved"].iloc[-1]

@@ -142,7 +142,7 @@ def test_errors_are_relative_to_the_reference() -> None:
     np.testing.assert_allclose(table["reference_error"], 0.01)
 
 
-def test_known_errors_stand_beside_the_uncertainty_of_the_reference() -> None:
+def test_numerical_errors_stand_beside_the_uncertainty_of_the_reference() -> None:
     over: dict[str, Any] = {
         "scene_id": "b",
         "pile": "b",
@@ -158,7 +158,9 @@ def test_known_errors_stand_beside_the_uncertainty_of_the_reference() -> None:
     ).reset_index(drop=True)
     # a fraction that only one of the two reaches is infinitely off
     table.loc[table["grain_rung"] == FAST, "tau_0.5"] = math.nan
-    known = ladder.known_errors(table).set_index(["scene_class", "rung", "fraction"])
+    known = ladder.numerical_errors(table).set_index(
+        ["scene_class", "rung", "fraction"]
+    )
     for place, error, uncertainty in (
         (("aligned", "static", 0.5), 0.02, 0.01),
         (("aligned", "reference", 0.1), 0.0, 0.01),

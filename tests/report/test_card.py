@@ -164,10 +164,10 @@ def test_motion_starts_within_the_interval_of_its_place(results: Results) -> Non
     heap = only(results, "pile")
     table = heap.tables["pile_threshold"]
     # no error was measured at the first of so many grains
-    assert table["first_known_error"].isna().all()
+    assert table["first_numerical_error"].isna().all()
     assert math.isnan(answers.card(heap).numbers[0].low)
-    wide = changed(heap, pile_threshold=table.assign(first_known_error=0.5))
-    narrow = changed(heap, pile_threshold=table.assign(first_known_error=0.0))
+    wide = changed(heap, pile_threshold=table.assign(first_numerical_error=0.5))
+    narrow = changed(heap, pile_threshold=table.assign(first_numerical_error=0.0))
     ends = []
     for each in (narrow, wide):
         place = answers.card(each).numbers[0]

@@ -113,7 +113,7 @@ def test_cohesion_holds_a_grain_in_its_pocket_but_not_as_it_goes_on() -> None:
 def test_what_answers_a_bed_whose_grains_go_on() -> None:
     of_bed = {
         "": "pivot",
-        # a pile of 20 diameters, as known errors were measured on
+        # a pile of 20 diameters, as numerical errors were measured on
         f"{PILE}height = 0.007\n": "pivot",
         CURVED: "local",
         "[bed]\nkind = 'flat'\n": "local",

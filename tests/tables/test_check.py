@@ -35,7 +35,7 @@ def test_the_check_is_the_answer_of_the_same_scene_by_dem(
     tmp_path: Path, fluid: str
 ) -> None:
     """To the digit: it has the same criterion, and is read from the same case."""
-    # known errors were measured on grains of 2,500 times the density of that gas
+    # numerical errors were measured on grains of 2,500 times the density of that gas
     text = PILE.format(fluid=fluid, density=2650.0 if fluid else 2500.0)
     checked = small_study.run(tmp_path, text).tables
     check = checked["check"].set_index("fraction")

@@ -108,7 +108,7 @@ def test_the_interval_of_seeds_holds_all_of_them_and_all_their_intervals() -> No
         found[["shields_low", "shields_high"]].to_numpy().tolist() == [[0.04, 0.06]] * 2
     )
     assert set(found["interval_of"]) == {MEASURED}
-    # without a known error it is the range of the seeds; of one bed there is none
+    # without a known numerical error it is the range of the seeds; one bed has none
     found = _quoted(NO_ERROR, {**other, **NO_ERROR}, NO_ERROR, twins=[3, 3, 4])
     assert found["interval_of"].tolist()[:2] == [SEEDS] * 2
     assert found["interval_of"].isna().tolist() == [False, False, True]

@@ -33,7 +33,7 @@ SOUND = {
     **{
         "highest_fraction": 0.8,
         "share_carried_off": 0.0,
-        "known_error": 0.03,
+        "numerical_error": 0.03,
         "u_e_m_s": 10.0,
     },
     **{
@@ -76,8 +76,8 @@ UNREACHED = {"reynolds": NAN, "shields": NAN, "share_carried_off": NAN}
             {"share_carried_off": 0.76},
             ["lift carried off 76% of the moved grains"],
         ),
-        (None, {"known_error": NAN}, ["is not known"]),
-        (0.02, {}, ["known error 3.0% is above the tolerance of 0.02"]),
+        (None, {"numerical_error": NAN}, ["is not known"]),
+        (0.02, {}, ["numerical error 3.0% is above the tolerance of 0.02"]),
         (None, UNREACHED, ["not reached: at most 80% of 65 grains moved"]),
         (
             None,
@@ -96,8 +96,8 @@ UNREACHED = {"reynolds": NAN, "shields": NAN, "share_carried_off": NAN}
         ),
         (
             None,
-            {"shields_numerical_high": NAN, "known_error": 3.75},
-            ["above: the known error is 375%"],
+            {"shields_numerical_high": NAN, "numerical_error": 3.75},
+            ["above: the numerical error is 375%"],
         ),
         (
             None,

@@ -52,7 +52,7 @@ GAP = 5.0
 CAPTION = """\
 Each bed has three panels. Above: the {{ told }} at which {{ "the local stress reaches
 the threshold of a grain on the local slope" if local else "each counted grain goes" }}.
-Orange: computed, with the known error of the method as a band. Dashed: {{
+Orange: computed, with the numerical error of the method as a band. Dashed: {{
 beside }} of one grain. Motion starts where the curve is lowest. Grey: what
 never goes. Middle: the stress on the bed over that on the flat ground upwind; the dots
 are averaged as a grain feels it. Where the flow runs back, which is shaded, it pushes
@@ -190,8 +190,8 @@ def _thresholds(
 
 
 def _band(ax: Axes, row: pd.Series, x: Any, ustar: Any, told: ReportedQuantity) -> None:
-    """What is within the known error of the method at each place."""
-    error = single.known_number(row["first_known_error"])
+    """What is within the numerical error of the method at each place."""
+    error = single.known_number(row["first_numerical_error"])
     if not (math.isfinite(error) and error < 1):
         return
     least, most = within(1.0, error)
