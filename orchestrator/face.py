@@ -39,7 +39,7 @@ FIRST = (
     "ustar0_low_m_s",
     "ustar0_high_m_s",
     "interval_of",
-    "measured_ustar0_m_s",
+    "compared_ustar0_m_s",
     "shields",
     "usable",
     "why_not",

@@ -24,14 +24,14 @@ from orchestrator.physics import verdict
 from orchestrator.physics.beside import (
     COMPARED_WITH,
     beside,
+    compared_level_ustar,
     compared_with,
-    measured_level_ustar,
 )
 from orchestrator.physics.constants import GAS_BELOW, GRAIN_COLUMNS
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import DEFAULT, LAWS, law
 from orchestrator.physics.onset import Onset, of_grains
-from orchestrator.physics.reported import Interval, every_unit, has_no_law, measured
+from orchestrator.physics.reported import Interval, compared, every_unit, has_no_law
 from orchestrator.physics.threshold import (
     AUTO,
     LAWS_OF,
@@ -163,7 +163,7 @@ def _of_all_laws(
         block |= rows_beside
         block["level_ustar_m_s"] = of_grains(level, name, criterion).friction_velocity
         with_inputs = {**inputs, **rows_beside}
-        block["measured_level_ustar_m_s"] = measured_level_ustar(with_inputs)
+        block["compared_level_ustar_m_s"] = compared_level_ustar(with_inputs)
         block[COMPARED_WITH] = compared_with(with_inputs)
         block["answer"] = np.array([name in laws for laws in picked])
         blocks.append(block)
@@ -204,7 +204,7 @@ def _flow(table: Table) -> Table:
 
 
 def _reported(table: Table) -> Table:
-    """The intervals and the measured values of thresholds, in every unit."""
+    """The intervals and the values to compare of thresholds, in every unit."""
     ustar = table["ustar_m_s"]
     flow = _flow(table)
     # a row for each law, grain by grain
@@ -218,7 +218,7 @@ def _reported(table: Table) -> Table:
             by_law.append((own, holds & is_asked))
     with np.errstate(all="ignore"):
         interval = Interval.tested(table, ustar).or_of_laws(by_law)
-        return interval.columns(flow) | measured(flow, ustar)
+        return interval.columns(flow) | compared(flow, ustar)
 
 
 def _judge(table: Table, against: Sequence[Sequence[Reason]]) -> None:

@@ -68,7 +68,7 @@ MEASURED: Mapping[str, str] = {
 """Columns of the formula and of what was measured at the Re*."""
 
 COMPARED_WITH, FLUMES, FORMULA = "compared_with", "flumes", "formula"
-"""Column that says what the columns ``measured_…`` of a flow are made of, and its
+"""Column that says what the columns ``compared_…`` of a flow are made of, and its
 words: the median of flumes, or a formula."""
 TESTED: Mapping[str, str] = {
     "tested_low": (
@@ -193,7 +193,7 @@ def by_formula(grain: Grain) -> FloatArray:
     return np.where(fitted, of_medium(grain), np.nan)
 
 
-def measured_level_ustar(table: Any) -> FloatArray:
+def compared_level_ustar(table: Any) -> FloatArray:
     """Find the threshold of one grain on a level bed to compare the computed one with.
 
     Parameters
@@ -214,12 +214,12 @@ def measured_level_ustar(table: Any) -> FloatArray:
 
 
 def compared_with(table: Any) -> NDArray[Any]:
-    """Say what the threshold of `measured_level_ustar` is.
+    """Say what the threshold of `compared_level_ustar` is.
 
     Parameters
     ----------
     table
-        As `measured_level_ustar` takes it.
+        As `compared_level_ustar` takes it.
 
     Returns
     -------

@@ -252,36 +252,40 @@ def has_no_law(table: Any, count: int) -> BoolArray:
     return np.asarray(np.asarray(table["decides"], object) == SUSTAINED)
 
 
-def measured(
+def compared(
     table: Any,
     ustar: FloatArray,
     is_level: Any = False,
-    before: str = "measured_",
+    which: str = "",
 ) -> dict[str, FloatArray]:
-    """Make the columns of a flow with measured thresholds in place of the computed one.
+    """Make the columns of a flow with other thresholds in place of the computed one.
+
+    Those are the threshold of flumes or of a formula that it is compared with, and the
+    ends of what was measured.
 
     Parameters
     ----------
     table
         The columns of grains, fluids and beds, those of `beside`, and the friction
-        velocities of one grain on a level bed, computed and measured.
+        velocities of one grain on a level bed, computed and compared with.
     ustar
         The flow, m/s: it goes with the threshold of the grain.
     is_level
         Whether each bed is level: its flow has the stress of the grain everywhere.
-    before
-        What the names of the columns begin with.
+    which
+        ``first_`` for the flow that moves the first grains.
 
     Returns
     -------
     dict of str to ndarray
-        The columns in every unit, of the measured threshold and of the ends of what
-        was measured.
+        The columns in every unit: ``compared_…`` of the threshold that it is compared
+        with, ``measured_…_low`` and ``measured_…_high`` of the ends of what was
+        measured.
     """
     level = np.asarray(table["level_ustar_m_s"], float)
     grains = Grain.of_table(table)
     of_grain = {
-        "": np.asarray(table["measured_level_ustar_m_s"], float),
+        "": np.asarray(table["compared_level_ustar_m_s"], float),
         "_low": grains.ustar_at(table["measured_low"]),
         "_high": grains.ustar_at(table["measured_high"]),
     }
@@ -289,5 +293,6 @@ def measured(
     for end, at in of_grain.items():
         with np.errstate(invalid="ignore", divide="ignore"):
             there = np.where(is_level, at, ustar * at / level)
-        made |= in_units(there, table, end, before)
+        word = "measured_" if end else "compared_"
+        made |= in_units(there, table, end, word + which)
     return made

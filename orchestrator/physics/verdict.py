@@ -29,7 +29,7 @@ COMPARED: Word = "usable, to compare"
 """No measurement is near: beds may be compared with each other."""
 UNUSABLE: Word = "not usable"
 MOST_CORRECTION = 2.0
-"""Factor from the measured friction velocity up to which the answer may be corrected.
+"""Factor from the friction velocity beside it up to which an answer may be corrected.
 The tested intervals of the usual roughness reach as far: 0.21 to 3.5 in the stress."""
 EXPOSED_FROM = 0.25
 """Part of a grain over the tops of its neighbours from which it is exposed."""
@@ -39,8 +39,8 @@ COLUMNS: Mapping[str, str] = {
     "usable": "whether why_not is empty",
     "verdict": (
         "what the threshold is worth: usable, within what was measured; with a "
-        "correction, to the measured value; to compare, where nothing was measured "
-        "near; not usable"
+        "correction, to the measured value or that of a formula; to compare, where "
+        "neither is near; not usable"
     ),
     "reason": (
         "a word for each thing that speaks against the use of the threshold, for "
@@ -107,7 +107,7 @@ def of_measurements(row: Mapping[Any, Any], is_closed: bool) -> Iterator[Reason]
     ----------
     row
         The threshold, as `of_grain` takes it, with the friction velocities of one grain
-        on a level bed, computed and measured.
+        on a level bed, computed and compared with.
     is_closed
         Whether it is of the closed form.
 
@@ -133,12 +133,12 @@ def of_measurements(row: Mapping[Any, Any], is_closed: bool) -> Iterator[Reason]
     is_other = size is not None and abs(size - 1) > LIKE
     off = correction(row)
     if off > MOST_CORRECTION and not is_other:
-        computed, measured = row["level_ustar_m_s"], row["measured_level_ustar_m_s"]
+        computed, other = row["level_ustar_m_s"], row["compared_level_ustar_m_s"]
         what = f"one grain on a level bed has a friction velocity of {computed:.3g} m/s"
         source, remedy = "measured is", "take the measured value"
         if row.get(COMPARED_WITH) == FORMULA:
             source, remedy = "the formula gives", "take the value of the formula"
-        what = f"{what}, {source} {measured:.3g} m/s: more than {MOST_CORRECTION:g}"
+        what = f"{what}, {source} {other:.3g} m/s: more than {MOST_CORRECTION:g}"
         yield Reason("correction", f"{what} times off", remedy)
 
 
@@ -157,7 +157,7 @@ def _held_by_cohesion(row: Mapping[Any, Any]) -> Iterator[Reason]:
 
 
 def correction(row: Mapping[Any, Any]) -> float:
-    """Find how far the computed threshold of one grain is from the measured one.
+    """Find how far the computed threshold of one grain is from that beside it.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def correction(row: Mapping[Any, Any]) -> float:
     float
         The factor between them, at least 1; NaN where one is not known.
     """
-    ratio = float(row["level_ustar_m_s"]) / float(row["measured_level_ustar_m_s"])
+    ratio = float(row["level_ustar_m_s"]) / float(row["compared_level_ustar_m_s"])
     return math.exp(abs(math.log(ratio))) if 0 < ratio < math.inf else math.nan
 
 
@@ -180,7 +180,7 @@ def is_measured(row: Mapping[Any, Any]) -> bool:
     ----------
     row
         The threshold, with the columns of `beside` and the friction velocities of one
-        grain on a level bed, computed and measured.
+        grain on a level bed, computed and compared with.
 
     Returns
     -------
@@ -201,7 +201,7 @@ def is_measured(row: Mapping[Any, Any]) -> bool:
     computed = float(row["level_ustar_m_s"])
     has_rows = row["measured_rows"] > 0
     if has_interval and (is_gas(row["rho_f_kg_m3"]) or not has_rows):
-        over = float(row["measured_level_ustar_m_s"]) / computed
+        over = float(row["compared_level_ustar_m_s"]) / computed
         return bool(row["tested_low"] <= theta * over**2 <= row["tested_high"])
     if not has_rows:
         return False

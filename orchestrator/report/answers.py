@@ -468,7 +468,7 @@ def _of_mixture(row: pd.Series, results: Results) -> Card:
     here = here[here["scene_id"] == row["scene_id"]].sort_values("size_over_d")
     density = float(row["rho_f_kg_m3"])
     stress = (density * here["ustar0_m_s"] ** 2).tolist()
-    beside = [measured_of_size(row, float(size)) for size in here["size_over_d"]]
+    beside = [hidden_stress(row, float(size)) for size in here["size_over_d"]]
     sizes = [1e3 * float(row["d_m"]) * float(size) for size in here["size_over_d"]]
     all_sizes = share(row, STRESS)
     spread = Number(
@@ -480,8 +480,8 @@ def _of_mixture(row: pd.Series, results: Results) -> Card:
         "Wilcock and Crowe (2003) fitted to transport, at the "
         f"{'formula' if single.is_by_formula(row) else 'measured stress'} of d50",
         last=float(stress[-1]),
-        measured=beside[0],
-        measured_last=beside[-1],
+        compared=beside[0],
+        compared_last=beside[-1],
         beside_is="formula",
     )
     told = single.quantity_of_row(row)
@@ -497,8 +497,8 @@ def _of_mixture(row: pd.Series, results: Results) -> Card:
     )
 
 
-def measured_of_size(row: pd.Series, size: float) -> float:
-    """Compute the stress that moves a size by Wilcock and Crowe, d50 as measured.
+def hidden_stress(row: pd.Series, size: float) -> float:
+    """Compute the stress that moves a size by Wilcock and Crowe, beside that of d50.
 
     Parameters
     ----------
@@ -512,7 +512,7 @@ def measured_of_size(row: pd.Series, size: float) -> float:
     float
         Stress on the bed, Pa.
     """
-    ustar = float(row["measured_level_ustar_m_s"])
+    ustar = float(row["compared_level_ustar_m_s"])
     return float(row["rho_f_kg_m3"]) * ustar**2 * float(wilcock_crowe_hiding(size))
 
 
@@ -652,7 +652,7 @@ def _behind(aspect: float, rows: pd.DataFrame) -> Number:
         low=float(ends.min()),
         high=float(ends.max()),
         interval_of=f"the {len(rows)} turbulence models",
-        measured=0.0 if math.isnan(measured) else measured,
+        compared=0.0 if math.isnan(measured) else measured,
         decimals=1,
     )
 

@@ -44,12 +44,12 @@ class Number:
         Ends of its tested interval in that unit; NaN where one is not known.
     interval_of
         What the interval is, such as ``the six force laws that hold``.
-    measured
-        The measured value in that unit; NaN without one.
+    compared
+        The value to compare with, in that unit; NaN without one.
     last
         The other end of a range of numbers, NaN of one number.
-    measured_last
-        The measured value beside that end.
+    compared_last
+        The value beside that end.
     beside_is
         What the value beside it is called: ``measured``, or ``formula``.
     decimals
@@ -65,9 +65,9 @@ class Number:
     low: float = math.nan
     high: float = math.nan
     interval_of: str = ""
-    measured: float = math.nan
+    compared: float = math.nan
     last: float = math.nan
-    measured_last: float = math.nan
+    compared_last: float = math.nan
     beside_is: str = "measured"
     decimals: int | None = None
     mark: Mark | None = None
@@ -115,10 +115,10 @@ class Number:
 
     @property
     def beside(self) -> str:
-        """The measured value as it is written, without its unit; empty without one."""
-        if math.isnan(self.measured):
+        """The value beside it as it is written, without its unit; empty without one."""
+        if math.isnan(self.compared):
             return ""
-        return self._written(self.measured, self.measured_last, "–")
+        return self._written(self.compared, self.compared_last, "–")
 
     def _written(self, first: float, last: float, between: str) -> str:
         """One number, or two where they differ."""
@@ -227,7 +227,7 @@ class Card:
     numbers
         At most three large figures.
     source
-        Where the measured values are from.
+        Where the values beside the numbers are from.
     worth
         What the answer is worth, and what to do.
     heads
@@ -282,7 +282,7 @@ def _numbers(numbers: Sequence[Number]) -> Iterator[str]:
         return
     has_interval = any(number.interval for number in numbers)
     beside_is = [number.beside_is for number in numbers if number.beside]
-    has_measured = bool(beside_is)
+    has_beside = bool(beside_is)
     heads = ["answer"]
     heads += ["interval"] if has_interval else []
     heads += beside_is[:1]
@@ -290,7 +290,7 @@ def _numbers(numbers: Sequence[Number]) -> Iterator[str]:
     for number in numbers:
         cells = [f"{number.figure} {number.unit}".strip()]
         cells += [number.interval or "-"] if has_interval else []
-        cells += [number.beside or "-"] if has_measured else []
+        cells += [number.beside or "-"] if has_beside else []
         told = [number.meaning]
         if number.note:
             told.append(number.note)

@@ -145,7 +145,7 @@ def _correction(results: Results, table: pd.DataFrame) -> Iterator[Remark]:
         rows = results.exemplars
     row = rows.iloc[0]
     computed = float(row["level_ustar_m_s"])
-    measured = float(row["measured_level_ustar_m_s"])
+    measured = float(row["compared_level_ustar_m_s"])
     if np.isnan(computed / measured) or row["verdict"] == USABLE:
         return
     ratio = computed / measured

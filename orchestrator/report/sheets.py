@@ -185,7 +185,7 @@ def _first_grain(
         ends = (row[f"first_{told.column(end)}"] for end in ("_low", "_high"))
         values[heads[1]] = labels.interval(*ends)
     if beside:
-        values[beside] = f"{row[f'measured_first_{told.column()}']:#.3g}"
+        values[beside] = f"{row[f'compared_first_{told.column()}']:#.3g}"
     if USTAR_HEAD in values:
         values[USTAR_HEAD] = f"{row['first_ustar0_m_s']:#.3g}"
     if "usable" in values:
@@ -353,8 +353,8 @@ def _columns(
     columns = {value: [told.column()]}
     if not is_range:
         columns[interval] = [told.column("_low"), told.column("_high")]
-    if f"measured_{told.column()}" in known:
-        columns[f"{beside}, {told.unit}"] = [f"measured_{told.column()}"]
+    if f"compared_{told.column()}" in known:
+        columns[f"{beside}, {told.unit}"] = [f"compared_{told.column()}"]
     columns[USTAR_HEAD] = ["ustar0_m_s"]
     columns[TAU_HEAD] = ["shields"]
     columns[TAU_INTERVAL] = ["shields_low", "shields_high"]

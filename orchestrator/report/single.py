@@ -238,7 +238,7 @@ def reported_number(
     Returns
     -------
     Number
-        With its interval and the measured value.
+        With its interval and the value to compare with.
     """
     return Number(
         known_number(row.get(f"{which}{told.column()}")),
@@ -248,7 +248,7 @@ def reported_number(
         low=known_number(row.get(f"{which}{told.column('_low')}")),
         high=known_number(row.get(f"{which}{told.column('_high')}")),
         interval_of=of_what,
-        measured=known_number(row.get(f"measured_{which}{told.column()}")),
+        compared=known_number(row.get(f"compared_{which}{told.column()}")),
         beside_is=beside_is(row),
     )
 
@@ -395,7 +395,7 @@ def tested_on(row: Row) -> str:
 
 
 def source(row: Row, told: ReportedQuantity, which: str = "") -> str:
-    """Say where the measured values of a card are from.
+    """Say where the values beside the numbers of a card are from.
 
     Parameters
     ----------
@@ -411,7 +411,7 @@ def source(row: Row, told: ReportedQuantity, which: str = "") -> str:
     str
         The sentences.
     """
-    if math.isnan(known_number(row["measured_level_ustar_m_s"])):
+    if math.isnan(known_number(row["compared_level_ustar_m_s"])):
         return "No measurement is near."
     size = length(float(row["d_m"]))
     alike = "this bed with "

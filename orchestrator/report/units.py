@@ -29,8 +29,8 @@ def told_by(rows: Any, ustar: Any, told: ReportedQuantity) -> FloatArray:
     return in_units(ustar, rows)[told.column()]
 
 
-def measured_over_computed(row: pd.Series) -> float:
-    """Compute the measured over the computed threshold of one grain on a level bed.
+def compared_over_computed(row: pd.Series) -> float:
+    """Compute the ratio of the threshold to compare with to that of one computed grain.
 
     Parameters
     ----------
@@ -42,4 +42,4 @@ def measured_over_computed(row: pd.Series) -> float:
     float
         The ratio of the friction velocities.
     """
-    return float(row["measured_level_ustar_m_s"]) / float(row["level_ustar_m_s"])
+    return float(row["compared_level_ustar_m_s"]) / float(row["level_ustar_m_s"])

@@ -208,7 +208,7 @@ def missing(tables: Mapping[str, pd.DataFrame]) -> list[str]:
     reported = {*verdict.COLUMNS, "interval_of"}
     for stem, unit in REPORTED.items():
         if stem != "depth":
-            ends = (stem, f"{stem}_low", f"{stem}_high", f"measured_{stem}")
+            ends = (stem, f"{stem}_low", f"{stem}_high", f"compared_{stem}")
             reported |= {name + unit for name in ends}
     columns = {
         "scenes": {*fields.OF_QUESTION, "gust"},

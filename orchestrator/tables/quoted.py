@@ -1,8 +1,8 @@
 """Thresholds in the units that a report quotes: speeds and stresses, with intervals.
 
 A threshold has one interval, which is made here: page, card, figures and texts read it.
-Beside each stands what a measured threshold gives: the same flow, with the measured
-threshold of one grain on a level bed in place of the computed one.
+Beside each stands what it is compared with: the same flow, with the threshold of one
+grain on a level bed by flumes or by a formula in place of the computed one.
 """
 
 from collections.abc import Mapping
@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from orchestrator.physics.beside import (
     COMPARED_WITH,
     ENTRAINED,
+    compared_level_ustar,
     compared_with,
-    measured_level_ustar,
 )
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import LAWS
@@ -26,9 +26,9 @@ from orchestrator.physics.reported import (
     NUMERICAL,
     SEEDS,
     Interval,
+    compared,
     has_no_law,
     in_units,
-    measured,
     tested_word,
 )
 from orchestrator.study.shapes import SHAPES
@@ -88,25 +88,24 @@ QUOTED: Mapping[str, str] = {
         "friction velocity at which one grain on a level bed starts to move by the "
         "force law, closed form"
     ),
-    "measured_level_ustar_m_s": (
+    "compared_level_ustar_m_s": (
         "the same to compare it with: the median of the flumes at this Re*, else that "
         "of formula_shields"
     ),
     COMPARED_WITH: (
-        "which of the two the columns measured_level_ustar_m_s, measured_ustar0_m_s "
-        "and measured_first_ustar0_m_s are, in all their units: flumes, measured, or "
+        "which of the two the columns compared_level_ustar_m_s, compared_ustar0_m_s "
+        "and compared_first_ustar0_m_s are, in all their units: flumes, measured, or "
         "formula; empty without both"
     ),
-    "measured_ustar0_m_s": (
-        "undisturbed friction velocity of the same flow at the threshold, with the "
-        "measured threshold of one grain in place of the computed one"
+    "compared_ustar0_m_s": (
+        "undisturbed friction velocity of the same flow at the threshold, with "
+        "compared_level_ustar_m_s of one grain in place of the computed threshold"
     ),
-    "measured_stress_pa": "stress of that undisturbed flow on the bed",
-    "measured_wind_10m_m_s": "wind of that flow 10 m above the bed",
-    "measured_mean_velocity_m_s": "mean velocity of that flow over its depth",
+    "compared_stress_pa": "stress of that undisturbed flow on the bed",
+    "compared_wind_10m_m_s": "wind of that flow 10 m above the bed",
+    "compared_mean_velocity_m_s": "mean velocity of that flow over its depth",
     "measured_ustar0_low_m_s": (
-        "the same as measured_ustar0_m_s with measured_low in place of the measured "
-        "threshold"
+        "the same as compared_ustar0_m_s with the threshold measured_low"
     ),
     "measured_stress_low_pa": "stress of the flow of measured_ustar0_low_m_s",
     "measured_wind_10m_low_m_s": "wind of the flow of measured_ustar0_low_m_s",
@@ -114,8 +113,7 @@ QUOTED: Mapping[str, str] = {
         "mean velocity of the flow of measured_ustar0_low_m_s"
     ),
     "measured_ustar0_high_m_s": (
-        "the same as measured_ustar0_m_s with measured_high in place of the measured "
-        "threshold"
+        "the same as compared_ustar0_m_s with the threshold measured_high"
     ),
     "measured_stress_high_pa": "stress of the flow of measured_ustar0_high_m_s",
     "measured_wind_10m_high_m_s": "wind of the flow of measured_ustar0_high_m_s",
@@ -133,9 +131,9 @@ def quoted(rows: pd.DataFrame, twins: "pd.Series[int] | None" = None) -> dict[st
     measured, else the numerical one; of replicates it holds the
     intervals and the thresholds of all, and is open above if one does not reach the
     fraction. The ends of an interval of the Shields number are those of a stress: u*_0
-    goes with its root. Measured values are u*_0 times the ratio of the measured
+    goes with its root. Values to compare are u*_0 times the ratio of the other
     friction velocity of one grain on a level bed to the computed one. On a level bed
-    under its undisturbed flow every grain has the measured threshold itself.
+    under its undisturbed flow every grain has the other threshold itself.
 
     Parameters
     ----------
@@ -152,7 +150,7 @@ def quoted(rows: pd.DataFrame, twins: "pd.Series[int] | None" = None) -> dict[st
         Stress of the undisturbed flow, Pa; ends of the Shields number, of u*_0, of the
         wind at 10 m, of the mean velocity (m/s) and of that stress, and what they are
         of; the flow that moves the first grain, in these units with its ends; the same
-        with the measured threshold. NaN where there is none.
+        with the threshold to compare with. NaN where there is none.
     """
     ustar = _ustar(rows)
     theta = rows["shields"].to_numpy(float)
@@ -169,16 +167,16 @@ def quoted(rows: pd.DataFrame, twins: "pd.Series[int] | None" = None) -> dict[st
         columns |= _first(rows, twins)
     of_grain = {
         "level_ustar_m_s": of_rows(rows.assign(alpha_deg=0.0))["ustar"],
-        "measured_level_ustar_m_s": measured_level_ustar(rows),
+        "compared_level_ustar_m_s": compared_level_ustar(rows),
         COMPARED_WITH: compared_with(rows),
     }
     columns |= of_grain
     rows = rows.assign(**of_grain)
     level = is_flat(rows)
-    columns |= measured(rows, ustar, level)
+    columns |= compared(rows, ustar, level)
     if "first_ustar0_m_s" in rows:
         first = rows["first_ustar0_m_s"].to_numpy(float)
-        columns |= measured(rows, first, level, "measured_first_")
+        columns |= compared(rows, first, level, "first_")
     return columns
 
 
@@ -243,14 +241,14 @@ def reported(rows: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        The rows, whose flows, measured or not, are those of ``ustar0_m_s`` and of
+        The rows, whose flows, computed or not, are those of ``ustar0_m_s`` and of
         ``first_ustar0_m_s`` in every unit.
     """
     changed: dict[str, FloatArray] = {}
     for stem in ("", "first_"):
         ustar = rows[f"{stem}ustar0_m_s"].to_numpy(float)
         changed |= in_units(ustar, rows, before=stem)
-        changed |= measured(rows, ustar, is_flat(rows), f"measured_{stem}")
+        changed |= compared(rows, ustar, is_flat(rows), stem)
     return rows.assign(**changed)
 
 
@@ -309,24 +307,22 @@ FIRST: Mapping[str, str] = {
     "first_mean_velocity_high_m_s": (
         "upper end of the interval of first_mean_velocity_m_s"
     ),
-    "measured_first_ustar0_m_s": "the same of first_ustar0_m_s",
+    "compared_first_ustar0_m_s": "the same of first_ustar0_m_s",
     "measured_first_ustar0_low_m_s": (
-        "the same as measured_first_ustar0_m_s with measured_low in place of the "
-        "measured threshold"
+        "the same as compared_first_ustar0_m_s with the threshold measured_low"
     ),
     "measured_first_ustar0_high_m_s": (
-        "the same as measured_first_ustar0_m_s with measured_high in place of the "
-        "measured threshold"
+        "the same as compared_first_ustar0_m_s with the threshold measured_high"
     ),
-    "measured_first_stress_pa": "stress of the flow of measured_first_ustar0_m_s",
+    "compared_first_stress_pa": "stress of the flow of compared_first_ustar0_m_s",
     "measured_first_stress_low_pa": (
         "stress of the flow of measured_first_ustar0_low_m_s"
     ),
     "measured_first_stress_high_pa": (
         "stress of the flow of measured_first_ustar0_high_m_s"
     ),
-    "measured_first_wind_10m_m_s": (
-        "wind 10 m above the bed of the flow of measured_first_ustar0_m_s"
+    "compared_first_wind_10m_m_s": (
+        "wind 10 m above the bed of the flow of compared_first_ustar0_m_s"
     ),
     "measured_first_wind_10m_low_m_s": (
         "wind 10 m above the bed of the flow of measured_first_ustar0_low_m_s"
@@ -334,8 +330,8 @@ FIRST: Mapping[str, str] = {
     "measured_first_wind_10m_high_m_s": (
         "wind 10 m above the bed of the flow of measured_first_ustar0_high_m_s"
     ),
-    "measured_first_mean_velocity_m_s": (
-        "mean velocity of the flow of measured_first_ustar0_m_s"
+    "compared_first_mean_velocity_m_s": (
+        "mean velocity of the flow of compared_first_ustar0_m_s"
     ),
     "measured_first_mean_velocity_low_m_s": (
         "mean velocity of the flow of measured_first_ustar0_low_m_s"

@@ -70,8 +70,8 @@ UNITS = [(stem, unit) for stem, unit in REPORTED.items() if stem != "depth"]
 REPORTED_AS = [
     f"{stem}{end}{unit}" for stem, unit in UNITS for end in ("_low", "_high")
 ]
-REPORTED_AS += [f"measured_{stem}{unit}" for stem, unit in UNITS]
-"""Columns of intervals and of measured values in each reported unit."""
+REPORTED_AS += [f"compared_{stem}{unit}" for stem, unit in UNITS]
+"""Columns of intervals and of values to compare in each reported unit."""
 
 
 def named() -> list[dict[str, Any]]:
@@ -216,7 +216,7 @@ def test_threshold_and_study_say_the_same_of_one_grain(
         assert one.worth.word == other.worth.word, (told, one.worth, other.worth)
         for number, same in zip(one.numbers, other.numbers, strict=True):
             assert number.interval_of == same.interval_of, told
-            for name in ("value", "low", "high", "measured"):
+            for name in ("value", "low", "high", "compared"):
                 ends = getattr(number, name), getattr(same, name)
                 assert alike(*ends), (told, name, ends)
         for name in (*OTHERS, *REPORTED_AS):
@@ -233,7 +233,7 @@ def test_other_worlds_have_no_measurements(pairs: list[tuple[Any, Any]]) -> None
     for row, (given, _, _) in zip(pairs[: len(NAMED)], NAMED, strict=True):
         if given[2] in (MARS, TITAN):
             assert row[0]["measured_rows"] == row[0]["tested_rows"] == 0
-            assert math.isnan(row[0]["measured_level_ustar_m_s"])
+            assert math.isnan(row[0]["compared_level_ustar_m_s"])
 
 
 def test_a_usable_answer_has_measurements_and_lies_in_its_interval(

@@ -20,7 +20,7 @@ from orchestrator.report.figures import shields as overview
 from orchestrator.report.results import Results
 from tests.report.conftest import axes_of, changed, copies, legend_of, only
 
-WIND = Number(13.44, "m/s", "wind", low=9.947, high=13.44, measured=9.683)
+WIND = Number(13.44, "m/s", "wind", low=9.947, high=13.44, compared=9.683)
 WORTH = Worth("care", "usable, with a correction", "Take the measured value.")
 
 
@@ -54,17 +54,17 @@ def test_measured_is_the_same_flow_with_the_measured_threshold(
 ) -> None:
     """u*_0 goes with the threshold of a grain, the wind with u*_0 by the log law."""
     rows = only(results, "pile").joined("pile_threshold")
-    ratio = rows["measured_level_ustar_m_s"] / rows["level_ustar_m_s"]
-    np.testing.assert_allclose(rows["measured_ustar0_m_s"], ratio * rows["ustar0_m_s"])
+    ratio = rows["compared_level_ustar_m_s"] / rows["level_ustar_m_s"]
+    np.testing.assert_allclose(rows["compared_ustar0_m_s"], ratio * rows["ustar0_m_s"])
     row = rows.iloc[0]
     (wind,) = measurable_speeds(
-        [row["measured_ustar0_m_s"]],
+        [row["compared_ustar0_m_s"]],
         roughness=row["z0_m"],
         fluid_density=row["rho_f_kg_m3"],
         viscosity=row["nu_m2_s"],
         depth=math.nan,
     )["wind_10m_m_s"]
-    assert row["measured_wind_10m_m_s"] == pytest.approx(wind)
+    assert row["compared_wind_10m_m_s"] == pytest.approx(wind)
     root = np.sqrt(rows["shields_low"] / rows["shields"])
     np.testing.assert_allclose(rows["ustar0_low_m_s"], root * rows["ustar0_m_s"])
     stress = rows["rho_f_kg_m3"] * rows["ustar0_high_m_s"] ** 2
@@ -81,7 +81,7 @@ def test_a_grain_that_is_within_what_was_measured_needs_no_correction(
     # a curve alone is no measurement
     row["tested_rows"] = 0
     row["measured_rows"] = 0
-    row["measured_level_ustar_m_s"] = row["level_ustar_m_s"]
+    row["compared_level_ustar_m_s"] = row["level_ustar_m_s"]
     assert verdict.verdict(row, []) == verdict.CORRECTED
     # an answer below its own interval is not within what was measured
     theta = row["shields"]
@@ -90,11 +90,11 @@ def test_a_grain_that_is_within_what_was_measured_needs_no_correction(
     assert verdict.verdict(row, []) == verdict.USABLE
     row["tested_low"] = 1.1 * theta
     assert verdict.verdict(row, []) == verdict.CORRECTED
-    row["measured_level_ustar_m_s"] = math.nan
+    row["compared_level_ustar_m_s"] = math.nan
     assert verdict.verdict(row, []) == verdict.COMPARED
     # a correction has an upper limit
     for factor, limit in ((1.9, 0), (2.1, 1)):
-        row["measured_level_ustar_m_s"] = factor * row["level_ustar_m_s"]
+        row["compared_level_ustar_m_s"] = factor * row["level_ustar_m_s"]
         against = [*verdict.of_measurements(row, is_closed=True)]
         assert [each.code for each in against] == ["correction"] * limit
     reason = verdict.Reason("law", "Re* 9 is not below 3", 'choose "bridged"')
@@ -151,7 +151,7 @@ def test_the_growth_of_motion_passes_through_the_answer(results: Results) -> Non
         units.told_by(row, curve["ustar0_m_s"], told)
     )
     assert np.asarray(computed.get_ydata()).tolist() == curve["fraction_moved"].tolist()
-    ratio = units.measured_over_computed(row)
+    ratio = units.compared_over_computed(row)
     assert np.asarray(measured.get_xdata()) == pytest.approx(
         units.told_by(row, ratio * curve["ustar0_m_s"], told)
     )
@@ -241,7 +241,7 @@ def test_labels_of_the_picture_of_a_grain_lie_on_no_points(
     grain["z0_m"] = grain["d_m"] / 30
     ustar = grain["ustar_m_s"]
     columns = in_units(ustar, grain)
-    columns |= in_units(measured * ustar, grain, before="measured_")
+    columns |= in_units(measured * ustar, grain, before="compared_")
     grain = pd.Series({**grain, **columns})
     canvas = of_one.grain_panels(grain)
     canvas.draw_without_rendering()

@@ -123,7 +123,7 @@ def _draw_card(row: pd.Series, others: Sequence[str], table: pd.DataFrame) -> Ca
     factors = [(1.0, COMPUTED)]
     if not single.is_level(row):
         beside: Look = {**BESIDE, "label": single.with_threshold(row)}
-        factors.append((units.measured_over_computed(row), beside))
+        factors.append((units.compared_over_computed(row), beside))
     at = float(row[told.column()])
     reach = [at]
     for factor, look in factors:

@@ -78,8 +78,8 @@ def grain_panels(row: pd.Series) -> Canvas:
     ustar = np.where(found["holds"], found["ustar"], np.nan)
     computed = units.told_by(here, ustar, told)
     grains = Grain.of_table(here)
-    measured = units.told_by(here, grains.ustar_at(by_formula(grains)), told)
-    curves = pd.DataFrame({"mm": 1e3 * d, "computed": computed, "measured": measured})
+    compared = units.told_by(here, grains.ustar_at(by_formula(grains)), told)
+    curves = pd.DataFrame({"mm": 1e3 * d, "computed": computed, "formula": compared})
     canvas = style.canvas(2.6)
     left, right = canvas.subplots(1, 2)
     _by_law(left, row, told)
@@ -102,12 +102,12 @@ def _by_law(ax: Axes, row: pd.Series, told: ReportedQuantity) -> None:
         found.append((holds, float(units.told_by(row, ustar, told)), name))
     found.sort(key=lambda one: (one[0], one[1] if one[0] else -one[1]))
     asked = str(row["force_law"])
-    measured = float(row[f"measured_{told.column()}"])
+    compared = float(row[f"compared_{told.column()}"])
     for place, (holds, value, name) in enumerate(found):
         look: Look = {"ms": 4.5, "mew": 1.0}
         if name == asked:
             look |= {"ms": 7, "color": ANSWER}
-            is_left = value < measured
+            is_left = value < compared
             ax.annotate(
                 f"{value:.3g}",
                 (value, place),
@@ -123,20 +123,20 @@ def _by_law(ax: Axes, row: pd.Series, told: ReportedQuantity) -> None:
         else:
             look |= {"color": NONE, "mfc": "none"}
         ax.plot([value], [place], "o", **look)
-    _measured_lines(ax, row, told)
+    _compared_lines(ax, row, told)
     ax.set_yticks(range(len(found)), [name for _, _, name in found])
     shown = [value for holds, value, name in found if holds or name == asked]
-    least = min(*shown, measured)
-    most = max(*shown, measured)
+    least = min(*shown, compared)
+    most = max(*shown, compared)
     ax.set_xlim(0.6 * least, 1.25 * most)
     ax.set_ylim(-0.6, len(found) - 0.2)
     ax.set_xlabel(f"{told.name} by force law, {told.unit}")
 
 
-def _measured_lines(ax: Axes, row: pd.Series, told: ReportedQuantity) -> None:
-    """A dashed line at the median of flumes or the formula, and the measured range."""
-    measured = float(row[f"measured_{told.column()}"])
-    ax.axvline(measured, color=INK, lw=1.1, ls=MEASURED, zorder=1)
+def _compared_lines(ax: Axes, row: pd.Series, told: ReportedQuantity) -> None:
+    """A dashed line at the median of flumes or the formula, and what was measured."""
+    compared = float(row[f"compared_{told.column()}"])
+    ax.axvline(compared, color=INK, lw=1.1, ls=MEASURED, zorder=1)
     name = "formula" if single.is_by_formula(row) else "flumes"
     look: Look = {
         "xycoords": ax.get_xaxis_transform(),
@@ -144,7 +144,7 @@ def _measured_lines(ax: Axes, row: pd.Series, told: ReportedQuantity) -> None:
         "va": "top",
         "fontsize": 7,
     }
-    ax.annotate(name, (measured, 1.0), xytext=(4, 0), **look)
+    ax.annotate(name, (compared, 1.0), xytext=(4, 0), **look)
     if not row["measured_rows"] > 0:
         return
     low, high = (row[f"measured_{told.column(end)}"] for end in ("_low", "_high"))
@@ -158,14 +158,14 @@ def _by_size(
 ) -> None:
     """The threshold by size: by the law where it holds, and by the formula."""
     size = float(row["d_m"])
-    mm, computed, measured = curves.to_numpy().T
+    mm, computed, compared = curves.to_numpy().T
     ax.plot(mm, computed, color=ANSWER, lw=1.5)
-    ax.plot(mm, measured, color=INK, lw=1.1, ls=MEASURED)
+    ax.plot(mm, compared, color=INK, lw=1.1, ls=MEASURED)
     value = float(row[told.column()])
     ax.plot([1e3 * size], [value], "o", color=ANSWER, ms=6, mec="white")
     # both curves rise to the right: what is below them is free there
-    at = _middle(measured)
-    is_below = at is None or value < measured[at]
+    at = _middle(compared)
+    is_below = at is None or value < compared[at]
     below: Look = {"textcoords": "offset points"}
     below |= {"xytext": (8, -6), "va": "top"}
     above = {**below, "xytext": (-8, 6), "va": "bottom", "ha": "right"}
@@ -178,7 +178,7 @@ def _by_size(
     )
     if at is not None:
         name = f"formula of {single.formula_of(row)}"
-        ax.annotate(name, (mm[at], measured[at]), **(above if is_below else below))
+        ax.annotate(name, (mm[at], compared[at]), **(above if is_below else below))
     style.log_sizes(ax)
     ax.set(ylim=(0, None), xlabel="the same for other sizes, mm")
     ax.set_ylabel(f"{told.name}, {told.unit}")

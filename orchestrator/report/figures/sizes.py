@@ -60,9 +60,9 @@ def _sizes(row: pd.Series, here: pd.DataFrame) -> Canvas:
     low = weight * here["shields_own_low"].to_numpy(float)
     high = weight * here["shields_own_high"].to_numpy(float)
     few = here["few"].to_numpy(bool)
-    measured = [answers.measured_of_size(row, size) for size in here["size_over_d"]]
+    compared = [answers.hidden_stress(row, size) for size in here["size_over_d"]]
     at = float(row["rho_f_kg_m3"]) * float(row["ustar0_m_s"]) ** 2
-    top = 1.15 * np.nanmax([*value[np.isfinite(value)], *measured, at])
+    top = 1.15 * np.nanmax([*value[np.isfinite(value)], *compared, at])
     count = len(here)
     places = np.arange(count)[::-1]
     canvas = style.canvas(0.9 + 0.2 * count, style.NARROW)
@@ -72,7 +72,7 @@ def _sizes(row: pd.Series, here: pd.DataFrame) -> Canvas:
     ax.plot(value[~few], places[~few], **DISC)
     if np.isfinite(value[few]).any():
         ax.plot(value[few], places[few], **RING)
-    ax.plot(measured, places, **SQUARE)
+    ax.plot(compared, places, **SQUARE)
     ax.axvline(at, **TOGETHER)
     ax.set_yticks(places, _names(float(row["d_m"]), here))
     ax.set(xlim=(0, top), ylim=(-0.6, count - 0.4), xlabel="stress on the bed, Pa")

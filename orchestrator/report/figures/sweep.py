@@ -135,10 +135,10 @@ def _draw_series(
     marker = MARKERS[number]
     ax.plot(x[usable], y[usable], marker, color=ANSWER, ms=5)
     ax.plot(x[~usable], y[~usable], marker, color=NONE, mfc="white", ms=5)
-    measured = part[f"measured_{told.column()}"].to_numpy(float)
+    compared = part[f"compared_{told.column()}"].to_numpy(float)
     every = (row for _, row in part.iterrows())
     name = single.with_threshold(*every) if number == 0 else "_"
-    ax.plot(x, measured, color=INK, lw=1.1, ls=MEASURED, zorder=1.5, label=name)
+    ax.plot(x, compared, color=INK, lw=1.1, ls=MEASURED, zorder=1.5, label=name)
 
 
 FIGURE = FigureKind(order=90, draws=draw, uses=("pile_threshold", "single_grain"))

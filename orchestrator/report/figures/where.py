@@ -167,16 +167,16 @@ def _title(results: Results, pile: Pile) -> str:
 def _thresholds(
     ax: Axes, row: pd.Series, grains: pd.DataFrame, told: ReportedQuantity
 ) -> None:
-    """The flow at which each place goes, with a band, and by the measured threshold."""
+    """The flow at which each place goes, with a band, and that to compare with."""
     goes = np.isfinite(grains["ustar0_m_s"]) & (grains["ustar0_m_s"] > 0)
     x = grains.loc[goes, "x_m"].to_numpy(float)
     ustar = grains.loc[goes, "ustar0_m_s"].to_numpy(float)
     computed = units.told_by(row, ustar, told)
-    factor = units.measured_over_computed(row)
-    measured = units.told_by(row, factor * ustar, told)
+    factor = units.compared_over_computed(row)
+    compared = units.told_by(row, factor * ustar, told)
     cuts = _parted(x)
     _band(ax, row, x, ustar, told)
-    ax.plot(*_broken(x, measured, cuts), label=single.with_threshold(row), **BESIDE)
+    ax.plot(*_broken(x, compared, cuts), label=single.with_threshold(row), **BESIDE)
     ax.plot(*_broken(x, computed, cuts), **COMPUTED)
     # one collection: by the method local these may be hundreds
     across = ax.get_xaxis_transform()
@@ -184,7 +184,7 @@ def _thresholds(
     if len(x):
         first = float(np.nanmin(computed))
         shown = computed[computed < HIGHEST * first]
-        low = 0.85 * float(np.nanmin([*measured, first]))
+        low = 0.85 * float(np.nanmin([*compared, first]))
         ax.set_ylim(low, 1.5 * float(np.nanmax(shown, initial=first)))
     ax.set_ylabel(f"{told.name}, {told.unit}")
 
