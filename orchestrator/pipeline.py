@@ -15,7 +15,7 @@ from orchestrator.plan import Plan
 from orchestrator.report.results import Results
 from orchestrator.runs import case, cluster, engine, reuse, terminal, workspace
 from orchestrator.runs.case import Case
-from orchestrator.runs.cluster import Queue
+from orchestrator.runs.queues import Queue
 from orchestrator.runs.workspace import EXPERIMENT, STATE, STUDY, Workspace, claimed
 from orchestrator.study.own_errors import noted
 from orchestrator.study.profile import Files

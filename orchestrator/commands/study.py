@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from orchestrator import guests
 from orchestrator.command import Command, Parser, add_run_options
-from orchestrator.runs.cluster import SYSTEMS, Queue
+from orchestrator.runs.queues import SYSTEMS, Queue
 from orchestrator.study.units import number
 
 if TYPE_CHECKING:

@@ -11,6 +11,8 @@ and the constants 0.9 and 6 agree with code_saturne (cs_wall_functions), which c
 these authors; 26 is the value commonly quoted of van Driest.
 """
 
+from functools import cache
+
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import ArrayLike
@@ -594,13 +596,19 @@ def _nodes(start: FloatArray, end: FloatArray) -> tuple[FloatArray, FloatArray]:
 
     Both have the points of the quadrature along their last axis.
     """
-    root, weight = leggauss(GAUSS_POINTS)
+    root, weight = _quadrature()
     first = np.arcsinh(start / BUFFER)
     width = np.arcsinh(end / BUFFER) - first
     stretched = first[..., None] + width[..., None] * (root + 1) / 2
     y = BUFFER * np.sinh(stretched)
     step = width[..., None] * weight / 2 * BUFFER * np.cosh(stretched)
     return y, step * shear(y)
+
+
+@cache
+def _quadrature() -> tuple[FloatArray, FloatArray]:
+    """Points and weights of Gauss's quadrature, from -1 to 1."""
+    return leggauss(GAUSS_POINTS)
 
 
 def shear(y: FloatArray) -> FloatArray:

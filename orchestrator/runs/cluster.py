@@ -6,7 +6,6 @@ import math
 import shlex
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,17 +18,8 @@ from orchestrator.runs import engine, process
 from orchestrator.runs.case import Case, done_state, names_in
 from orchestrator.runs.engine import Pool
 from orchestrator.runs.files import PACKAGE
+from orchestrator.runs.queues import SYSTEMS, Queue
 
-SYSTEMS = {
-    "htcondor": "HTCondorCluster",
-    "lsf": "LSFCluster",
-    "moab": "MoabCluster",
-    "oar": "OARCluster",
-    "pbs": "PBSCluster",
-    "sge": "SGECluster",
-    "slurm": "SLURMCluster",
-}
-"""Names of the queues, and dask-jobqueue's classes for them."""
 EXTRA = "cluster"
 """The extra of the package with dask-jobqueue."""
 AHEAD = 2
@@ -47,22 +37,6 @@ PATIENCE_S = 60.0
 
 Until the next line it is twice as long.
 """
-
-
-@dataclass(frozen=True)
-class Queue:
-    """A queue, and what its jobs ask for.
-
-    Attributes
-    ----------
-    system
-        One of `SYSTEMS`.
-    settings
-        The table ``[cluster]`` of the study file: arguments of dask-jobqueue's class.
-    """
-
-    system: str
-    settings: Mapping[str, Any] = field(default_factory=dict)
 
 
 @contextlib.contextmanager

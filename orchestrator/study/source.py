@@ -11,10 +11,13 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from orchestrator.errors import InputError, suggestion
 from orchestrator.runs.files import digest_file, opened
-from orchestrator.study.own_errors import OwnErrors
+
+if TYPE_CHECKING:  # no file is read by what it loads
+    from orchestrator.study.own_errors import OwnErrors
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,7 @@ class Source:
     file: str
     digests: Mapping[str, str | None]
     tolerance: float | None = None
-    errors: OwnErrors | None = None
+    errors: "OwnErrors | None" = None
 
     def described(self, root: Path) -> dict[str, object]:
         """The source as JSON, for a directory of results.

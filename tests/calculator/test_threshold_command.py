@@ -4,6 +4,8 @@ import csv
 import io
 import json
 import math
+import subprocess
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +15,7 @@ from orchestrator import cli
 from orchestrator.calculator import QUANTITIES
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import LAWS
+from tests.waiting import HANGS_S
 
 Ended = tuple[int, str, str]
 Run = Callable[..., Ended]
@@ -449,3 +452,20 @@ def test_a_negative_number_of_any_spelling_is_the_value_of_its_option(run: Run) 
     found = [run(*gravel, "--bed-slope", text) for text in ("-5e-3", "-.005", "5e-3")]
     assert [code for code, _, _ in found] == [0, 0, 0]
     assert found[0][1] == found[1][1] == found[2][1]
+
+
+STARTED = """
+import sys
+from orchestrator import cli
+assert cli.main(["threshold", "--diameter", "3e-4", "--fluid", sys.argv[1]]) == 0
+slow = {"filelock", "jinja2", "matplotlib", "pandas", "pydantic", "pyvista", "scipy"}
+print("imported:", *sorted(slow & set(sys.modules)))
+"""
+
+
+@pytest.mark.parametrize("fluid", ["air", "water"])
+def test_a_card_waits_for_no_library_that_is_slow_to_import(fluid: str) -> None:
+    command = [sys.executable, "-c", STARTED, fluid]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=HANGS_S)
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stdout.splitlines()[-1] == "imported:"
