@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator import guests, pipeline, report, tables
-from orchestrator.calculator import BY_FLUID, PARAMETERS
+from orchestrator.calculator import BY_FLUID, LENGTHS, PARAMETERS
 from orchestrator.calculator.asked import thresholds_and_questions
 from orchestrator.calculator.cli import OPTIONS
 from orchestrator.errors import InputError, OrchestratorError, SolverError
@@ -63,14 +63,14 @@ def threshold(
     *,
     law: str | None = "auto",
     fluid: str | None = None,
-    temperature: float | None = None,
+    temperature: "ArrayLike | None" = None,
     criterion: str = BY_FLUID,
     **parameters: "ArrayLike",
 ) -> pd.DataFrame:
     """Thresholds of motion of single grains by the closed form.
 
-    All parameters but `law`, `fluid`, `temperature` and `criterion` are numbers or
-    arrays that broadcast together.
+    All parameters but `law`, `fluid` and `criterion` are numbers or arrays that
+    broadcast together.
 
     Parameters
     ----------
@@ -101,7 +101,8 @@ def threshold(
     entrainment_angle_deg
         Angle (60) of the contact that a grain rolls over, degrees.
     roughness
-        Roughness length z0, m, or a part of the diameter ("d/30").
+        Roughness length z0 of the grain's pocket, m, or a part of the diameter
+        ("d/30").
     lift_coefficient
         Saffman's (1.615).
     gravity
@@ -109,7 +110,17 @@ def threshold(
     cohesion
         Pull of a contact over the diameter (0), N/m.
     depth
-        Depth of a liquid, m, for its mean velocity.
+        Depth of a liquid, m, for its mean velocity and its discharge.
+    bed_slope
+        Slope at which a channel falls, whatever its sign, in place of a depth: the
+        depth is that of the uniform flow at the threshold.
+    channel_roughness
+        Roughness length z0 of the channel, or of the ground in air, m, or a part of the
+        diameter: speeds and discharge follow from it. By default it is that of the
+        pocket, and d84/10 where there is a depth.
+    d84
+        Diameter that 84 % by mass of the bed of a channel are finer than (the
+        diameter), m.
 
     Returns
     -------
@@ -139,26 +150,15 @@ def threshold(
         if not isinstance(word, str | None):
             raise InputError(f"{word!r} is no name", name, "write one, such as a text")
     given: dict[str, Any] = {"diameter": diameter, **parameters}
-    index = _index({**given})
-    for name, values in given.items():
-        if name not in PARAMETERS:
-            what = f"there are {', '.join(PARAMETERS)}"
-            raise InputError("no such parameter", name, what)
-        given[name] = _column(name, values)
-    try:
-        arrays = np.broadcast_arrays(*given.values())
-    except ValueError as error:
-        raise InputError(str(error), where="threshold") from None
-    points = {}
-    for name, array in zip(given, arrays, strict=True):
-        points[name] = array.ravel().tolist()
-    if not points["diameter"]:
-        remedy = "give one diameter at least"
-        raise InputError("the arrays have no point", "threshold", remedy)
+    if temperature is not None:
+        given["temperature"] = temperature
+    index = _index(given)
+    points = _points(given)
     names = {name: name for name in OPTIONS}
     form = "{} {:.4g}"
+    temperatures = points.pop("temperature", None)
     table, asked = thresholds_and_questions(
-        points, law or "auto", fluid, temperature, names, form, criterion
+        points, law or "auto", fluid, temperatures, names, form, criterion
     )
     if asked:
         warnings.warn("; ".join(asked), stacklevel=2)
@@ -170,6 +170,27 @@ def threshold(
     chosen = rows if law is None else rows[rows["answer"]]
     chosen = chosen.drop(columns="answer")
     return chosen if is_indexed else chosen.reset_index(drop=True)
+
+
+def _points(given: Mapping[str, Any]) -> dict[str, list[Any]]:
+    """Columns of one length of parameters that broadcast together."""
+    columns = {}
+    for name, values in given.items():
+        if name not in (*PARAMETERS, "temperature"):
+            what = f"there are {', '.join(PARAMETERS)}"
+            raise InputError("no such parameter", name, what)
+        columns[name] = _column(name, values)
+    try:
+        arrays = np.broadcast_arrays(*columns.values())
+    except ValueError as error:
+        raise InputError(str(error), where="threshold") from None
+    points = {}
+    for name, array in zip(columns, arrays, strict=True):
+        points[name] = array.ravel().tolist()
+    if not points["diameter"]:
+        remedy = "give one diameter at least"
+        raise InputError("the arrays have no point", "threshold", remedy)
+    return points
 
 
 def _index(given: Mapping[str, Any]) -> "pd.Index[Any] | None":
@@ -200,7 +221,7 @@ def _column(name: str, values: Any) -> "NDArray[Any]":
     refusal = InputError(what, name, remedy)
     try:
         array = np.asarray(values)
-        if name == "roughness" and array.dtype.kind in "UO":
+        if name in LENGTHS and array.dtype.kind in "UO":
             return np.asarray(values, object)
         if array.dtype.kind not in "iufO":
             # Python makes numbers of texts and of truths

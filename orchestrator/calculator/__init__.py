@@ -6,7 +6,13 @@ Here are its parameters and results, by every name that they have.
 from typing import NamedTuple
 
 from orchestrator.physics import fluids
-from orchestrator.physics.constants import GRAIN_COLUMNS, GRAVITY, LIFT_COEFFICIENT
+from orchestrator.physics.constants import (
+    CHANNEL,
+    GRAIN_COLUMNS,
+    GRAVITY,
+    LIFT_COEFFICIENT,
+    SLOPE,
+)
 
 
 class Parameter(NamedTuple):
@@ -15,7 +21,7 @@ class Parameter(NamedTuple):
     Attributes
     ----------
     field
-        Its name in a study file; the depth is in none.
+        Its name in a study file; those of `OF_FLOW` are in none.
     column
         Its column of the table, with the unit.
     label
@@ -105,15 +111,47 @@ PARAMETERS = {
         "depth_m",
         "depth, m",
         (0, 0),
-        note="of a liquid: its mean speed",
+        note="of a liquid: its mean speed and its discharge",
+    ),
+    "bed_slope": Parameter(
+        "bed_slope",
+        SLOPE,
+        "S",
+        (0, 0),
+        note=(
+            "slope at which a channel falls, such as 0.005, whatever its sign: depth "
+            "and mean velocity at which its uniform flow starts motion"
+        ),
+    ),
+    "channel_roughness": Parameter(
+        "channel_roughness",
+        CHANNEL,
+        "z0 of the channel or the ground, m",
+        (0, 0),
+        note=(
+            "speeds and discharge follow from it, a thirtieth of Nikuradse's roughness "
+            "k_s; default: in a channel d84/10, which is k_s = 3 d84, else that of the "
+            "grain's pocket"
+        ),
+    ),
+    "d84": Parameter(
+        "d84",
+        "d84_m",
+        "d84, m",
+        (0, 0),
+        note="84 % by mass of the bed of a channel are finer; default: the diameter",
     ),
 }
 """By keyword, which is also the name in JSON. The paper's values are the defaults."""
 OF_FLUID = {"fluid_density": "density", "viscosity": "viscosity"}
 """Parameters that a fluid has by its name, as a table ``[fluid]`` calls them."""
+OF_FLOW = ("depth", "bed_slope", "channel_roughness", "d84")
+"""Parameters of the flow over the grains, on which no stress depends."""
 LARGEST_DEPTH = 1e4
 """Largest depth of a flow, m, as in a study file."""
-GEOMETRIC = ("diameter", "viscosity", "roughness", "depth")
+LENGTHS = ("roughness", "channel_roughness")
+"""Parameters that may be parts of the diameter."""
+GEOMETRIC = ("diameter", "viscosity", *LENGTHS, "depth", "bed_slope", "d84")
 """Parameters whose ranges are geometric; all others are spaced evenly."""
 QUANTITIES = {
     "ustar_m_s": ("friction_velocity", "u*, m/s"),
@@ -121,6 +159,7 @@ QUANTITIES = {
     "wind_10m_m_s": ("wind_speed_10_m", "wind at 10 m, m/s"),
     "current_1m_m_s": ("current_1_m", "current at 1 m, m/s"),
     "mean_velocity_m_s": ("mean_velocity", "mean velocity, m/s"),
+    "discharge_m2_s": ("discharge", "discharge, m2/s"),
     "stress_pa": ("stress", "stress, Pa"),
     "shields": ("shields", "Shields"),
     "reynolds": ("reynolds", "Re*"),
@@ -128,6 +167,12 @@ QUANTITIES = {
     "lift_n": ("lift", "lift, N"),
 }
 """Columns of a threshold, each with its name in JSON, and its symbol and unit."""
+BESIDE_CHANNEL = {
+    "mean_velocity_3d84_m_s": "k_s = 3 d84",
+    "mean_velocity_strickler_m_s": "Strickler, 21.1/d^(1/6)",
+    "mean_velocity_grains_m_s": "grains alone, z0 of the pocket",
+}
+"""Columns of the mean velocity of the same depth by other roughnesses of a channel."""
 ENTRAINED, SUSTAINED = "entrained", "sustained"
 CRITERIA = (ENTRAINED, SUSTAINED)
 """What a grain must do to count: leave its pocket, or also move on after a gust."""

@@ -14,7 +14,10 @@ if TYPE_CHECKING:  # this loads numpy
 
 Value = float | str
 """A number, or a part of the diameter such as ``d/30``."""
-FIELD = re.compile(r"\b([a-z]+\.[a-z_]+|(?<=threshold: )(depth|law|criterion))\b")
+FIELD = re.compile(
+    r"\b([a-z]+\.[a-z_]+|(?<=threshold: )(depth|law|criterion)"
+    r"|bed_slope|channel_roughness|d84)\b"
+)
 """A field of a study file in a message, or what else is refused."""
 
 
@@ -22,11 +25,10 @@ def thresholds_and_questions(
     points: Mapping[str, Sequence[Value]],
     law: str,
     fluid: str | None,
-    temperature: float | None,
+    temperature: float | Sequence[float] | None,
     names: Mapping[str, str],
     form: str,
     criterion: str = BY_FLUID,
-    bed_slope: float | None = None,
 ) -> tuple["Table", list[str]]:
     """Find the thresholds of some points, and ask about numbers that seem to be wrong.
 
@@ -40,7 +42,7 @@ def thresholds_and_questions(
         Name of the fluid in place of density and viscosity; the paper's gas may have
         numbers of its own.
     temperature
-        Temperature of that fluid, deg C.
+        Temperature of that fluid, deg C, or that of each point.
     names
         What refusals and questions call the parameters, ``fluid``, ``temperature``,
         ``law`` and ``criterion``.
@@ -48,8 +50,6 @@ def thresholds_and_questions(
         How a parameter is given a value: a format of its name and the value.
     criterion
         What a grain must do, one of `CRITERIA`, or `BY_FLUID`.
-    bed_slope
-        Slope at which a channel falls; None without one.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def thresholds_and_questions(
         if fluid == PAPER and criterion == BY_FLUID:
             criterion = ENTRAINED  # also where the points have numbers of their own
         asked = questions(_by_field(points), fields, form)
-        table = thresholds(points, law, criterion, bed_slope)
+        table = thresholds(points, law, criterion)
         return table, [one.text for one in asked]
     except InputError as error:
         renamed = InputError(
@@ -90,22 +90,27 @@ def thresholds_and_questions(
 def _of_fluid(
     points: Mapping[str, Sequence[Value]],
     fluid: str | None,
-    temperature: float | None,
+    temperature: float | Sequence[float] | None,
 ) -> Mapping[str, Sequence[Value]]:
     """The points with the numbers of a fluid; refuses what is given twice."""
     given: dict[str, Any] = {}
     if fluid is not None:
         given["kind"] = fluid
-    if temperature is not None:
-        given[TEMPERATURE] = temperature
     for name, field in OF_FLUID.items():
         if name in points:
             given[field] = points[name]
-    of_fluid = numbers_of(given)
+    temperatures: list[Any] = [temperature] * len(points["diameter"])
+    if isinstance(temperature, Sequence):
+        temperatures = [*temperature]
+    by_temperature = {}
+    for each in dict.fromkeys(temperatures):
+        warm = {} if each is None else {TEMPERATURE: each}
+        by_temperature[each] = numbers_of({**given, **warm})
     if fluid is None:
         return points
-    count = len(points["diameter"])
-    columns = {name: [of_fluid[field]] * count for name, field in OF_FLUID.items()}
+    columns = {}
+    for name, field in OF_FLUID.items():
+        columns[name] = [by_temperature[each][field] for each in temperatures]
     return {**columns, **points}
 
 

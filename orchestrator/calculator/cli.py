@@ -8,6 +8,7 @@ import sys
 from orchestrator.calculator import (
     BY_FLUID,
     GEOMETRIC,
+    LENGTHS,
     MOST_POINTS,
     OF_FLUID,
     PARAMETERS,
@@ -24,16 +25,17 @@ OPTIONS = {
     for name in (*PARAMETERS, "fluid", "temperature", "law", "criterion")
 }
 """Options of the command line, by the parameters of `face.threshold`."""
-BED_SLOPE = "--bed-slope"
-"""Option of the slope of a channel."""
+GROUND = "--ground-roughness"
+"""What `channel_roughness` is called of a wind."""
 FORM = (
     "write a number in SI units, or FIRST:LAST:COUNT such as 1e-4:2e-3:20; "
     "a z0 may be d/30"
 )
 RANGES = """\
 Any number may be a range FIRST:LAST:COUNT, such as --diameter 1e-4:2e-3:20, for a
-table; several ranges give every combination. Diameter, viscosity, roughness and
-depth are spaced geometrically, all others evenly. A fluid below 100 kg/m3 is a gas."""
+table; several ranges give every combination. Lengths, viscosity and the slope of a
+channel are spaced geometrically, all others evenly. A fluid below 100 kg/m3 is a
+gas."""
 LAW_HELP = (
     "force law of the answer; default: bridged, or bridged-gravel where the drag law "
     "of bridged ends; paper: Eq. 2 or 4 where each holds"
@@ -43,12 +45,6 @@ CRITERION_HELP = (
     "roll and hop on after it; entrained, which is to leave its pocket; default: "
     "entrained in the fluid paper and by the laws paper, low and high, sustained in "
     "all others"
-)
-
-
-BED_SLOPE_HELP = (
-    "slope at which a channel falls, such as 0.005, whatever its sign: depth and mean "
-    "velocity at which its uniform flow starts motion"
 )
 
 
@@ -62,8 +58,10 @@ def options(command: Parser) -> None:
     """
     command.epilog = RANGES
     for name in PARAMETERS:
+        alias = [GROUND] if name == "channel_roughness" else []
         command.add_argument(
             OPTIONS[name],
+            *alias,
             dest=name,
             help=_help(name),
             required=name == "diameter",
@@ -79,7 +77,6 @@ def options(command: Parser) -> None:
     command.add_argument(
         "--criterion", default=BY_FLUID, metavar="NAME", help=CRITERION_HELP
     )
-    command.add_argument(BED_SLOPE, type=number, metavar="S", help=BED_SLOPE_HELP)
     form = command.add_mutually_exclusive_group()
     text = "an object for each law by its name"
     form.add_argument("--json", action="store_true", help=text)
@@ -129,7 +126,8 @@ def run(options: argparse.Namespace) -> int:
             axes[name] = values(name, text)
     if "slope_deg" in axes and min(map(float, axes["slope_deg"])) < 0:
         what = "below 0: the flow goes up a positive slope"
-        remedy = f"a river's slope, which falls with the flow, is {BED_SLOPE} 0.005"
+        option = OPTIONS["bed_slope"]
+        remedy = f"a river's slope, which falls with the flow, is {option} 0.005"
         raise InputError(what, OPTIONS["slope_deg"], remedy)
     count = math.prod(map(len, axes.values()))
     if count > MOST_POINTS:
@@ -145,7 +143,6 @@ def run(options: argparse.Namespace) -> int:
         OPTIONS,
         "{} {:.4g}",
         options.criterion,
-        options.bed_slope,
     )
     if questions:
         print(f"orchestrator: {'; '.join(questions)}", file=sys.stderr)
@@ -193,7 +190,7 @@ def values(name: str, text: str) -> list[Value]:
     >>> values("roughness", "d/30")
     ['d/30']
     """
-    is_part = name == "roughness" and "/" in text
+    is_part = name in LENGTHS and "/" in text
     ends = text.split(":")
     if is_part and len(ends) == 1:
         return [text]

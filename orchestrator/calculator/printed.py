@@ -7,8 +7,13 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.calculator import OF_CRITERION, PARAMETERS, QUANTITIES
-from orchestrator.physics.constants import GAS_BELOW
+from orchestrator.calculator import (
+    BESIDE_CHANNEL,
+    OF_CRITERION,
+    PARAMETERS,
+    QUANTITIES,
+)
+from orchestrator.physics.constants import CHANNEL, GAS_BELOW
 from orchestrator.physics.fluids import PAPER
 
 if TYPE_CHECKING:  # this loads numpy
@@ -66,6 +71,8 @@ def as_json(rows: Sequence["Row"]) -> str:
     names = {column: name for column, (name, _) in QUANTITIES.items()}
     for column in ("valid", *COLUMNS, *MEASURED, COMPARED_WITH, *TESTED):
         names[column] = column
+    for column in (*BESIDE_CHANNEL, "discharge_low_m2_s", "discharge_high_m2_s"):
+        names[column] = column.removesuffix("_m_s").removesuffix("_m2_s")
     for column in OF_CRITERION:
         if column in rows[0]:
             names[column] = column
@@ -98,7 +105,11 @@ def _record(of_laws: Sequence["Row"], names: Mapping[str, str]) -> "Row":
 
     first = of_laws[0]
     record: Row = {}
-    record["input"] = {n: first[each.column] for n, each in PARAMETERS.items()}
+    record["input"] = {
+        name: first[each.column]
+        for name, each in PARAMETERS.items()
+        if each.column in first
+    }
     record["regime"] = first["regime"]
     record["paper"] = list(LAWS_OF[first["regime"]])
     record["answer"] = [row["law"] for row in of_laws if row["answer"]]
@@ -158,6 +169,9 @@ def _of_one(rows: Sequence["Row"]) -> Iterator[str]:
     if "decides" in chosen[0]:
         yield ""
         yield from _criteria(chosen)
+    if not _is_nan(chosen[0]["mean_velocity_m_s"]):
+        yield ""
+        yield from _of_channel(chosen[0])
     yield ""
     quantities = _quantities(rows)
     heads = {"law": "force law"}
@@ -202,6 +216,40 @@ def _criteria(chosen: Sequence["Row"]) -> Iterator[str]:
             f"{of_law}at least {low}, at most {high}: a quarter of the grains over "
             "half of the way, three quarters over twice the way"
         )
+
+
+def _of_channel(row: "Row") -> Iterator[str]:
+    """The mean velocity and the discharge by several roughnesses of a channel.
+
+    The depth is one, that of the answer.
+    """
+    from orchestrator.report.card import apart
+    from orchestrator.report.lines import table
+
+    def cells(words: str, roughness: float, speed: float, interval: str) -> list[str]:
+        discharge = speed * row["depth_m"]
+        numbers = [f"{number:.3g}" for number in (speed, discharge)]
+        length = "-" if _is_nan(roughness) else f"{roughness:.3g}"
+        return [words, length, *numbers, interval]
+
+    ends = [row[f"discharge{end}_m2_s"] for end in ("_low", "_high")]
+    has_interval = not any(map(_is_nan, ends))
+    interval = apart(ends[0], ends[1], 2, "g") if has_interval else "-"
+    channel = row[CHANNEL]
+    rows = [cells("the answer", channel, row["mean_velocity_m_s"], interval)]
+    roughnesses = (row["d84_m"] / 10, math.nan, row["z0_m"])
+    for (column, words), roughness in zip(
+        BESIDE_CHANNEL.items(), roughnesses, strict=True
+    ):
+        rows.append(cells(words, roughness, row[column], ""))
+    heads = ["channel", "z0, m", "mean velocity, m/s", "discharge, m2/s", "interval"]
+    yield from table(rows, heads)
+    d84 = row["d84_m"]
+    of_grain = ", taken for d (--d84)" if d84 == row["d_m"] else ""
+    yield f"depth {row['depth_m']:.3g} m, d84 {d84:.3g} m{of_grain}"
+    said = "All of the stress is taken to act on the grains: where ripples, bars or "
+    said += "plants take a part of it, motion starts at a higher velocity."
+    yield from textwrap.wrap(said, 79)
 
 
 def _of_many(rows: Sequence["Row"], asked: str, varied: Sequence[str]) -> Iterator[str]:

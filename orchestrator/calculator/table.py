@@ -13,6 +13,8 @@ from orchestrator.calculator import (
     BY_FLUID,
     CRITERIA,
     ENTRAINED,
+    LENGTHS,
+    OF_FLOW,
     OF_FLUID,
     PARAMETERS,
     QUANTITIES,
@@ -27,7 +29,12 @@ from orchestrator.physics.beside import (
     compared_level_ustar,
     compared_with,
 )
-from orchestrator.physics.constants import GAS_BELOW, GRAIN_COLUMNS
+from orchestrator.physics.constants import (
+    CHANNEL,
+    GAS_BELOW,
+    GRAIN_COLUMNS,
+    SLOPE,
+)
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import DEFAULT, LAWS, law
 from orchestrator.physics.onset import Onset, of_grains
@@ -55,7 +62,6 @@ def thresholds(
     points: Mapping[str, Any],
     asked: str = AUTO,
     criterion: str = BY_FLUID,
-    bed_slope: float | None = None,
 ) -> Table:
     """Find the thresholds of single grains under every force law.
 
@@ -64,7 +70,8 @@ def thresholds(
     points
         Sequences of equal length by keys of `PARAMETERS`. A parameter that is left out
         has its default, and the depth none. Without a number of the fluid it is the
-        paper's gas.
+        paper's gas. Of a channel that falls by ``bed_slope`` the depth and the mean
+        velocity are those of its uniform flow.
     asked
         The law that is asked for, ``auto`` for the default law, or ``paper`` for the
         paper's rule.
@@ -72,9 +79,6 @@ def thresholds(
         What a grain must do: one of `CRITERIA`, or `BY_FLUID`. Grains that go on leave
         their pockets in a gust of `gusts.PEAK` times the mean stress, and roll and hop
         on after it; their threshold is the larger of the two mean stresses.
-    bed_slope
-        Slope at which a channel falls, whatever its sign: the depth and the mean
-        velocity are then those of its uniform flow.
 
     Returns
     -------
@@ -108,9 +112,10 @@ def thresholds(
         remedy = f"take the criterion {ENTRAINED}, or another law"
         raise InputError(what, "threshold: criterion", remedy)
     if "depth" in points:
-        if bed_slope is not None:
-            remedy = "leave --depth out: it follows from the slope"
-            raise InputError("both a depth and a bed slope", "--bed-slope", remedy)
+        if "bed_slope" in points:
+            what = "both a depth and a bed slope"
+            remedy = "leave the depth out: it follows from the slope"
+            raise InputError(what, "threshold: bed_slope", remedy)
         _check_depth(grains)
     # numbers beyond all floats end as laws that do not hold
     with np.errstate(all="ignore"):
@@ -120,14 +125,14 @@ def thresholds(
         reason = f"{table['law'][place]}: {verdict.texts(against[place])}"
         remedy = "write all numbers in SI units"
         raise InputError(f"no force law holds; {reason}", "threshold", remedy)
-    if bed_slope is not None:
-        table |= river.uniform_flow(table, bed_slope)
+    if SLOPE in table:
+        table |= river.uniform_flow(table)
         for row, text in enumerate(river.against_depths(table)):
             if text:
                 against[row].append(Reason("depth", text))
                 table["valid"][row] = False
     _judge(table, against)
-    return table | _reported(table)
+    return table | river.beside(table) | _reported(table)
 
 
 def _check_criterion(criterion: str) -> None:
@@ -145,7 +150,9 @@ def _of_all_laws(
 
     Beside them is what the law of each row has against it.
     """
-    inputs = {each.column: grains[name] for name, each in PARAMETERS.items()}
+    inputs = {
+        each.column: grains[name] for name, each in PARAMETERS.items() if name in grains
+    }
     grain = Grain.of_table(inputs)
     level = grain.changed(slope_deg=0.0)
     by_law = {name: of_grains(grain, name, criterion) for name in LAWS}
@@ -231,7 +238,7 @@ def _judge(table: Table, against: Sequence[Sequence[Reason]]) -> None:
     with np.errstate(all="ignore"):
         reynolds = open_water_reynolds(
             table["ustar_m_s"],
-            roughness=table["z0_m"],
+            roughness=table[CHANNEL],
             viscosity=table["nu_m2_s"],
             depth=table["depth_m"],
         )
@@ -312,16 +319,25 @@ def _grains(points: Mapping[str, Any]) -> Table:
     given = {}
     for name, parameter in PARAMETERS.items():
         given[name] = points.get(name, [parameter.default] * count)
-    lengths = list(map(_length, given["roughness"], given["diameter"]))
+    if "bed_slope" not in points:
+        del given["bed_slope"]
+    lengths = {}
+    for name in LENGTHS:
+        lengths[name] = list(map(_length, given[name], given["diameter"]))
     grains = {}
-    for name, column in {**given, "roughness": lengths}.items():
+    for name, column in {**given, **lengths}.items():
         grains[name] = np.array(column, float)
     for index in np.flatnonzero(~_is_ordinary(grains)):
         point = {name: column[index] for name, column in given.items()}
         grain = _as_scene(point)
         for name in GRAIN_COLUMNS:
             grains[name][index] = getattr(grain, name)
-    return grains
+    has_depth = ~np.isnan(grains.get("bed_slope", grains["depth"]))
+    is_channel = has_depth & (grains["fluid_density"] >= GAS_BELOW)
+    for name in ("channel_roughness", "d84"):
+        if name not in points:
+            del grains[name]
+    return grains | river.roughnesses(grains, is_channel)
 
 
 def _is_ordinary(grains: Table) -> NDArray[np.bool_]:
@@ -329,7 +345,7 @@ def _is_ordinary(grains: Table) -> NDArray[np.bool_]:
     is_ordinary = grains["density"] > grains["fluid_density"]
     is_ordinary &= grains["roughness"] <= 0.3 * grains["diameter"]
     for name, parameter in PARAMETERS.items():
-        if name != "depth":
+        if name not in OF_FLOW:
             low, high = parameter.ordinary
             is_ordinary &= (grains[name] >= low) & (grains[name] <= high)
     return np.asarray(is_ordinary)
@@ -356,8 +372,10 @@ def _as_scene(point: Mapping[str, Any]) -> Grain:
 def _length(roughness: Any, diameter: float) -> float:
     """A roughness length, m, of a number or of such a part of the diameter as ``d/30``.
 
-    NaN of any other text.
+    NaN of any other text, and of None.
     """
+    if roughness is None:
+        return np.nan
     if not isinstance(roughness, str):
         return float(roughness)
     part = re.fullmatch(r"d/([1-9]\d*(?:\.\d+)?)", roughness, re.ASCII)

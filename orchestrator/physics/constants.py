@@ -28,3 +28,8 @@ GRAIN_COLUMNS = {
     "cohesion": "cohesion_n_m",
 }
 """Columns of tables with the quantities of `Grain`, by its attributes."""
+CHANNEL = "z0_channel_m"
+"""Column of the roughness length of the channel or the ground, from which the speeds of
+a flow follow, where it is another than that of the grain's pocket."""
+SLOPE = "bed_slope"
+"""Column of the slope at which a channel falls, whose depth follows from the flow."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orchestrator.physics.beside import SUSTAINED
-from orchestrator.physics.constants import GAS_BELOW
+from orchestrator.physics.constants import CHANNEL, GAS_BELOW, SLOPE
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.types import BoolArray, FloatArray
@@ -24,10 +24,11 @@ REPORTED = {
     "wind_10m": "_m_s",
     "mean_velocity": "_m_s",
     "depth": "_m",
+    "discharge": "_m2_s",
 }
 """Quantities by which thresholds are reported, with the unit in names of columns."""
-SLOPE = "bed_slope"
-"""Column of the slope at which a channel falls, whose depth follows from the flow."""
+OF_CHANNELS = ("depth", "discharge")
+"""Those of `REPORTED` that a channel alone has, of the calculator."""
 MEASURED, NUMERICAL, SEEDS, OF_LAWS = (
     "measured thresholds",
     "numerical",
@@ -53,13 +54,15 @@ def every_unit(ustar: ArrayLike, flow: Any) -> dict[str, FloatArray]:
     flow
         A table, a row or a mapping of columns of fluid and bed, which broadcast with
         them: density, viscosity, roughness length, depth, ``flow_top`` of a closed
-        channel, and `SLOPE` of one whose depth follows from the flow.
+        channel, `CHANNEL` of a bed with two roughnesses, and `SLOPE` of a channel whose
+        depth follows from the flow.
 
     Returns
     -------
     dict of str to ndarray
-        Friction velocity, stress on the bed, depth of the flow of a slope, and the
-        speeds of `measurable_speeds`, by their columns.
+        Friction velocity, stress on the bed, depth of the flow of a slope, the speeds
+        of `measurable_speeds`, and over a `CHANNEL` the discharge for each metre of
+        width, by their columns.
 
     Examples
     --------
@@ -80,14 +83,17 @@ def every_unit(ustar: ArrayLike, flow: Any) -> dict[str, FloatArray]:
     is_closed = False
     if "flow_top" in flow:
         is_closed = np.asarray(flow["flow_top"], object) == CLOSED_CHANNEL
+    roughness = flow[CHANNEL] if CHANNEL in flow else flow["z0_m"]
     speeds = measurable_speeds(
         speed,
-        roughness=np.asarray(flow["z0_m"], float),
+        roughness=np.asarray(roughness, float),
         fluid_density=density,
         viscosity=np.asarray(flow["nu_m2_s"], float),
         depth=depth,
         closed=is_closed,
     )
+    if CHANNEL in flow:
+        found["discharge_m2_s"] = np.asarray(speeds["mean_velocity_m_s"] * depth)
     return found | speeds
 
 
@@ -106,7 +112,8 @@ def in_units(
     Returns
     -------
     dict of str to ndarray
-        Those of `REPORTED`, and the depth of the flow of a slope.
+        Those of `REPORTED`, with the depth of the flow of a slope and the discharge
+        over a `CHANNEL`.
 
     Examples
     --------

@@ -17,7 +17,12 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import ArrayLike
 
-from orchestrator.physics.constants import GAS_BELOW, INVERSE_KARMAN, KARMAN
+from orchestrator.physics.constants import (
+    GAS_BELOW,
+    INVERSE_KARMAN,
+    KARMAN,
+    SAND_GRAIN,
+)
 from orchestrator.types import FloatArray
 
 SMOOTH_WALL = 1 / 9
@@ -32,6 +37,10 @@ u* k_s/nu = 70 with k_s = 30 z0 (Nikuradse).
 """
 LAMINAR_BELOW = 2000.0
 """U D/nu below which open water may be laminar, and has no logarithmic profile."""
+COARSE = 3.0
+"""Nikuradse's roughness of a gravel bed over d84."""
+STRICKLER = 21.1
+"""Strickler's coefficient of a bed of a median grain of 1 m, m^(1/3)/s."""
 HIDDEN = 1e-9
 """Least part of a grain's height that is exposed.
 
@@ -148,6 +157,64 @@ def depth_mean_speed(
     part = np.asarray(roughness, float) / (np.asarray(depth, float) / profiles)
     mean = (1 + part) * np.log1p(1 / part) - 1
     return np.asarray(np.asarray(ustar, float) / KARMAN * mean)
+
+
+def coarse_roughness(d84: ArrayLike) -> FloatArray:
+    """Compute the roughness length of a channel from the coarse grains of its bed.
+
+    Nikuradse's roughness of a gravel bed is about 3 d84, several times that of equal
+    grains: coarse grains, clusters and small forms take a part in it.
+
+    Parameters
+    ----------
+    d84
+        Diameter that 84 % by mass of the bed are finer than, m.
+
+    Returns
+    -------
+    FloatArray
+        Roughness length z0 = 3 d84/30, m, of the same shape.
+
+    Examples
+    --------
+    >>> print(coarse_roughness([0.03, 0.053]).round(6))
+    [0.003  0.0053]
+    """
+    return np.asarray(COARSE * np.asarray(d84, float) / SAND_GRAIN)
+
+
+def strickler_speed(
+    ustar: ArrayLike, depth: ArrayLike, diameter: ArrayLike, gravity: ArrayLike
+) -> FloatArray:
+    """Compute the depth-averaged speed of wide water by Strickler's formula.
+
+    ``U = K h^(2/3) S^(1/2)`` with ``K = 21.1/d^(1/6)`` in SI units, and the slope
+    ``S = ustar^2/(g h)`` of the stress.
+
+    Parameters
+    ----------
+    ustar
+        Friction velocity, m/s.
+    depth
+        Depth h, m.
+    diameter
+        Median diameter d of the bed, m.
+    gravity
+        Acceleration of gravity, m/s2.
+
+    Returns
+    -------
+    FloatArray
+        Depth-averaged speed, m/s, of the broadcast shape.
+
+    Examples
+    --------
+    >>> print(strickler_speed(0.154, 0.6, 0.03, 9.81).round(2))
+    1.71
+    """
+    coefficient = STRICKLER / np.asarray(diameter, float) ** (1 / 6)
+    of_depth = np.asarray(depth, float) ** (1 / 6) / np.sqrt(gravity)
+    return np.asarray(coefficient * of_depth * np.asarray(ustar, float))
 
 
 def measurable_speeds(

@@ -18,6 +18,7 @@ from orchestrator.physics.beside import (
     OF_TUNNELS,
     SUSTAINED,
 )
+from orchestrator.physics.constants import CHANNEL
 from orchestrator.physics.fluids import is_gas
 from orchestrator.physics.reported import COUNT, IN_GAS, MEASURED, OF_LAWS, SEEDS
 from orchestrator.report.card import Card, Number, Worth, decimals
@@ -190,9 +191,16 @@ def numbers_of_grain(row: Row, told: ReportedQuantity) -> tuple[Number, ...]:
         Speed, friction velocity and stress, each with its interval.
     """
     theta = float(row["shields"])
+    ground = "bare, level ground"
+    channel = known_number(row.get(CHANNEL))
+    if channel > 0 and channel != float(row["z0_m"]):
+        ground = f"level ground of z₀ {length(channel)}"
+    over = place_of_quantity(MEAN, row) if told is MEAN else ""
+    if over and channel > 0:
+        over = f"{over}; z₀ of the channel {length(channel)}"
     notes = {
-        WIND: "10 m above bare, level ground",
-        MEAN: place_of_quantity(MEAN, row) if told is MEAN else "",
+        WIND: f"10 m above {ground}",
+        MEAN: over,
         DEPTH: "of the uniform flow whose weight along the slope is that stress",
         USTAR: "√(τ_b/ρ), the bed shear stress as a speed",
         STRESS: f"τ_b, of the undisturbed flow; critical Shields number "

@@ -22,7 +22,7 @@ from orchestrator import digits
 from orchestrator.errors import OrchestratorError
 from orchestrator.grains.pile import Pile
 from orchestrator.physics import beside, verdict
-from orchestrator.physics.reported import REPORTED
+from orchestrator.physics.reported import OF_CHANNELS, REPORTED
 from orchestrator.plan import Plan
 from orchestrator.runs.files import Folder
 from orchestrator.study import fields
@@ -207,7 +207,7 @@ def missing(tables: Mapping[str, pd.DataFrame]) -> list[str]:
     """
     reported = {*verdict.COLUMNS, "interval_of"}
     for stem, unit in REPORTED.items():
-        if stem != "depth":
+        if stem not in OF_CHANNELS:
             ends = (stem, f"{stem}_low", f"{stem}_high", f"compared_{stem}")
             reported |= {name + unit for name in ends}
     columns = {

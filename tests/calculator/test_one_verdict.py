@@ -13,7 +13,7 @@ from orchestrator import plan, tables
 from orchestrator.calculator import answer
 from orchestrator.calculator.table import thresholds
 from orchestrator.physics.laws import LAWS
-from orchestrator.physics.reported import OF_LAWS, REPORTED
+from orchestrator.physics.reported import OF_CHANNELS, OF_LAWS, REPORTED
 from orchestrator.report import answers, sheets
 from orchestrator.report.results import Results
 from orchestrator.study import study
@@ -66,7 +66,7 @@ OTHERS = (
     *("verdict", "shields_low", "shields_high", "interval_of", "interval_laws"),
 )
 """Columns that a row of either command has."""
-UNITS = [(stem, unit) for stem, unit in REPORTED.items() if stem != "depth"]
+UNITS = [(stem, unit) for stem, unit in REPORTED.items() if stem not in OF_CHANNELS]
 REPORTED_AS = [
     f"{stem}{end}{unit}" for stem, unit in UNITS for end in ("_low", "_high")
 ]
