@@ -32,8 +32,7 @@ from orchestrator.grains.sheltering import Shelter
 from orchestrator.physics import threshold
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import LAWS
-from orchestrator.physics.roots import root
-from orchestrator.physics.threshold import LIFT_OFF, check_known, thresholds_of
+from orchestrator.physics.threshold import LIFT_OFF, check_known, root, thresholds_of
 from orchestrator.runs.files import state_of
 from orchestrator.study import methods
 from orchestrator.study.closed_form import closed_form, single_grain

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from orchestrator.bed.packing import Packing
 from orchestrator.digits import SLACK
-from orchestrator.physics.roots import root
+from orchestrator.physics.threshold import root
 from orchestrator.types import FloatArray, IntArray
 
 GRAINS = 10

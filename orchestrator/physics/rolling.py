@@ -13,15 +13,17 @@ like, with z0 = d/30. Factors lead to other beds.
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from orchestrator.physics.constants import SAND_GRAIN
 from orchestrator.physics.grain import Grain
-from orchestrator.physics.nodes import Nodes
 from orchestrator.types import FloatArray
+
+if TYPE_CHECKING:
+    from scipy.interpolate import RegularGridInterpolator
 
 TABLE = Path(__file__).with_name("rolling.csv")
 """Shields numbers on level beds."""
@@ -119,7 +121,7 @@ def sustained(grains: Grain, end: End = "middle") -> Sustained:
         }
     # numbers that are not known stay so
     inside = np.clip(point, ends[:, :1], ends[:, 1:])
-    found = np.exp(table.at(*inside))
+    found = np.exp(table(inside.T)).T
     for kind, value in values.items():
         factors = _factors(kind)
         found = found * factors.at(inside, value)
@@ -129,33 +131,39 @@ def sustained(grains: Grain, end: End = "middle") -> Sustained:
 class _Factors:
     """Factors of both numbers over a value, Galileo number and density ratio."""
 
-    def __init__(self, table: Nodes) -> None:
-        """Take them at nodes of value, Galileo number and density ratio."""
-        self.table = table
+    def __init__(self, axes: list[FloatArray], numbers: FloatArray) -> None:
+        """Make them of nodes of value, Galileo number and density ratio."""
+        from scipy.interpolate import RegularGridInterpolator  # slow to import
+
+        self.axes = axes
+        self.table = RegularGridInterpolator(axes, numbers)
 
     def at(self, point: FloatArray, value: FloatArray) -> FloatArray:
         """The factors at some points, shape (2, n); beyond the nodes a line goes on."""
-        nodes, *others = self.table.axes
+        nodes, *others = self.axes
         place = np.clip(np.searchsorted(nodes, value) - 1, 0, len(nodes) - 2)
         low, high = nodes[place], nodes[place + 1]
         inside = [
             np.clip(each, axis[0], axis[-1])
             for each, axis in zip(point, others, strict=True)
         ]
-        of_low, of_high = (self.table.at(end, *inside) for end in (low, high))
-        part = (value - low) / (high - low)
-        return np.asarray(np.maximum(of_low + part * (of_high - of_low), 0))
+        of_low = self.table(np.column_stack([low, *inside]))
+        of_high = self.table(np.column_stack([high, *inside]))
+        part = ((value - low) / (high - low))[:, None]
+        return np.asarray(np.maximum(of_low + part * (of_high - of_low), 0)).T
 
 
 @cache
-def _level(end: End) -> tuple[Nodes, FloatArray]:
+def _level(end: End) -> tuple["RegularGridInterpolator", FloatArray]:
     """Logarithms of both numbers on level beds, and the ends of their axes."""
+    from scipy.interpolate import RegularGridInterpolator  # slow to import
+
     rows = np.genfromtxt(TABLE, delimiter=",", names=True)
     axes = [np.unique(rows[name]) for name in ("galileo", "density_ratio")]
     both = np.column_stack([rows[name] for name in COLUMNS[end]])
     shape = [len(axis) for axis in axes]
     logs = [np.log(axis) for axis in axes]
-    table = Nodes(logs, np.log(both).reshape(*shape, 2))
+    table = RegularGridInterpolator(logs, np.log(both).reshape(*shape, 2))
     return table, np.array([[each[0], each[-1]] for each in logs])
 
 
@@ -172,4 +180,4 @@ def _factors(kind: str) -> _Factors:
     nodes = [np.unique(np.log(value) if is_ratio else value)]
     axes = [*nodes, np.unique(np.log(galileo)), np.unique(np.log(density))]
     shape = [len(axis) for axis in axes]
-    return _Factors(Nodes(axes, np.column_stack([start, after]).reshape(*shape, 2)))
+    return _Factors(axes, np.column_stack([start, after]).reshape(*shape, 2))

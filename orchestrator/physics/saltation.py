@@ -20,7 +20,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,8 +29,10 @@ from orchestrator.physics import velocity
 from orchestrator.physics.constants import SAND_GRAIN
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import CLIFT_GAUVIN
-from orchestrator.physics.nodes import Nodes
 from orchestrator.types import BoolArray, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from scipy.interpolate import RegularGridInterpolator
 
 ADDED_MASS = 0.5
 """Added mass of a sphere, in masses of the fluid that it displaces."""
@@ -786,7 +788,7 @@ def _interpolated(grains: Grain) -> FloatArray:
     below = np.minimum(below, len(SLOPE_NODES_DEG) - 2)
     ends = SLOPE_NODES_DEG[below], SLOPE_NODES_DEG[below + 1]
     table = _table()
-    gentle, steep = (np.exp(table.at(galileo, density, end)) for end in ends)
+    gentle, steep = (np.exp(table((galileo, density, end))).T for end in ends)
     part = (slope - ends[0]) / (ends[1] - ends[0])
     return np.asarray(gentle + part * (steep - gentle))
 
@@ -828,10 +830,12 @@ LOG_OF_NOTHING = -1e300
 
 
 @cache
-def _table() -> Nodes:
+def _table() -> "RegularGridInterpolator":
     """Logarithms of the thresholds, steady and of cessation, on the table's axes."""
+    from scipy.interpolate import RegularGridInterpolator  # slow to import
+
     both = np.loadtxt(TABLE, delimiter=",", skiprows=1)
     with np.errstate(divide="ignore"):  # of 0, below `LEAST`
         logarithms = np.maximum(np.log(both), LOG_OF_NOTHING)
     shape = [len(nodes) for nodes in _AXES]
-    return Nodes(_AXES, logarithms.reshape(*shape, 2))
+    return RegularGridInterpolator(_AXES, logarithms.reshape(*shape, 2))

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +17,6 @@ from orchestrator.physics.laws import (
     Validity,
     reasons,
 )
-from orchestrator.physics.roots import Excess, root
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
 Regime = Literal["low", "high", "transition"]
@@ -176,6 +175,50 @@ def standing_out(
     squared_height = ((1 + size) / 2) ** 2 - half_gap**2
     centre = np.sqrt(np.maximum(squared_height, 0.0))
     return np.asarray((centre + size / 2 - 0.5) / size)
+
+
+class Excess(Protocol):
+    """A function of some of n grains: what forces have beyond that which holds."""
+
+    def __call__(self, x: FloatArray, places: IntArray, /) -> FloatArray:
+        """Compute it for the grains at some places, each for its own x."""
+        ...
+
+
+def root(function: Excess, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Find a root of each of n grains.
+
+    Parameters
+    ----------
+    function
+        The function.
+    low, high
+        Bounds of different signs, shape (n,).
+
+    Returns
+    -------
+    FloatArray
+        The roots, shape (n,), right to the last digits; NaN, not known, where none is
+        found.
+
+    Examples
+    --------
+    >>> squares = np.array([2.0, 3.0])
+    >>> found = root(lambda x, at: x**2 - squares[at], np.zeros(2), np.full(2, 4.0))
+    >>> print(found.round(6))
+    [1.414214 1.732051]
+    """
+    from scipy.optimize.elementwise import find_root  # slow to import: no page waits
+
+    if not len(low):
+        return np.zeros(0)
+
+    def of_floats(x: FloatArray, places: FloatArray) -> FloatArray:
+        """The function of places that became floats as all arguments do."""
+        return function(x, places.astype(int))
+
+    found = find_root(of_floats, (low, high), args=(np.arange(len(low)),))
+    return np.where(found.success, found.x, np.nan)
 
 
 def least_ustar(excess: Excess, unit: FloatArray) -> FloatArray:

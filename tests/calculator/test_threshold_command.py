@@ -458,7 +458,7 @@ STARTED = """
 import sys
 from orchestrator import cli
 assert cli.main(["threshold", "--diameter", "3e-4", "--fluid", sys.argv[1]]) == 0
-slow = {"filelock", "jinja2", "matplotlib", "pandas", "pydantic", "pyvista", "scipy"}
+slow = {"filelock", "jinja2", "matplotlib", "pandas", "pydantic", "pyvista"}
 print("imported:", *sorted(slow & set(sys.modules)))
 """
 

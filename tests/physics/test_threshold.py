@@ -16,6 +16,7 @@ from orchestrator.physics.threshold import (
     Threshold,
     check_known,
     least_ustar,
+    root,
     shields_at,
     threshold,
 )
@@ -319,6 +320,18 @@ def test_a_lift_lowers_the_threshold() -> None:
     without_lift = threshold(LAWS["bridged"], grain.changed(lift_coefficient=0.0))
     lifted = water(3e-4).friction_velocity
     assert float(lifted) < float(without_lift.friction_velocity)
+
+
+def test_a_root_that_is_not_found_is_not_known() -> None:
+    """The last place tried was told as the root."""
+    target = np.array([0.5, 8.0, 100.0])
+
+    def cubes(x: FloatArray, at: IntArray) -> FloatArray:
+        return np.where(x > 1.5, np.nan, x**3 - target[at])
+
+    found = root(cubes, np.zeros(3), np.array([1.0, 4.0, 1.0]))
+    assert found[0] == pytest.approx(0.5 ** (1 / 3), rel=1e-12)
+    assert np.isnan(found[1:]).all()
 
 
 class Blind(Bridged):
