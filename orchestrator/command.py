@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from orchestrator.errors import suggestion
 from orchestrator.runs import processors
@@ -99,6 +99,22 @@ class Command:
             lines += [f"  orchestrator {line}", f"      {meaning}"]
         parser.ending = "\n".join([*lines, "", f"explained in {self.page}"])
         self.options(parser)
+
+
+class Extension(NamedTuple):
+    """Options that a guest adds to a command of the core, and what they run.
+
+    Attributes
+    ----------
+    options
+        Adds the options to the parser of the command.
+    run
+        Runs the command where one of them is given, and returns the exit code, or None
+        where none is.
+    """
+
+    options: Callable[[Parser], None]
+    run: Callable[[Namespace], int | None]
 
 
 def add_run_options(command: Parser, preset: str, of: str = "command") -> None:

@@ -12,7 +12,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.command import Command
+from orchestrator.command import Command, Extension
 
 if TYPE_CHECKING:
     from orchestrator.report.page import Guest
@@ -41,6 +41,8 @@ class Offer:
     take_over
         Runs a command on a study of its beds, and returns its exit code, or None for
         other beds; None for a guest without beds.
+    threshold
+        What it adds to the command `threshold`; None for nothing.
     """
 
     commands: tuple[Command, ...] = ()
@@ -48,6 +50,7 @@ class Offer:
     beds: "Beds" = field(default_factory=dict)
     figures: str = ""
     take_over: "Callable[[Study[Any], Namespace], int | None] | None" = None
+    threshold: Extension | None = None
 
 
 def offers() -> Iterator[Offer]:

@@ -4,6 +4,7 @@ import argparse
 import itertools
 import math
 import sys
+from typing import TYPE_CHECKING
 
 from orchestrator.calculator import (
     BY_FLUID,
@@ -19,6 +20,9 @@ from orchestrator.command import Parser
 from orchestrator.errors import InputError
 from orchestrator.physics.fluids import KINDS, PAPER, STANDARD_DEG_C
 from orchestrator.study.units import meant, number
+
+if TYPE_CHECKING:  # this loads numpy
+    from orchestrator.calculator.table import Table
 
 OPTIONS = {
     name: f"--{name.removesuffix('_deg').replace('_', '-')}"
@@ -101,8 +105,10 @@ def _help(name: str) -> str:
     return "; ".join(parts)
 
 
-def run(options: argparse.Namespace) -> int:
-    """Print the thresholds that the options ask for, and questions on them.
+def table_of(
+    options: argparse.Namespace,
+) -> tuple["Table", dict[str, list[Value]]]:
+    """Find the thresholds that the options ask for, and print questions on them.
 
     Parameters
     ----------
@@ -111,8 +117,10 @@ def run(options: argparse.Namespace) -> int:
 
     Returns
     -------
-    int
-        The exit code.
+    table
+        The thresholds, by every law.
+    axes
+        The values of each parameter that is given.
 
     Raises
     ------
@@ -146,6 +154,28 @@ def run(options: argparse.Namespace) -> int:
     )
     if questions:
         print(f"orchestrator: {'; '.join(questions)}", file=sys.stderr)
+    return table, axes
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print the thresholds that the options ask for, and questions on them.
+
+    Parameters
+    ----------
+    options
+        The options of the command.
+
+    Returns
+    -------
+    int
+        The exit code.
+
+    Raises
+    ------
+    InputError
+        If an option or a range is refused.
+    """
+    table, axes = table_of(options)
     if options.csv:
         print_csv(table)
         return 0

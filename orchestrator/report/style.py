@@ -474,7 +474,7 @@ def saved(figure: Figure, folder: Folder, *, png: bool = False) -> Figure:
     """
     raster = b""
     if png and figure.canvas is not None:
-        raster = _png(figure.canvas)
+        raster = as_png(figure.canvas)
         folder.put(f"{FIGURES}/{figure.name}.png", raster)
         figure.canvas.set_layout_engine("none")  # it is laid out now
     made = drawn(figure)
@@ -502,7 +502,19 @@ def drawn(figure: Figure) -> Figure:
     return replace(figure, drawing=None, image=svg(canvas), part=part)
 
 
-def _png(drawn: Canvas) -> bytes:
+def as_png(drawn: Canvas) -> bytes:
+    """Draw a figure as PNG.
+
+    Parameters
+    ----------
+    drawn
+        The figure.
+
+    Returns
+    -------
+    bytes
+        The image.
+    """
     out = BytesIO()
     agg: Any = FigureCanvasAgg(drawn)
     agg.print_png(out, metadata={"Software": None})

@@ -4,11 +4,13 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from orchestrator.command import Extension
 from orchestrator.errors import InputError
 from orchestrator.guests import Offer
 from orchestrator.study.hints import HINTS
 
 if TYPE_CHECKING:
+    from orchestrator.command import Parser
     from orchestrator.study.study import Kind, Study
 
 TRUTH = ("ridge", "turn", "interval", "piles", "askervein")
@@ -54,6 +56,31 @@ def take_over(study: "Study[Any]", options: Namespace) -> int | None:
     return SurfaceMotion(study).command(options, out)
 
 
+def _stress_options(command: "Parser") -> None:
+    """Add the options of a map of the stress over the threshold."""
+    group = command.add_argument_group("a map of the stress over the threshold")
+    text = "raster of bed stress, GeoTIFF or .asc, as a hydraulic model writes it"
+    group.add_argument("--stress", type=Path, metavar="FILE", help=text)
+    text = "its unit; default: that which the file names, else Pa"
+    group.add_argument("--stress-unit", metavar="UNIT", help=text)
+    text = "directory of the map; default: results/stress- and the name of the file"
+    group.add_argument("--out", type=Path, metavar="DIR", help=text)
+
+
+def _stress_map(options: Namespace) -> int | None:
+    """Map the stress over the threshold, where a raster of stress is given."""
+    if options.stress is None:
+        for name in ("stress_unit", "out"):
+            if getattr(options, name) is not None:
+                option = f"--{name.replace('_', '-')}"
+                remedy = "leave it out, or name a raster: --stress FILE"
+                raise InputError("there is no map without a raster", option, remedy)
+        return None
+    from orchestrator.surface.stress_map import run
+
+    return run(options)
+
+
 def _hint(table: str, name: str) -> tuple[str, str] | None:
     """Say that a key of a study file is one of beds in three dimensions."""
     from orchestrator.surface.study import TABLES
@@ -73,4 +100,8 @@ def _surfaces() -> "Kind[Any]":
 
 
 HINTS.append(_hint)
-OFFER = Offer(beds={"surface": _surfaces}, take_over=take_over)
+OFFER = Offer(
+    beds={"surface": _surfaces},
+    take_over=take_over,
+    threshold=Extension(_stress_options, _stress_map),
+)

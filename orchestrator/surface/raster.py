@@ -6,8 +6,9 @@ rasterio reads GeoTIFF and ESRI ASCII grids, and writes the maps.
 import re
 import warnings
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,7 +27,7 @@ from orchestrator.surface.heights import (
 )
 from orchestrator.surface.points import read_points
 from orchestrator.surface.triangles import read_triangles
-from orchestrator.types import FloatArray
+from orchestrator.types import BoolArray, FloatArray
 
 LARGEST = 2**28
 """Most bytes of a file."""
@@ -140,6 +141,79 @@ def _check_heights(z: FloatArray, remedy: str, where: str) -> None:
             raise InputError(what, where, remedy.format(value))
 
 
+@contextmanager
+def opened_raster(path: Path, where: str) -> Iterator["Opened"]:
+    """Open a GeoTIFF or an ESRI grid, of whatever quantity.
+
+    Parameters
+    ----------
+    path
+        The file; its ending says what it is.
+    where
+        The file and the field that names it, for messages.
+
+    Yields
+    ------
+    Opened
+        The file.
+
+    Raises
+    ------
+    InputError
+        If it is neither, or cannot be read.
+    """
+    if not path.is_file():
+        raise InputError("there is no such file", where, "a GeoTIFF, or .asc")
+    ending = path.suffix.lower()
+    if ending == ".asc":
+        with _grid(path, where) as opened:
+            yield opened
+    elif ending in (".tif", ".tiff"):
+        with _opened(path, "GTiff", where) as dataset:
+            yield Opened(dataset, dataset.crs, dataset.nodata)
+    else:
+        what = f"the ending {ending!r} is of no raster"
+        raise InputError(what, where, "endings: .tif .tiff (GeoTIFF), .asc (ESRI)")
+
+
+class Opened(NamedTuple):
+    """A raster as rasterio opens it.
+
+    Attributes
+    ----------
+    dataset
+        The file.
+    system
+        Its coordinate reference system; None without one.
+    empty
+        The number of its empty cells; None where no number stands for them.
+    """
+
+    dataset: Any
+    system: Any
+    empty: float | None
+
+
+def is_empty(values: FloatArray, empty: float | None) -> BoolArray:
+    """Tell which cells of a raster have the number of empty ones.
+
+    Parameters
+    ----------
+    values
+        The numbers as they are stored.
+    empty
+        The number of empty cells; None for none.
+
+    Returns
+    -------
+    ndarray
+        Truth values, of the same shape.
+    """
+    if empty is None:
+        return np.zeros(np.shape(values), bool)
+    return np.isclose(values, empty, rtol=NEAR_EMPTY, atol=0.0)
+
+
 def _of_geotiff(path: Path, where: str) -> Raster:
     """The raster of a GeoTIFF of one band."""
     with _opened(path, "GTiff", where) as dataset:
@@ -195,12 +269,10 @@ def _raster(
     except library.errors.RasterioError as error:
         what = f"its heights are not readable: {error}"
         raise InputError(what, where, "is the file cut off?") from None
-    is_empty = np.ma.getmaskarray(stored)
     values = np.ma.getdata(stored).astype(float)
-    if empty is not None:
-        is_empty = is_empty | np.isclose(values, empty, rtol=NEAR_EMPTY, atol=0.0)
+    lacks = np.ma.getmaskarray(stored) | is_empty(values, empty)
     heights = values * dataset.scales[0] + dataset.offsets[0]
-    heights[is_empty] = np.nan
+    heights[lacks] = np.nan
     return Raster(name, x, y, heights[::-1], system.to_wkt() if system else "")
 
 
@@ -261,6 +333,13 @@ def _units(described: Mapping[str, Any]) -> Iterator[tuple[str, str, float | Non
 
 def _of_grid(path: Path, where: str) -> Raster:
     """The raster of an ESRI ASCII grid."""
+    with _grid(path, where) as (dataset, system, empty):
+        return _raster(dataset, path.name, system, empty, where)
+
+
+@contextmanager
+def _grid(path: Path, where: str) -> Iterator[Opened]:
+    """An ESRI ASCII grid as rasterio opens it."""
     system = _system_beside(path.with_suffix(".prj"), where)
     text = decoded(read_bytes(path, LARGEST, where), where)
     empty = _check_grid(text, where)
@@ -269,7 +348,7 @@ def _of_grid(path: Path, where: str) -> Raster:
     # numbers as they are written: 32-bit ones have seven digits
     precise = {"DATATYPE": "Float64"}
     with memory, _opened(memory.name, "AAIGrid", where, **precise) as dataset:
-        return _raster(dataset, path.name, system, empty, where)
+        yield Opened(dataset, system, empty)
 
 
 def _check_grid(text: str, where: str) -> float | None:
