@@ -1,10 +1,11 @@
-"""The exponent of hiding on poured strips of sand, by the definitions of a class's threshold.
+"""The exponent of hiding on poured strips of sand, read where the balance of the drags holds.
 
-python tools/hiding.py DIRECTORY [STRIPS] > docs/measured/hiding.csv
+python tools/hiding.py DIRECTORY [STRIPS] > orchestrator/lab/measured/hiding.csv
 
-Strips are those of the preset `validate`, with seeds from 0; each is poured in some 20 s of one core,
-and those that are there are not poured again. A row is a model of the forces and a definition: p of
-theta_i ~ (D_i/D_50)^p, with the standard deviation of `RESAMPLES` bootstraps of the grains.
+Strips are those of the preset `validate`, with seeds from 0; each is poured in some 25 s of one core,
+and those that are there are not poured again. A row is a model of the forces and an exponent m of the
+parts D_i^-m of the classes: p of theta_i ~ (D_i/D_50)^p, with the standard deviation of `RESAMPLES`
+bootstraps of the strips. `orchestrator.grains.threshold.hiding_exponent` has the rule of the reading.
 """
 
 import sys
@@ -13,39 +14,18 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from orchestrator.grains import threshold
+from orchestrator.bed.poured import BED
 from orchestrator.grains.loads import Geometry
+from orchestrator.grains.threshold import MOBILITIES
 from orchestrator.lab import validate
-from orchestrator.lab.strips import FEWEST, MOVED, ROUGH, Strips
-from orchestrator.runs import case as cases
+from orchestrator.lab.strips import ROUGH, Strips, hiding_of
 from orchestrator.runs import engine
 from orchestrator.study import study
-from orchestrator.types import BoolArray, FloatArray
 
 RESAMPLES = 400
-DEFINITIONS = {
-    "the same part of all grains": (False, 0.0),
-    "the same part of the free grains": (True, 0.0),
-    "equal mobility, steps of one length": (True, 1.0),
-    "equal mobility, steps as the diameter": (True, 2.0),
-}
-"""Whether grains count that no free way leads out, and the exponent m of parts D_i^-m."""
+STRIPS = 40
+"""Strips by default: with ten the deviation is twice that with forty."""
 MODELS = ("bridged", "bridged, protrusion", "balanced")
-
-
-def exponent(
-    own: FloatArray, sizes: FloatArray, held: BoolArray, power: float
-) -> float:
-    """The exponent p of the classes; `own` is the Shields number of each grain."""
-    points = []
-    for _, size, in_class in threshold.classes(sizes):
-        counted = held & in_class
-        if counted.sum() >= FEWEST:
-            part = min(MOVED * size**-power, 1.0)
-            found = np.quantile(own[counted], part, method="higher")
-            points.append((np.log(size), np.log(found)))
-    slope, _ = np.polyfit(*np.array(points).T, 1)
-    return float(slope)
 
 
 def main(directory: Path, count: int) -> pd.DataFrame:
@@ -57,7 +37,7 @@ def main(directory: Path, count: int) -> pd.DataFrame:
     scenes = [study.changed(base, change) for change in changes]
     for scene in scenes:
         for bed in Geometry(scene, directory).pouring:
-            if cases.done_state(bed, directory) is None:
+            if not (directory / bed.name / BED).exists():
                 engine.execute(bed, directory, 7200.0)
     strips = Strips(scenes, directory)
     random = np.random.default_rng(0)
@@ -66,29 +46,23 @@ def main(directory: Path, count: int) -> pd.DataFrame:
         if model.name not in MODELS:
             continue
         found = strips.grains(model.fields, ROUGH)
-        sizes = np.concatenate([strip.sizes for strip in found])
-        own = np.concatenate([strip.shields for strip in found]) / sizes
-        is_free = np.concatenate([strip.is_free for strip in found])
-        for name, (free_alone, power) in DEFINITIONS.items():
-            held = own > 0
-            if free_alone:
-                held &= is_free
-            draws = random.integers(len(own), size=(RESAMPLES, len(own)))
-            others = [exponent(own[i], sizes[i], held[i], power) for i in draws]
+        draws = random.integers(count, size=(RESAMPLES, count))
+        for mobility in MOBILITIES:
+            others = [hiding_of([found[n] for n in draw], mobility) for draw in draws]
             rows.append(
                 {
                     "model": model.name,
-                    "definition": name,
+                    "mobility": mobility,
                     "strips": count,
-                    "grains": len(own),
-                    "exponent": exponent(own, sizes, held, power),
-                    "sd": float(np.std(others)),
+                    "grains": sum(len(strip.sizes) for strip in found),
+                    "exponent": hiding_of(found, mobility),
+                    "sd": float(np.nanstd(others)),
                 }
             )
     return pd.DataFrame(rows)
 
 
 if __name__ == "__main__":
-    number = int(sys.argv[2]) if len(sys.argv) > 2 else 10
+    number = int(sys.argv[2]) if len(sys.argv) > 2 else STRIPS
     table = main(Path(sys.argv[1]), number)
     table.to_csv(sys.stdout, index=False, float_format="%.3g")

@@ -34,7 +34,7 @@ from scipy.optimize import minimize
 from scipy.special import expit
 
 from orchestrator.bed.line import BedLine
-from orchestrator.bed.poured import BED, PouredBed
+from orchestrator.bed.poured import BED, PouredBed, joined
 from orchestrator.physics import velocity
 from orchestrator.physics.constants import SAND_GRAIN
 from orchestrator.physics.gusts import PEAK
@@ -43,9 +43,6 @@ from orchestrator.physics.rolling import COLUMNS, FACTORS, TABLE
 from orchestrator.physics.saltation import LEAST, MOST
 from orchestrator.runs import engine
 from orchestrator.types import BoolArray, FloatArray, IntArray
-
-sys.path.insert(0, str(Path(__file__).parent))
-from going import joined  # a tool beside this one
 
 SOURCE = Path(__file__).with_name("rolling") / "roll.c"
 MEASURED = Path(__file__).parents[1] / "docs" / "measured"
@@ -106,6 +103,8 @@ class _Scene(ctypes.Structure):
         ("time_step", ctypes.c_double),
         ("look", ctypes.c_double),
         ("longest", ctypes.c_double),
+        ("gust_time", ctypes.c_double),
+        ("always", ctypes.c_int),
         ("columns", ctypes.c_int),
         ("rows", ctypes.c_int),
         ("first_of_column", ctypes.c_void_p),
@@ -191,6 +190,9 @@ class Sphere:
         Way in the gust, d.
     lowered
         By how much the zero level is lowered below that of the balance, d.
+    gust_time
+        How long the gust lasts at most, sqrt(d/g'). Where it ends, a sphere that has
+        not come the first way goes on in the mean flow as well.
     """
 
     galileo: float
@@ -204,6 +206,7 @@ class Sphere:
     settles: bool = False
     first: float = FIRST
     lowered: float = 0.0
+    gust_time: float = np.inf
 
     @property
     def viscosity(self) -> float:
@@ -325,6 +328,8 @@ def _over(
         time_step=max(0.02, 0.02 / (scale + s / (18 * nu))),
         look=max(4.0, 1 / scale),
         longest=200 + 5000 / scale,
+        gust_time=min(sphere.gust_time, 1e30),
+        always=int(np.isfinite(sphere.gust_time)),
         columns=columns,
         rows=rows,
         first_of_column=first.ctypes.data,

@@ -16,6 +16,7 @@ from pathlib import Path
 import pandas as pd
 
 from orchestrator.digits import percent
+from orchestrator.lab import followed, validate
 from orchestrator.lab.activity import activity_summary
 from orchestrator.lab.validate import (
     DEFAULT,
@@ -159,6 +160,41 @@ def in_motion() -> str:
     )
 
 
+def by_dem() -> str:
+    """Both thresholds of the strips that DEM follows, beside the closed form."""
+    rows = []
+    for row in followed.compare(followed.stored()).to_dict("records"):
+        numbers = (row[name] for name in ("entrained", "sustained", "cessation"))
+        rows.append(
+            [
+                row["set"],
+                row["threshold"],
+                f"{row['stiffness']:g}",
+                f"{row['strips']}",
+                written(row["shields"], 4),
+                f"{written(row['least'], 4)} to {written(row['largest'], 4)}",
+                *(written(number, 4) for number in numbers),
+                written(row["over_closed_form"]),
+            ]
+        )
+    heads = ("set", "threshold", "K d/W", "strips", "θ, median", "θ of the strips")
+    last = ("entrained", "sustained", "ceases", "over the closed form")
+    return table([*heads, *last], rows)
+
+
+def hiding() -> str:
+    """Exponents of hiding by model and by the ends of the bracket."""
+    found = validate.stored_hiding()
+    rows = []
+    for model, part in found.groupby("model", sort=False):
+        cells = [
+            f"{row['exponent']:+.2f} ± {row['sd']:.2f}".replace("-", "−")
+            for row in part.to_dict("records")
+        ]
+        rows.append([str(model), *cells])
+    return table(["forces", "m = 1", "m = 2"], rows)
+
+
 def intervals() -> str:
     """The tested intervals of the default, with the coverage of sets left out."""
     found = pd.read_csv(GRAINS)
@@ -192,6 +228,8 @@ BLOCKS: Mapping[str, Mapping[str, Callable[[], str]]] = {
         "factors": factors,
         "rows": by_row,
         "activity": in_motion,
+        "by DEM": by_dem,
+        "hiding": hiding,
         "intervals": intervals,
     },
     "how-sure": {"short": short, "factors": factors},

@@ -60,6 +60,9 @@ NEAR = 0.5
 """Fixed grains whose surfaces are nearer to that of a mobile one are in the case, d."""
 LOCAL = 5.0
 """Length of bed before and behind a grain that its height is compared with, d."""
+OVERLAP = 0.02
+"""Overlap of two grains where the ends of a strip meet, from which on one is left out,
+d: springs open a smaller one while the bed settles."""
 
 
 def drawn_sizes(
@@ -452,6 +455,87 @@ def read_poured(
         across=y[kept],
         width=width,
     )
+
+
+def joined(
+    directory: Path, length: float, surface: float, layers: int, width: float
+) -> Packing:
+    """Read a strip of a finished case `PouredBed`, and make its two ends one.
+
+    Where grains of both ends overlap, those that overlap most are left out.
+
+    Parameters
+    ----------
+    directory
+        The directory of the case.
+    length
+        Length of the strip from x = 0, d; a whole number, as the fixed grains are d
+        apart.
+    surface
+        Height of the highest centres over the level bed, d.
+    layers
+        Layers that may move.
+    width
+        Width of the strip, d.
+
+    Returns
+    -------
+    Packing
+        The mobile grains, of which the exposed ones are counted, and a layer under
+        them.
+    """
+    bed = deck.read_table(directory / BED)
+    xyz = bed[["x_over_d", "y_over_d", "z_over_d"]].to_numpy(float)
+    is_within = (xyz[:, 0] >= 0) & (xyz[:, 0] < length)
+    is_within &= surface - xyz[:, 2] < (layers + 1.5) * LAYER
+    xyz = xyz[is_within]
+    sizes = bed["size"].to_numpy(float)[is_within]
+    is_floor = bed["fixed"].to_numpy(bool)[is_within]
+    sides = np.array([length, width])
+    xyz[:, :2] = np.mod(xyz[:, :2], sides)
+    kept = _without_overlaps(xyz, sizes, is_floor, sides)
+    xyz = xyz[kept]
+    sizes = sizes[kept]
+    is_near_top = surface - xyz[:, 2] < (layers - 0.5) * LAYER
+    mobile = is_near_top & ~is_floor[kept]
+    flat = np.column_stack([xyz[:, 0], np.zeros(len(xyz))])
+    places = Places.of(flat, xyz[:, 1], width)
+    exposed = unshadowed(places, xyz[:, 2], sizes / 2) & mobile
+    return Packing(
+        centres=xyz[:, [0, 2]],
+        sizes=sizes,
+        mobile=mobile,
+        windward=exposed,
+        lee=np.zeros_like(exposed),
+        arc_length=xyz[:, 0],
+        across=xyz[:, 1],
+        width=width,
+    )
+
+
+def _without_overlaps(
+    xyz: FloatArray, sizes: FloatArray, is_floor: BoolArray, sides: FloatArray
+) -> BoolArray:
+    """Which grains are left where the ends of a strip meet; the whole floor is."""
+    from scipy.spatial import cKDTree  # slow to import
+
+    tree = cKDTree(xyz, boxsize=np.append(sides, 0.0))
+    first, second = tree.query_pairs(float(sizes.max()), output_type="ndarray").T
+    apart = xyz[second] - xyz[first]
+    is_across = np.abs(apart[:, 0]) > sides[0] / 2
+    apart[:, :2] -= sides * np.round(apart[:, :2] / sides)
+    overlap = (sizes[first] + sizes[second]) / 2 - np.linalg.norm(apart, axis=1)
+    overlap = np.where(is_across & (overlap > OVERLAP), overlap, 0.0)
+    kept = np.ones(len(sizes), bool)
+    while True:
+        total = np.bincount(first, overlap, len(sizes))
+        total += np.bincount(second, overlap, len(sizes))
+        total[is_floor] = 0.0
+        worst = int(np.argmax(digits.all_rounded(total)))
+        if not total[worst]:
+            return kept
+        kept[worst] = False
+        overlap[(first == worst) | (second == worst)] = 0.0
 
 
 def _check_counted(counted: BoolArray) -> None:

@@ -260,6 +260,14 @@ class Geometry:
         return self.packed_line.x[-2] - self.packed_line.x[1]
 
     @property
+    def closed_length(self) -> float:
+        """Length of a strip whose ends are made one, d.
+
+        It is a whole number, as the fixed grains under it are one d apart.
+        """
+        return float(math.floor(self.length + digits.SLACK))
+
+    @property
     def surface(self) -> float:
         """Height over the bed line of the centre of an exposed grain, d."""
         return 0.5 + self.bed.roughness / self.scene.grain.diameter
@@ -347,6 +355,14 @@ class Geometry:
         for run in self.pouring:
             assert self.cases is not None, "the grains of a poured bed lie in its run"
             directory = self.cases / run.name
+            if self.scene.is_followed:
+                return poured.joined(
+                    directory,
+                    self.closed_length,
+                    self.surface,
+                    self.scene.method.grains.mobile_layers,
+                    bed.width,
+                )
             return _poured(
                 state_of(directory / poured.BED),
                 directory,

@@ -10,6 +10,7 @@ from typing import ClassVar
 
 from orchestrator.grains import wear
 from orchestrator.grains.bed_state import BedState
+from orchestrator.grains.followed import FollowedCase
 from orchestrator.grains.loads import Geometry
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile_case import PileCase
@@ -157,6 +158,8 @@ class Dem(Method):
 
         A bed that changes has a run for each flow, which goes on from the last one.
         """
+        if self.geometry.scene.is_followed:
+            return (FollowedCase(self.geometry.scene),)
         return tuple(
             case for run in self.runs for case in (run.flow, run) if case is not None
         )
@@ -174,6 +177,9 @@ class Dem(Method):
 
     def motion(self, cases: Path) -> Motion:
         """The motion that the finished runs left."""
+        if self.geometry.scene.is_followed:
+            (followed,) = self.cases
+            return Motion.from_csv(cases / followed.name)
         motions = [Motion.from_csv(cases / run.name) for run in self.runs]
         if len(motions) == 1:
             return motions[0]

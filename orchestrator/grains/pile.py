@@ -179,7 +179,7 @@ class Pile(Geometry):
             When each of them moved.
         """
         motion = self.method.motion(cases)
-        if not self.is_sustained:
+        if not self.is_sustained or self.scene.is_followed:
             return motion
         return motion.until(*self.loads(cases).sustained())
 
@@ -201,6 +201,9 @@ class Pile(Geometry):
         BoolArray
             Which they are, shape (N,).
         """
+        if self.scene.is_followed:
+            # both are asked at once: no grain is known to have left alone
+            return np.ones(self.packing.count, bool)
         further, over = self.loads(cases).sustained()
         return np.asarray(self.method.motion(cases).flows / over < further)
 

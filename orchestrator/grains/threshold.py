@@ -26,6 +26,16 @@ class that moves in a time, times its diameter and the length of a step. A step 
 100 diameters of the grain (H. A. Einstein, 1950, from memory), so that the part is as
 1/D_i^2; with one length for all it would be as 1/D_i.
 """
+MOBILITIES = (1.0, EQUAL_MOBILITY)
+"""Exponents m between which hiding is read: steps of one length for all, and steps as
+the diameter. Which of the two grains take is not known."""
+READ_PART = 0.03
+"""Part of the grains of d at which hiding is read, at most: a reference transport is
+far less, and the first balance of the drags holds for few grains that have gone."""
+MOST_PART = 0.06
+"""Largest part of a class at which it is read."""
+FEWEST_READ = 2.0
+"""Least number of grains that such a part of a class is."""
 
 
 @dataclass(frozen=True)
@@ -408,3 +418,58 @@ def at_size(size: float, sizes: FloatArray, stress: FloatArray) -> float:
         return math.nan
     logarithm = np.interp(np.log(size), np.log(sizes[pair]), np.log(stress[pair]))
     return float(np.exp(logarithm))
+
+
+def hiding_exponent(
+    shields: FloatArray, sizes: FloatArray, counted: BoolArray, mobility: float
+) -> float:
+    """Find the exponent p of theta_i ~ D_i^p over the size classes of grains.
+
+    Each class is read at the flow that has moved the part ``part D_i^-mobility`` of its
+    counted grains, where `part` is `READ_PART`, or less where that of the smallest
+    grains would be above `MOST_PART`.
+
+    Parameters
+    ----------
+    shields
+        Shields number, by its own diameter, at which each grain moves; shape (N,).
+    sizes
+        Diameters, d; shape (N,).
+    counted
+        Which of the grains count; shape (N,).
+    mobility
+        Exponent m of the parts, one of `MOBILITIES` or between them.
+
+    Returns
+    -------
+    float
+        The exponent: -1 where all sizes move at one stress, 0 where each moves as if it
+        were alone. It is NaN where fewer than two classes have `FEWEST_READ` grains to
+        be read by.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> sizes = np.repeat([0.75, 1.0, 1.4], 1000)
+    >>> stress = np.tile(np.linspace(0.01, 1.0, 1000), 3)
+    >>> every = np.ones(3000, bool)
+    >>> round(hiding_exponent(stress / sizes, sizes, every, 0.0), 3)
+    -1.0
+    """
+    read = []
+    for each in classes(sizes):
+        own = np.sort(shields[each.chosen & counted])
+        if READ_PART * each.size**-mobility * len(own) >= FEWEST_READ:
+            read.append((each.size, own))
+    smallest = min((size for size, _ in read), default=1.0)
+    part = min(READ_PART, MOST_PART * smallest**mobility)
+    points = []
+    for size, own in read:
+        # by its flow at least that part of the grains has moved, as in tables
+        moved = math.ceil(part * size**-mobility * len(own) - COUNT_SLACK)
+        points.append((size, own[moved - 1]))
+    if len(points) < 2:
+        return math.nan
+    ln_size, ln_shields = np.log(np.array(points)).T
+    slope, _ = np.polyfit(ln_size, ln_shields, 1)
+    return float(slope)

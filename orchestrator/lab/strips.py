@@ -5,7 +5,6 @@ The threshold of a bed depends on the Galileo number
 few solves answer hundreds of measured beds.
 """
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +15,6 @@ import numpy as np
 from orchestrator.bed.packing import Packing, Places
 from orchestrator.grains import peeling, threshold
 from orchestrator.grains.loads import Geometry
-from orchestrator.grains.threshold import EQUAL_MOBILITY
 from orchestrator.study.closed_form import single_grain
 from orchestrator.study.fidelities import Fields
 from orchestrator.study.scene import Scene
@@ -35,8 +33,6 @@ PERCENTILES = np.array([10.0, 25.0, 50.0, 75.0, 90.0])
 """Percentiles of the pivots."""
 LAID = 40
 """Test grains that are laid on each strip for their pivots."""
-FEWEST = 20
-"""Fewest held grains of a size class whose threshold counts for the hiding."""
 STEPS = np.geomspace(0.1, 1e-6, 20)
 """Lengths of the steps by which a laid grain rolls to its place, d."""
 REPEATS = 80
@@ -234,8 +230,8 @@ class Strips:
         angles = [laid(bed.packing, LAID, bed.bed.seed) for bed in beds]
         return np.asarray(np.nanpercentile(np.concatenate(angles), PERCENTILES))
 
-    def hiding(self, fields: Fields, mobility: float = EQUAL_MOBILITY) -> float:
-        """Find the exponent g of theta_i ~ (D_i/D_50)^-g over the mixture's classes.
+    def hiding(self, fields: Fields, mobility: float) -> float:
+        """Find the exponent p of theta_i ~ (D_i/D_50)^p over the mixture's classes.
 
         Only grains that a free way leads out, and that the bed holds without a flow,
         count in a class.
@@ -245,32 +241,35 @@ class Strips:
         fields
             The fields of a scene that the model sets.
         mobility
-            Exponent m of the part of a class that has moved at its threshold, which is
-            ``MOVED (D_i/D_50)^-m``; 0 is the same part of each.
+            Exponent m of the parts of the classes, as of `threshold.hiding_exponent`.
 
         Returns
         -------
         float
-            The exponent: 1 where all sizes move at one stress, 0 where each moves as if
-            it were alone. It is NaN with fewer than two classes.
+            The exponent. It is NaN with fewer than two classes of enough grains.
         """
-        strips = self.grains(fields, ROUGH)
-        sizes = np.concatenate([strip.sizes for strip in strips])
-        own = np.concatenate([strip.shields for strip in strips]) / sizes
-        is_held = (own > 0) & np.concatenate([strip.is_free for strip in strips])
-        points = []
-        for _, size, in_class in threshold.classes(sizes):
-            counted = is_held & in_class
-            if counted.sum() >= FEWEST:
-                part = min(MOVED * size**-mobility, 1.0)
-                # by its flow at least that part of the grains has moved, as in tables
-                found = np.quantile(own[counted], part, method="higher")
-                points.append((size, found))
-        if len(points) < 2:
-            return math.nan
-        ln_size, ln_theta = np.log(np.array(points)).T
-        slope, _ = np.polyfit(ln_size, ln_theta, 1)
-        return float(-slope)
+        return hiding_of(self.grains(fields, ROUGH), mobility)
+
+
+def hiding_of(strips: Sequence[Counted], mobility: float) -> float:
+    """Find the exponent of hiding of the grains of some strips together.
+
+    Parameters
+    ----------
+    strips
+        The counted grains of each.
+    mobility
+        As of `threshold.hiding_exponent`.
+
+    Returns
+    -------
+    float
+        The exponent.
+    """
+    sizes = np.concatenate([strip.sizes for strip in strips])
+    own = np.concatenate([strip.shields for strip in strips]) / sizes
+    is_free = np.concatenate([strip.is_free for strip in strips])
+    return threshold.hiding_exponent(own, sizes, (own > 0) & is_free, mobility)
 
 
 def laid(packed: Packing, count: int, seed: int = 0) -> FloatArray:

@@ -18,7 +18,7 @@ from orchestrator.errors import InputError
 from orchestrator.experiment import Experiment, ExperimentResults, Runs
 from orchestrator.fidelity.decision import as_written
 from orchestrator.flow.stress import WallStress, bubble
-from orchestrator.lab import activity
+from orchestrator.lab import activity, followed
 from orchestrator.lab.sphere import speed_of, sphere
 from orchestrator.lab.strips import PERCENTILES, ROUGH, Strips
 from orchestrator.physics import rolling
@@ -365,7 +365,25 @@ def _answers(model: Model, strips: Strips, beds: pd.DataFrame) -> _Answers:
     for place in np.flatnonzero(bond):
         cohesion = {"bond": bond[place]}
         shields[place] = strips.shields(model.fields, galileo[place], **cohesion)
-    return _Answers(clear, level, shields, strips.hiding(model.fields))
+    return _Answers(clear, level, shields, _hiding_of(model.name))
+
+
+def stored_hiding() -> pd.DataFrame:
+    """Read the exponents of hiding that ``tools/hiding.py`` has found.
+
+    Returns
+    -------
+    DataFrame
+        A row for each model without gusts and each end of the bracket: the exponent p
+        of theta_i ~ (D_i/D_50)^p on forty strips, and its standard deviation.
+    """
+    return pd.read_csv(FOLDER / "hiding.csv")
+
+
+def _hiding_of(model: str) -> float:
+    """Exponent g = -p of hiding by a model, in the middle of the bracket."""
+    rows = stored_hiding()
+    return -float(rows.loc[rows["model"] == model, "exponent"].mean())
 
 
 def compare_models(
@@ -596,6 +614,8 @@ class Validation(Experiment):
             "scores": scored,
             "rows": by_rows(rows),
             "activity": activity.compare_activity(),
+            "followed": followed.compare(followed.stored()),
+            "hiding": stored_hiding(),
         }
         return ExperimentResults(tables, _sections(tables))
 
@@ -640,6 +660,13 @@ turns it over its neighbour."""
 SHIELDS_TEXT = """\
 Measured thresholds and those of the models, in water (solid) and in air (dotted). The \
 Galileo number has no threshold in it: both axes are independent."""
+HIDING_TEXT = """\
+Exponent p of θᵢ ~ (Dᵢ/d50)ᵖ over the size classes of forty poured strips of sand, \
+with its standard deviation. A class is read where the part 0.03 (Dᵢ/d50)⁻ᵐ of its \
+grains has moved, no class above 0.06: there the first balance of the drags holds. \
+The exponent m is 1 for steps of one length and 2 for steps as the diameter; which of \
+the two grains take is not known, so that both are a bracket. Measured exponents are \
+−0.67 to −0.98."""
 MEMORY_TEXT = """\
 Figures that are quoted from memory count in no score. They stand here beside the \
 last model."""
@@ -668,6 +695,10 @@ def _sections(tables: Mapping[str, pd.DataFrame]) -> list[Section]:
             "Row by row", [Paragraphs(ROWS_TEXT, "lead"), Table.of(tables["rows"])]
         ),
         Section("Thresholds", [points, of_beds, Table.of(scored)]),
+        Section(
+            "Hiding", [Paragraphs(HIDING_TEXT, "lead"), Table.of(tables["hiding"])]
+        ),
+        followed.strips_section(tables["followed"]),
         activity.activity_section(tables["activity"]),
         Section("From memory", [Paragraphs(MEMORY_TEXT, "lead"), Table.of(memory)]),
         truth.truth_section(truth.stored()),

@@ -124,6 +124,21 @@ class Dem(ThresholdMethod):
         if is_single and question.flow.gusts is not None:
             what = "DEM of single grains knows no gusts"
             return UnfitError("flow.gusts", what, LEFT_OPEN)
+        if question.is_for_following:
+            return self._misfit_of_followed(question)
+        return None
+
+    @staticmethod
+    def _misfit_of_followed(question: Question) -> UnfitError | None:
+        """Say which field means nothing to grains whose motion is followed."""
+        what = "grains that DEM follows have the drag of the flow at their own height"
+        if question.forces.exposure != "alike":
+            return UnfitError("forces.exposure", what, OUT)
+        if question.forces.sheltering != "none":
+            return UnfitError("forces.sheltering", what, OUT)
+        if question.flow.depth is not None:
+            what = "grains that DEM follows are in a deep flow"
+            return UnfitError("flow.depth", what, OUT)
         return None
 
 

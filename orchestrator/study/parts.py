@@ -405,6 +405,10 @@ class PileBed(Bed):
     width: float = _poured(0.0, unit="d", label="width of the strip", ge=0, le=50)
     """width of a strip of poured grains with periodic sides, at least 3 of the largest;
     0 is one layer in the plane of the flow"""
+    dropped_grains: int = field(0, scope="strips that DEM follows", ge=0, le=1000)
+    """grains that are dropped on a strip as each load step begins, from 5 d over it: 0
+    asks when the bed starts as it was cut, a few whether the motion that they begin is
+    sustained; they are not counted"""
     seed: int = field(0, scope="random beds and replicas", ge=0, le=10**9)
     """which of the many random packings; of a lattice 0 is itself, any other a replica
     with grains up to 1e-6 d aside"""

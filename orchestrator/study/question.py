@@ -80,6 +80,18 @@ class Question(Part):
         return isinstance(self.bed, PileBed) and self.bed.packing == "poured"
 
     @property
+    def is_for_following(self) -> bool:
+        """Whether DEM of it follows grains until their motion is sustained or ends.
+
+        It is of a level strip in gusts whose criterion is written.
+        """
+        bed = self.bed
+        if not isinstance(bed, PileBed) or not (self.is_poured and bed.width):
+            return False
+        is_asked = self.threshold.criterion == "sustained"
+        return is_asked and bed.is_level and self.flow.gusts is not None
+
+    @property
     def counts(self) -> str | Range | None:
         """Which exposed grains of a pile are counted; None on a bed of one grain.
 

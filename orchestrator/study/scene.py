@@ -59,6 +59,11 @@ class Scene(Question):
         _check(self)
         return self
 
+    @property
+    def is_followed(self) -> bool:
+        """Whether DEM follows its grains until their motion is sustained or ends."""
+        return self.method.is_resolved_in_time and self.is_for_following
+
     @cached_property
     def digest(self) -> str:
         """Digest of all that a run may depend on: of the fluid its numbers alone."""

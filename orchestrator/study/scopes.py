@@ -31,6 +31,10 @@ class Asked(Protocol):
     def is_poured(self) -> bool:
         """Whether its grains are poured."""
 
+    @property
+    def is_followed(self) -> bool:
+        """Whether DEM follows its grains as they roll and hop."""
+
 
 def _of_piles(
     condition: Callable[[Asked, PileBed], Any],
@@ -64,6 +68,7 @@ APPLIES: Mapping[str, Callable[[Asked], bool]] = {
     "profiles": _of_piles(lambda scene, bed: bed.profile),
     "disordered piles": _of_piles(lambda scene, bed: bed.packing == "disordered"),
     "poured beds": lambda scene: scene.is_poured,
+    "strips that DEM follows": lambda scene: scene.is_followed,
     "random beds and replicas": _of_piles(
         lambda _, bed: bed.packing in RANDOM or bed.is_replica
     ),
@@ -96,6 +101,10 @@ BY: Mapping[str, str] = {
     "profiles": "name one by bed.profile",
     "disordered piles": 'bed.packing = "disordered"',
     "poured beds": 'bed.packing = "poured"',
+    "strips that DEM follows": (
+        'a level poured bed with bed.width and flow.gusts, method.kind = "dem" and '
+        'threshold.criterion = "sustained"'
+    ),
     "random beds and replicas": "a bed.packing",
     "solved flows": 'method.flow.model = "solve"',
     "flows between others": 'method.flow.model = "solve"',

@@ -46,6 +46,7 @@ UNTESTED = {
     *("bed.kind", "bed.profile", "bed.smoothing", "bed.forms", "bed.spacing"),
     *("bed.brink_radius", "bed.entrainment_angle_deg"),
     *("bed.relative_size", "bed.poured_depth", "bed.width"),
+    "bed.dropped_grains",
     *("grain.friction_angle_deg", "grain.cohesion", "flow.gusts", "flow.towards"),
     *("forces.averaging_length", "forces.lift_coefficient", "forces.loaded_grains"),
     *("forces.exposure", "forces.sheltering"),

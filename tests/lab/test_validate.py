@@ -12,6 +12,7 @@ import pytest
 from orchestrator.bed.packing import Packing
 from orchestrator.errors import InputError
 from orchestrator.flow.stress import WallStress
+from orchestrator.grains import threshold
 from orchestrator.lab import strips, validate
 from orchestrator.physics import beside
 from orchestrator.physics.curves import GAMMA, iversen_white
@@ -43,24 +44,38 @@ def test_grains_laid_on_a_close_packed_layer_lie_in_its_pockets() -> None:
     assert {int(np.abs(angle - exact).argmin()) for angle in angles} == {0, 1}
 
 
-@pytest.mark.parametrize(("mobility", "exponent"), [(0.0, 1.0), (2.0, 2.0)])
+@pytest.mark.parametrize(("mobility", "exponent"), [(0.0, -1.0), (2.0, -2.0)])
 def test_hiding_is_that_of_grains_that_one_stress_moves(
-    monkeypatch: pytest.MonkeyPatch, mobility: float, exponent: float
+    mobility: float, exponent: float
 ) -> None:
     """Equal parts of all sizes move at one stress; then a part as D^-2 falls as that."""
-    sizes = np.repeat([0.5, math.sqrt(0.5), 1.0, math.sqrt(2.0)], 2001)
+    sizes = np.repeat([0.75, math.sqrt(0.75), 1.0, math.sqrt(2.0)], 2001)
     # as much of each class moves as the square of the stress; locked grains count in none
     stress = np.tile(np.sqrt(np.linspace(0, 1, 2001)), 4)
     free = strips.Counted(stress, sizes, np.ones(len(sizes), bool))
     locked = strips.Counted(np.full(500, 1e-3), np.full(500, 1.0), np.zeros(500, bool))
-
-    def grains(*_: Any) -> list[strips.Counted]:
-        return [free, locked]
-
-    monkeypatch.setattr(strips.Strips, "grains", grains)
-    found = strips.Strips([], Path()).hiding({}, mobility)
     # theta_i ~ D_i^-1 at one stress, and the stress as the root of the part
-    assert found == pytest.approx(exponent, abs=5e-3)
+    found = strips.hiding_of([free, locked], mobility)
+    assert found == pytest.approx(exponent, abs=2e-2)
+
+
+def test_hiding_is_read_where_few_grains_of_each_class_have_moved() -> None:
+    """At most 3 % at d50 and 6 % of a class; classes too small for such a part are left out."""
+    sizes = np.repeat([0.5, 1.0, 2.0], 2000)
+    # beyond those parts each class has a law of its own
+    part = np.tile(np.arange(1, 2001) / 2000, 3)
+    stress = np.where(part <= 0.06 + 1e-9, part, 1e3 * sizes)
+    every = np.ones(len(sizes), bool)
+    found = threshold.hiding_exponent(stress / sizes, sizes, every, 2.0)
+    # the part of 0.06 of the smallest makes 0.015 at d50
+    assert found == pytest.approx(-3.0, abs=0.06)
+    few = every.copy()
+    # of ten grains no 6 % can be read
+    few[10:2000] = False
+    of_two = threshold.hiding_exponent(stress / sizes, sizes, few, 2.0)
+    assert of_two == pytest.approx(-3.0, abs=2e-2)
+    few[2010:4000] = False
+    assert math.isnan(threshold.hiding_exponent(stress / sizes, sizes, few, 2.0))
 
 
 def test_a_score_is_of_rows_that_were_read_alone() -> None:

@@ -92,6 +92,15 @@ STUDIES: Mapping[str, Asked] = {
     "dunes by DEM in open water": {**DUNES, **DEM, **WATER},
     "a poured pile by DEM": {**PILE, **SLOPE, **POURED, **DEM},
     "a strip by DEM": {**LEVEL, **POURED, **DEM, "bed.width": 6.0},
+    "a strip that DEM follows": {
+        **LEVEL,
+        **POURED,
+        **DEM,
+        **FLAT,
+        "bed.width": 6.0,
+        "threshold.criterion": "sustained",
+        "flow.gusts": {"intensity": 0.4, "events": 100},
+    },
 }
 """Studies of one scene: of those by DEM the runs are compared, of others the answers."""
 FENCE = {"kind": "fence", "x": -0.1, "height": 0.01}
@@ -127,6 +136,7 @@ CHOSEN = "left open, its own load steps choose the same method"
 LEVEL_HEIGHT = "a level bed has no height, whatever is given, as its declaration says"
 WEDGE = "rows of one pile of two faces lie alike, with any number of layers below"
 REPLICA = "a replica has grains 1e-6 d aside, and the closed form along a line has none"
+FOLLOWED = "its grains have a drag, a way and times of their own"
 LIFTED = "its grains are lifted, and do not roll out of their pockets"
 OF_PIVOTS = {"fluid.kind": FLUID, "grain.friction_angle_deg": FRICTION}
 OF_DEM = {
@@ -152,6 +162,20 @@ WITHOUT: Mapping[str, Mapping[str, str]] = {
     "dunes by DEM in open water": OF_DEM,
     "a poured pile by DEM": OF_DEM,
     "a strip by DEM": {**OF_DEM, "bed.height": LEVEL_HEIGHT},
+    "a strip that DEM follows": {
+        **OF_GRAINS,
+        "bed.height": LEVEL_HEIGHT,
+        **dict.fromkeys(
+            (
+                "forces.law",
+                "forces.lift_coefficient",
+                "forces.loaded_grains",
+                "method.grains.waiting_time",
+                "threshold.displacement",
+            ),
+            FOLLOWED,
+        ),
+    },
 }
 """Fields that neither change a study nor are refused there, each with the reason."""
 

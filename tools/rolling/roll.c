@@ -33,6 +33,8 @@ typedef struct {
     double time_step;                    /* longest time step */
     double look;                         /* time between two looks */
     double longest;                      /* time after which a sphere counts as one that stops */
+    double gust_time;                    /* how long a gust lasts at most */
+    int always;                          /* whether also one that has not come the first way is in the mean flow */
     /* the bed's columns of 1 by 1, each with the places of its grains in `of_column` */
     int columns, rows;
     const int *first_of_column, *of_column;
@@ -205,13 +207,13 @@ static void apart(const Scene *s, Sphere *p)  /* takes away what overlap the ste
     }
 }
 
-/* Follows a sphere until it has come `way` downstream, or stops; returns how far it has come at most. */
-static double follow(const Scene *s, Sphere *p, const double *flow, double level, double way)
+/* Follows a sphere until it has come `way` downstream, or stops, or for `longest`; returns how far it has come at most. */
+static double follow(const Scene *s, Sphere *p, const double *flow, double level, double way, double longest)
 {
     double start = p->at[0], most = 0, clock = 0, next_look = s->look, last[3];
     for (int i = 0; i < 3; i++) last[i] = p->at[i];
     p->reynolds = -1;
-    while (clock < s->longest) {
+    while (clock < longest) {
         double far = 0;
         for (int i = 0; i < 3; i++) far = fmax(far, fabs(p->at[i] - p->listed[i]));
         if (far > MARGIN / 2) list_near(s, p);
@@ -254,10 +256,11 @@ int roll(const Scene *s, int count, const double *places, int settle, const doub
             if (room > 0) p.at[2] = fmax(p.at[2], b[2] + sqrt(room));
         }
         list_near(s, &p);
-        if (settle) follow(s, &p, still, gust_level, 1e9);
-        in_gust[probe] = follow(s, &p, gust, gust_level, first);
+        if (settle) follow(s, &p, still, gust_level, 1e9, s->longest);
+        in_gust[probe] = follow(s, &p, gust, gust_level, first, fmin(s->gust_time, s->longest));
         after[probe] = 0;
-        if (in_gust[probe] >= first && then > 0) after[probe] = follow(s, &p, mean, mean_level, then);
+        int goes_on = s->always || in_gust[probe] >= first;
+        if (goes_on && then > 0) after[probe] = follow(s, &p, mean, mean_level, then, s->longest);
     }
     return 0;
 }

@@ -1,1 +1,0 @@
-../../templates/liggghts/bed/liggghts.sh
