@@ -93,7 +93,7 @@ class OpenFoamCase(Case, Generic[OnBed]):
     """Steady turbulent flow over a bed, from one direction, on one mesh."""
 
     template: ClassVar[str] = "openfoam/flow"
-    results: ClassVar[tuple[str, ...]] = (BED_FLOW, COLUMN_FLOW)
+    results: ClassVar[tuple[str, ...]] = (BED_FLOW, COLUMN_FLOW, openfoam.SECOND_TRY)
     derived: ClassVar[tuple[str, ...]] = (WALL_STRESS, DIAGNOSTICS)
     bulky: ClassVar[tuple[str, ...]] = (
         *(f"[1-9]*/{name}" for name in _FIELDS),
@@ -208,6 +208,21 @@ class OpenFoamCase(Case, Generic[OnBed]):
             The version of each.
         """
         return {self.mesher: installed(self.mesher), "openfoam": openfoam.version()}
+
+    def said(self, directory: Path) -> str:
+        """Say whether the flow took a second try, and what was other in it.
+
+        Parameters
+        ----------
+        directory
+            The case, after `Allrun`.
+
+        Returns
+        -------
+        str
+            The sentence; empty after a single try.
+        """
+        return openfoam.second_try(directory)
 
     def collect(self, directory: Path) -> None:
         """Check the run and write `wall_stress.csv` and `diagnostics.csv`.

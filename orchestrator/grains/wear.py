@@ -20,6 +20,7 @@ from orchestrator.flow.stress import WallStress
 from orchestrator.grains.bed_state import BedState, sunk
 from orchestrator.grains.loads import Geometry, Loads
 from orchestrator.runs.case import Case
+from orchestrator.solvers import openfoam
 from orchestrator.study.scene import BEYOND_ASKED, READ_LATER, Scene
 
 
@@ -83,6 +84,10 @@ class WornFlow(Case):
             worn = BedState.from_csv(cases / self.run.name)
         worn.to_csv(directory)
         self._over(worn, cases).write_from(directory, None)
+
+    def said(self, directory: Path) -> str:
+        """Say whether the flow took a second try, as any flow's."""
+        return openfoam.second_try(directory)
 
     def collect(self, directory: Path) -> None:
         """Check the run and write the stress and the diagnostics, as any flow's."""

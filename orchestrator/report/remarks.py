@@ -18,6 +18,7 @@ from orchestrator.report.card import Remark
 from orchestrator.report.page import caption
 from orchestrator.report.results import Results
 from orchestrator.report.subjects import WIND, length, place_of_file
+from orchestrator.runs.case import said_of
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.tables.facts import packs_grains
@@ -80,6 +81,7 @@ def remarks(results: Results) -> list[Remark]:
     said += _usable(table, results.tables.get("reason", pd.DataFrame()))
     if len(piles):
         said += _of_piles(results, piles)
+    said += _of_runs(results)
     if any(scene.fluid.is_paper for scene in results.study.scenes):
         said.append(PAPER_FLUID)
     usual = [FIRST_MOTION]
@@ -194,6 +196,14 @@ def _usable(table: pd.DataFrame, reasons: pd.DataFrame) -> Iterator[Remark]:
     if pd.notna(most["remedy"]):
         said += f" What helps: {most['remedy']}."
     yield Remark(f"Usable: {usable} of {count} thresholds.", said)
+
+
+def _of_runs(results: Results) -> Iterator[Remark]:
+    """What runs that did not go as planned say of themselves."""
+    for name in results.plan.cases:
+        told = said_of(results.cases / name)
+        if told:
+            yield Remark("A run did not go as planned.", f"{name}: {told}.")
 
 
 def _of_piles(results: Results, piles: pd.DataFrame) -> Iterator[Remark]:

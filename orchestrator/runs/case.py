@@ -41,6 +41,8 @@ NAME = re.compile(r"[a-z]+-[0-9a-f]{12}")
 IDENTITY = "case.json"
 CODE = "code_sha256"
 """Key of the marker: the code by which inputs and tables are those of the case."""
+SAID = "said"
+"""Key of the marker: what `Case.said` said of the run."""
 DONE = "done.json"
 FAILED = "failed.json"
 CHECKSUMS = "results.sha256"
@@ -229,6 +231,21 @@ class Case(ABC):
             If the results cannot be trusted, whatever the exit code.
         """
 
+    def said(self, directory: Path) -> str:
+        """Say what a reader of the answer must know of a run that ended well.
+
+        Parameters
+        ----------
+        directory
+            The case, after its run.
+
+        Returns
+        -------
+        str
+            The sentence, which the marker keeps; empty where all went as planned.
+        """
+        return ""
+
     @abstractmethod
     def versions(self) -> dict[str, str]:
         """The programs that run the case.
@@ -339,6 +356,7 @@ def finish(case: Case, directory: Path, **times: float) -> None:
     marker = {
         "id": case.id,
         "ended": "done",
+        SAID: case.said(directory),
         **times,
         "results_sha256": results,
         "others_sha256": others,
@@ -409,6 +427,22 @@ def failure(directory: Path) -> tuple[str, str]:
     """
     about = read_json(directory / FAILED)
     return str(about.get("ended", "")), str(about.get("cause", ""))
+
+
+def said_of(directory: Path) -> str:
+    """What the marker of a finished case says of its run.
+
+    Parameters
+    ----------
+    directory
+        Its directory.
+
+    Returns
+    -------
+    str
+        The sentence; empty where all went as planned.
+    """
+    return str(read_json(directory / DONE).get(SAID, ""))
 
 
 def done_state(case: Case, cases: Path) -> dict[str, Any] | None:

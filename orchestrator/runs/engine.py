@@ -504,8 +504,11 @@ class Display:
         line = f"[{self._ended}/{self._count}] {state}  {case.name}  {left}"
         self._console.print(line)
         is_told = self._failing is None or case.name in self._failing
-        if error is not None and is_told:
-            self._console.print(f"  {error}")
+        told = str(error) if error and is_told else ""
+        if error is None:
+            told = case_states.said_of(self._cases / case.name)
+        if told:
+            self._console.print(f"  {told}")
 
     def watch(self, running: Collection[Case]) -> None:
         """Look how far the running cases are, once a second, for the bar of a terminal.

@@ -16,7 +16,7 @@ from orchestrator import __version__
 from orchestrator.errors import InputError, OrchestratorError, printable
 from orchestrator.runs import case as case_states
 from orchestrator.runs import files, process
-from orchestrator.runs.case import DONE, failure, names_in
+from orchestrator.runs.case import DONE, SAID, failure, names_in
 from orchestrator.runs.files import (
     RECORD,
     Folder,
@@ -496,35 +496,48 @@ def status(directory: Path) -> tuple[str, bool]:
     space = Workspace(directory.absolute())
     about = space.description()
     is_running = space.is_held()
-    begun = [name for name in about["cases"] if (space.cases / name).is_dir()]
-    undone = [name for name in begun if not read_json(space.cases / name / DONE)]
-    causes = {}
-    for name in undone:
-        _, cause = failure(space.cases / name)
-        if cause:
-            causes[name] = cause
+    names = about["cases"]
+    begun = [name for name in names if (space.cases / name).is_dir()]
+    markers = {name: read_json(space.cases / name / DONE) for name in begun}
+    undone = [name for name, marker in markers.items() if not marker]
+    causes = _causes(undone, space.cases)
     unfinished = [name for name in undone if name not in causes]
-    left = len(about["cases"]) - len(begun)
     word = "running" if is_running else "unfinished"
     counts = [
         f"{len(begun) - len(undone)} done",
         f"{len(unfinished)} {word}",
-        f"{left} not begun",
+        f"{len(names) - len(begun)} not begun",
         f"{len(causes)} failed",
     ]
     kind = STUDY if "study" in about else EXPERIMENT
     lines = [f"{kind.word} {about['name']}: {', '.join(counts)}"]
     lines += [f"  {word}: {name}" for name in unfinished]
     lines += [f"  failed: {name}: {cause}" for name, cause in causes.items()]
+    lines += [f"  done: {each}" for each in _said(markers)]
     lines += _sizes(space, "size: ")
     # a run of an experiment ends with its page, and notes nothing of it
-    is_drawn = space.drawn.is_file() if kind is STUDY else not (unfinished or left)
+    is_drawn = not (unfinished or len(begun) < len(names))
+    if kind is STUDY:
+        is_drawn = space.drawn.is_file()
     if is_drawn and space.page.is_file():
         lines.append(f"page: {space.page}")
     elif not is_running:
         lines.append("the same command continues it")
     # a study's name may come from anywhere
     return "\n".join(map(printable, lines)), bool(causes)
+
+
+def _causes(names: Iterable[str], cases: Path) -> dict[str, str]:
+    """Why cases failed, by name; one that is not known to have failed is not there."""
+    found = {name: failure(cases / name)[1] for name in names}
+    return {name: cause for name, cause in found.items() if cause}
+
+
+def _said(markers: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
+    """What runs that did not go as planned say, by the markers of finished cases."""
+    for name, marker in markers.items():
+        if marker.get(SAID):
+            yield f"{name}: {marker[SAID]}"
 
 
 def prune_cases(

@@ -16,6 +16,10 @@ Later ones may lack the bed's nutkAtmRoughWallFunction.
 """
 INSTALL = "install Debian's package `openfoam`, and put it first in PATH"
 
+SECOND_TRY = "second_try"
+"""What `Allrun` changes where the first try fails; only then it is there."""
+FIRST_LOG = f"log.{PROGRAM}.first"
+"""What the first try said, where there was a second."""
 _OTHER_MESH = "other first cells or cells per face may do; see also system/fvSolution"
 _HOME = "/usr/share/openfoam"
 _STATED = r"Using: OpenFOAM-(?:v(\d{4})|\S* \((\d{4})\))"
@@ -80,8 +84,44 @@ def check_log(directory: Path) -> int:
     SolverError
         If it has not run, failed or was stopped otherwise.
     """
+    try:
+        return _check_last(directory)
+    except SolverError as error:
+        if not (directory / FIRST_LOG).is_file():
+            raise
+        what = f"{error.what}; it was the second try, with more relaxation"
+        remedy = f"{error.remedy}; the first is in {FIRST_LOG}"
+        raise type(error)(what, error.where, remedy) from None
+
+
+def second_try(directory: Path) -> str:
+    """Say whether a flow that converged took a second try.
+
+    Parameters
+    ----------
+    directory
+        Directory of the case.
+
+    Returns
+    -------
+    str
+        The sentence; empty after a single try.
+    """
+    if not (directory / SECOND_TRY).is_file():
+        return ""
+    try:
+        _check_last(directory, FIRST_LOG)
+    except SolverError as error:
+        first = error.what
+    else:
+        first = "the first try failed"
+    return f"{first}; the second try converged, with the values of {SECOND_TRY}"
+
+
+def _check_last(directory: Path, name: str = f"log.{PROGRAM}") -> int:
+    """Read the log of one try; returned and raised is what `check_log` says."""
     where = str(directory)
-    log = directory / f"log.{PROGRAM}"
+    log = directory / name
     if not log.is_file():
         raise SolverError(f"{PROGRAM} has not run", where, "run ./Allrun there")
     text = log.read_text(encoding="utf-8", errors="replace")

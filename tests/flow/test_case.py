@@ -14,14 +14,14 @@ from orchestrator import pipeline, plan
 from orchestrator.bed.line import between_flats
 from orchestrator.errors import Exploded, SolverError, Stalled
 from orchestrator.flow.case import FINE, FlowCase
-from orchestrator.flow.foam import SolvedFlow
+from orchestrator.flow.foam import BED_FLOW, SolvedFlow
 from orchestrator.flow.run import DIAGNOSTICS, WALL_STRESS
 from orchestrator.flow.stress import APPROACH_ERROR, WallStress, bubble
 from orchestrator.runs import case
 from orchestrator.runs.files import read_json
 from orchestrator.solvers import openfoam
 from orchestrator.study.study import parse
-from tests.flow.conftest import OPEN, PILE, Solve, allrun, changed, edit
+from tests.flow.conftest import OPEN, PILE, Solve, allrun, changed, edit, of_hill
 
 FACE = PILE.height_m / np.sin(np.radians(PILE.slope_deg))
 
@@ -140,9 +140,80 @@ def test_a_diverged_run(tmp_path: Path, trap: str, cause: str) -> None:
         "consistent      yes;",
         "consistent      no;",
     )
+    edit(directory / "Allrun", "relaxation       0.7;", "relaxation 1.9;")
     assert allrun(directory, FOAM_SIGFPE=trap).returncode != 0
-    with pytest.raises(Exploded, match=f"simpleFoam diverged: .*{cause}"):
+    told = f"simpleFoam diverged: .*{cause}.*it was the second try"
+    with pytest.raises(Exploded, match=told) as raised:
         PILE.collect(directory)
+    assert "log.simpleFoam.first" in raised.value.remedy
+    assert "cells per face may do" in raised.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("fault", "first"),
+    [
+        (("relaxation       0.95;", "relaxation 1.9;"), "simpleFoam diverged: "),
+        (
+            ("iterations       1000;", "iterations 80;"),
+            "simpleFoam did not converge: ",
+        ),
+    ],
+)
+def test_a_flow_that_fails_is_tried_once_more_with_more_relaxation(
+    solve: Solve, tmp_path: Path, fault: tuple[str, str], first: str
+) -> None:
+    ends = []
+    for folder in ("one", "other"):
+        directory = case.prepare(PILE, tmp_path / folder)
+        edit(directory / "parameters", *fault)
+        ended = allrun(directory)
+        assert ended.returncode == 0
+        PILE.collect(directory)
+        case.finish(PILE, directory, solver_s=1.0, cpu_s=1.0, wall_s=1.0)
+        said = case.said_of(directory)
+        assert said.startswith(first)
+        assert "the second try converged, with the values of second_try" in said
+        changes = (directory / "second_try").read_text()
+        assert "relaxation       0.7;\n" in changes
+        ends.append(read_json(directory / case.DONE)["results_sha256"])
+        logs = {path.name for path in directory.glob("log.simpleFoam*")}
+        assert logs == {"log.simpleFoam", "log.simpleFoam.first"}
+    assert ends[0] == ends[1]
+    assert {"second_try", BED_FLOW} < ends[0].keys()
+    # by hand the same, and a change of what was other in the second try is noticed
+    assert allrun(directory).returncode == 0
+    assert case.run_of(directory, PILE.id)
+    stress = windward_mean(solve(PILE), PILE)
+    assert windward_mean(directory, PILE) == pytest.approx(stress, rel=0.01)
+    (directory / "second_try").write_text(changes.replace("0.7", "0.6"))
+    assert not case.run_of(directory, PILE.id)
+
+
+def test_a_flow_of_several_processes_is_tried_once_more(template: Path) -> None:
+    hill = of_hill(template)
+    edit(hill / "parameters", "relaxation       0.95;", "relaxation 1.9;")
+    edit(hill / "parameters", "ranks            1;", "ranks 2;")
+    assert allrun(hill).returncode == 0
+    assert "simpleFoam diverged: " in openfoam.second_try(hill)
+    assert not [*hill.glob("processor*")]
+    assert subprocess.run([hill / "Allclean"], check=True)
+    assert not (hill / "second_try").exists()
+    assert not (hill / openfoam.FIRST_LOG).exists()
+
+
+def test_a_first_try_that_converges_is_the_only_one(solve: Solve) -> None:
+    directory = solve(PILE)
+    assert not case.said_of(directory)
+    assert not (directory / "second_try").exists()
+    assert not (directory / openfoam.FIRST_LOG).exists()
+
+
+def test_a_solver_that_cannot_start_is_not_tried_again(template: Path) -> None:
+    edit(template / "parameters", "turbulence       kEpsilon;", "turbulence nosuch;")
+    assert allrun(template).returncode != 0
+    with pytest.raises(SolverError, match=r"simpleFoam stopped: .*nosuch"):
+        openfoam.check_log(template)
+    assert not (template / openfoam.FIRST_LOG).exists()
 
 
 @pytest.mark.parametrize(
@@ -294,7 +365,12 @@ def test_diagnostics_tell_a_sound_run_from_others(solve: Solve) -> None:
 @pytest.mark.parametrize(
     ("settings", "last", "error", "cause"),
     [
-        ({}, "30", Stalled, "did not converge: .* after iteration 30"),
+        (
+            {},
+            "20",
+            Stalled,
+            "did not converge: .* after iteration 60; it was the second",
+        ),
         ({"viscosity": 1e-3}, "1000", SolverError, "the wall function fails"),
     ],
 )
