@@ -11,7 +11,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from orchestrator.fidelity import limits
-from orchestrator.study import fields, profile, question, scene
+from orchestrator.study import fields, profile, question, scene, sieve
 from orchestrator.study.fidelities import AUTO, WRITTEN
 from orchestrator.study.fields import Quantity
 from orchestrator.study.reading import TIME_LIMIT_S
@@ -65,9 +65,9 @@ DAMPED = ", ".join(
 LOW, HIGH = limits.PILE_SLOPES_DEG
 LIMITS = {
     "grain.sizes": (
-        f"the largest grain is more than {question.LARGEST_RATIO:g} times the smallest: the time of "
+        f"the largest grain is more than {sieve.LARGEST_RATIO:g} times the smallest: the time of "
         "DEM rises with the square",
-        "merge the finest or the coarsest classes of the sieve",
+        "merge the finest or the coarsest classes; a file of what passes or stays on sieves is cut to it",
     ),
     "bed.profile": (
         f"more than {limits.MOST_GRAINS:g} d of bed, of any shape, to pack with grains, or "

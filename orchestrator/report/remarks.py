@@ -11,6 +11,8 @@ from orchestrator.fidelity import crest
 from orchestrator.fidelity.decision import floor_of
 from orchestrator.fidelity.limits import FROZEN_BED
 from orchestrator.physics.fluids import is_gas
+from orchestrator.physics.grain import Grain
+from orchestrator.physics.measured import wilcock_crowe_hiding
 from orchestrator.physics.velocity import log_law_speed
 from orchestrator.physics.verdict import USABLE
 from orchestrator.report import counted, labels, sheets, single, theory
@@ -21,6 +23,7 @@ from orchestrator.report.subjects import WIND, length, place_of_file
 from orchestrator.runs.case import said_of
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
+from orchestrator.study.sieve import Cut, said_of
 from orchestrator.tables.facts import packs_grains
 from orchestrator.tables.kinds import INTERLOCKED
 
@@ -78,6 +81,7 @@ def remarks(results: Results) -> list[Remark]:
     if table.empty:
         return [*_questions(results)]
     said = [*_of_laws(results), *_correction(results, table), *_questions(results)]
+    said += [*_cuts(results), *_files(results)]
     said += _usable(table, results.tables.get("reason", pd.DataFrame()))
     if len(piles):
         said += _of_piles(results, piles)
@@ -181,6 +185,48 @@ def _questions(results: Results) -> Iterator[Remark]:
     """What is asked about numbers of the study file that seem to be wrong."""
     for asked in results.study.asked:
         yield Remark("Is the study file right?", asked.sentence)
+
+
+def _files(results: Results) -> Iterator[Remark]:
+    """What was understood of the files that the study names."""
+    for name, text in results.study.understood.items():
+        yield Remark(f"Read from {name}:", f"{text}.")
+
+
+def _cuts(results: Results) -> Iterator[Remark]:
+    """What was cut from sieve tables, and what a hiding function says of it."""
+    sieves = results.study.sieves
+    for scene in results.study.scenes:
+        sizes = scene.grain.sizes
+        table = sieves.get(sizes) if isinstance(sizes, tuple) else None
+        if table is None:
+            continue
+        for cut in table.cuts:
+            yield _cut(results, scene, cut)
+        return
+
+
+def _cut(results: Results, scene: Scene, cut: Cut) -> Remark:
+    """The remark on one cut, with the stress of the nearest size that was cut."""
+    end = cut.high if cut.is_fine else cut.low
+    size = end / scene.grain.diameter
+    factor = float(wilcock_crowe_hiding(size))
+    text = (
+        f"{said_of(cut)[:1].upper()}{said_of(cut)[1:]}: these grains are not in the "
+        "bed. By the hiding function of Wilcock and Crowe (2003), a formula that was "
+        f"fitted to transport, grains of {length(end)} need {factor:.2f} times the "
+        "stress of d50"
+    )
+    rows = results.joined("size_class")
+    if len(rows):
+        here = rows[rows["scene_id"] == scene.id]
+        known = here[here["hiding"] > 0]
+        for _, row in known.head(1).iterrows():
+            own = row["shields_own"] / row["hiding"]
+            stress = factor * float(own) * float(Grain.of_table(row).layer_weight)
+            part = percent(float(row["fraction"]))
+            text += f", {stress:.3g} Pa where {part} of each size have moved"
+    return Remark("Sizes were cut.", f"{text}.")
 
 
 def _usable(table: pd.DataFrame, reasons: pd.DataFrame) -> Iterator[Remark]:

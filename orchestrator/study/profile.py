@@ -1,55 +1,54 @@
-"""Files that a study file names: measured bed lines, and sieve tables."""
+"""Files that a study file names: measured bed lines, sieve tables and others."""
 
-import csv
-import io
 import json
-import math
 import os
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from hashlib import sha256
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orchestrator.digits import on_grid, rounded
+from orchestrator.digits import number as counted
+from orchestrator.digits import on_grid
 from orchestrator.errors import InputError
 from orchestrator.runs.files import digest_file, digest_text
+from orchestrator.study.cells import Marks, TextTable, marks_of, read_table
 from orchestrator.study.heads import (
     ALONG,
+    DEGREES,
+    DEPTHS,
+    EAST,
     HEIGHT,
-    UNITS,
+    NORTH,
     in_metres,
-    is_passing,
-    is_size,
-    more_cells,
     name_of,
+    one_word,
 )
 from orchestrator.study.noise import needed_smoothing
 from orchestrator.study.shapes import SHAPES
+from orchestrator.study.sieve import SieveTable, read_sieve
 from orchestrator.study.source import decoded, read_bytes
-from orchestrator.study.units import number
 from orchestrator.types import FloatArray
 
 LARGEST, LARGEST_NUMBER = 20 * 2**20, 1e5  # bytes of a file, and largest number, m
 LARGEST_X = 1e7
 """Largest x of a profile, m: eastings and northings of maps."""
-ALSO = {"x_m": ALONG, "z_m": HEIGHT}
+COLUMNS = {"x_m": ALONG, "z_m": HEIGHT}
 """What surveyors call the columns of a profile, with or without the unit m."""
-CLASSES = ("diameter_m", "fraction")
-"""Columns of a sieve table of classes."""
-PASSING = ("sieve_mm", "passing_percent")
-"""Columns of a sieve table as laboratories write it."""
-NO_PAN = "leave out the line of the pan, and end with the sieve that nothing passes"
-SIEVE_REMEDY = (
-    f"the first line must be {','.join(PASSING)} (what passes each sieve, mm) or "
-    f"{','.join(CLASSES)} (in m), or names with another unit of length, as Sieve (um); "
-    f"then numbers; {NO_PAN}"
+PROFILE_REMEDY = "the first line must be x_m,z_m, then numbers in m"
+KNOWN_NAMES = (
+    f"x_m,z_m, or for x {one_word(ALONG)}; for z {one_word(HEIGHT)}; unit and datum "
+    "may follow: Level (mAOD)"
 )
+STATION = re.compile(r"(\d+)\+(\d+(?:\.\d*)?)")
+"""A station: what stands behind the sign has as many digits as the length before it has
+zeros."""
 MOST_CORNERS = (
     3000  # most corners of a bed line, each of which is a grid line of the flow's mesh
 )
@@ -63,7 +62,16 @@ OVER = (
     0.5  # each of the two lengths whose means give the slope of a line, over its height
 )
 
-T = TypeVar("T")
+
+class Understood(Protocol):
+    """What is read of a file, and says how."""
+
+    @property
+    def understood(self) -> str:
+        """What was understood, in words."""
+
+
+T = TypeVar("T", bound=Understood)
 WITH_X, AGAINST_X = "+x", "-x"
 """Where the flow goes in the file of a profile."""
 
@@ -91,6 +99,8 @@ class Profile:
         flow meets.
     towards
         Where the flow goes in the file: "+x" or "-x".
+    understood
+        What was understood of the file, in words.
     """
 
     name: str = field(compare=False)  # the file's
@@ -101,6 +111,7 @@ class Profile:
     needs: float = field(default=0.0, compare=False)  # smoothing for its noise, m
     origin: tuple[float, float] = field(default=(0.0, 0.0), compare=False)
     towards: str = field(default=WITH_X, compare=False)
+    understood: str = field(default="", compare=False)
 
     def __str__(self) -> str:
         return f"{self.name} ({self.digest[:12]})"
@@ -251,12 +262,20 @@ class Files:
     added
         TOML with the texts of the files that were read: with it the text of a study is
         whole without them.
+    understood
+        What was understood of each file, in words, by name.
+    sieves
+        The sieve tables that were read, by their classes.
     """
 
     folder: Path | None
     carried: dict[str, str] = field(default_factory=dict)
     digests: dict[str, str | None] = field(default_factory=dict)
     added: str = ""
+    understood: dict[str, str] = field(default_factory=dict)
+    sieves: dict[tuple[tuple[float, float], ...], SieveTable] = field(
+        default_factory=dict
+    )
     _read: dict[str, str] = field(default_factory=dict)
     _made: dict[str, Any] = field(default_factory=dict)
 
@@ -294,10 +313,11 @@ class Files:
         place = self._place(name, where)
         text = self._text(name, where)
         profile = read_profile(text, Path(name).name, place, smoothing, towards)
+        self.understood[name] = profile.understood
         return _fields(profile) | _from_first_point(bed, profile)
 
     def sieve(self, name: str, where: str) -> list[list[float]]:
-        """Read a sieve table: classes, or the per cent that passes each sieve.
+        """Read a sieve table.
 
         Parameters
         ----------
@@ -317,28 +337,10 @@ class Files:
             If the file is no sieve table.
         """
         where = f"{where}: grain.sizes"
-        place = self._place(name, where)
-        text = self._text(name, where)
-        head = next(csv.reader(text.splitlines()[:1]), [])
-        cells = [cell.strip() for cell in head]
-        sizes = [*filter(is_size, cells)]
-        passing = [*filter(is_passing, cells)]
-        if len(sizes) == len(passing) == 1:
-            unit = UNITS[name_of(sizes[0]).unit] / UNITS["mm"]
-            names = (sizes[0], passing[0])
-            lines, rows = read_columns(text, names, place, SIEVE_REMEDY)
-            in_mm = [[rounded(unit * size), part] for size, part in rows]
-            return _classes(lines, in_mm, place)
-        parts = [cell for cell in cells if cell.lower() == CLASSES[1]]
-        names = CLASSES
-        if len(sizes) == len(parts) == 1:
-            names = (sizes[0], parts[0])
-        lines, rows = read_columns(text, names, place, SIEVE_REMEDY)
-        unit = UNITS[name_of(names[0]).unit]
-        if unit != 1:
-            rows = [[rounded(unit * size), part] for size, part in rows]
-        _check_rows(lines, rows, place)
-        return rows
+        sieve = read_sieve(self._text(name, where), self._place(name, where))
+        self.understood[name] = sieve.said
+        self.sieves[sieve.rows] = sieve
+        return [[*row] for row in sieve.rows]
 
     def once(self, name: str, where: str, read: Callable[[Path, str], T]) -> T:
         """Read a file that a study cannot carry.
@@ -370,6 +372,7 @@ class Files:
             self._made[name] = read(self.folder / name, place)
             self.digests[name] = digest_file(self.folder / name)
         made: T = self._made[name]
+        self.understood[name] = made.understood
         return made
 
     def _place(self, name: str, where: str) -> str:
@@ -396,7 +399,7 @@ class Files:
             what = "its text is not in the table [profiles] of the study"
             raise InputError(what, where, "add it there, or remove the table")
         content = read_bytes(self.folder / name, LARGEST, where)
-        text = decoded(content, where)
+        text = decoded(content, where, is_data=True)
         self.digests[name] = sha256(content).hexdigest()
         # a JSON string is a TOML string, but for the mark of deletion
         string = json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
@@ -406,150 +409,169 @@ class Files:
         return text
 
 
-def _check_rows(lines: list[int], rows: list[list[float]], where: str) -> None:
-    """Refuse a class that has no size, or a fraction below 0."""
-    for line, (diameter, fraction) in zip(lines, rows, strict=True):
-        place = f"{where}: line {line}"
-        if not diameter > 0:
-            what = f"{CLASSES[0]}: {diameter:g} is no size"
-            raise InputError(what, place, "diameters are in m, above 0")
-        if not fraction >= 0:
-            what = f"{CLASSES[1]}: {fraction:g} is no part of the mass"
-            raise InputError(what, place, "fractions are from 0 to 1")
+@dataclass(frozen=True)
+class _Points:
+    """The points of a profile in the order of its x, and what was understood.
 
-
-def _classes(
-    lines: list[int], rows: list[list[float]], where: str
-) -> list[list[float]]:
-    """The classes between sieves, of the per cent of the mass that passes each.
-
-    A class has the geometric mean of its two sieves as diameter, m.
-    """
-    for line, (sieve, percent) in zip(lines, rows, strict=True):
-        place = f"{where}: line {line}"
-        if not sieve > 0:
-            what = f"{PASSING[0]}: {sieve:g} is no sieve"
-            raise InputError(what, place, f"openings are in mm, above 0; {NO_PAN}")
-        if not 0 <= percent <= 100:
-            what = f"{PASSING[1]}: {percent:g} is no part of the mass"
-            raise InputError(what, place, "per cent that pass are from 0 to 100")
-    if len(rows) < 2:
-        remedy = "begin with the sieve that all pass, end with one that nothing passes"
-        raise InputError("one class lies between two sieves", where, remedy)
-    ordered = sorted(zip(rows, lines, strict=True))
-    (_, none), line = ordered[0]
-    if none != 0:
-        what = f"{none:g} % pass the smallest sieve, not 0"
-        remedy = f"add a finer one that nothing passes, if only by its size; {NO_PAN}"
-        raise InputError(what, f"{where}: line {line}", remedy)
-    (_, whole), line = ordered[-1]
-    if whole != 100:
-        what = f"{whole:g} % pass the largest sieve, not 100"
-        remedy = "begin with the sieve that all pass"
-        raise InputError(what, f"{where}: line {line}", remedy)
-    classes = []
-    for ((smaller, below), _), ((larger, above), line) in pairwise(ordered):
-        if above < below or larger == smaller:
-            what = f"{above:g} % pass {larger:g} mm, and {below:g} % {smaller:g} mm"
-            place = f"{where}: line {line}"
-            raise InputError(what, place, "a larger sieve lets more pass")
-        if above > below:
-            diameter = 1e-3 * math.sqrt(smaller * larger)
-            classes.append([rounded(diameter), rounded((above - below) / 100)])
-    return classes
-
-
-def read_columns(
-    text: str, names: tuple[str, str], where: str, remedy: str = ""
-) -> tuple[list[int], list[list[float]]]:
-    """Two columns of a CSV file with a header.
-
-    Blank lines and other columns are left out.
-
-    Parameters
+    Attributes
     ----------
-    text
-        The file.
-    names
-        The names of the columns; those of a profile may have others, see `ALSO`.
-    where
-        The file, for messages.
-    remedy
-        What the first line must be, in words; by default the two names.
-
-    Returns
-    -------
-    The number of each line, and its two values.
-
-    Raises
-    ------
-    InputError
-        With the line and the remedy.
+    lines
+        Number of the line of each.
+    values
+        x and z of each, m.
+    understood
+        The words.
     """
-    reader = csv.DictReader(io.StringIO(text))
-    lines, values = [], []
+
+    lines: list[int]
+    values: list[tuple[float, float]]
+    understood: str
+
+
+def _points_of(text: str, where: str) -> _Points:
+    """The points of a profile; an `InputError` with the line and the remedy.
+
+    Blank lines, comments and other columns are left out. Points against x are turned.
+    """
+    if not text.strip():
+        raise InputError("it is empty", f"{where}: line 1", PROFILE_REMEDY)
+    table = read_table(text, _names_both, where, _remedy_of(text))
+    place = f"{where}: line {table.head}"
     try:
-        reader.fieldnames = [cell.strip() for cell in reader.fieldnames or ()]
-        columns = [_column(reader.fieldnames, name, names) for name in names]
-        for row in reader:
-            pair = [_cell(row, column) for column in columns]
-            if None in row:
-                cells = len(reader.fieldnames) + len(row[None])
-                raise ValueError(more_cells(cells, len(reader.fieldnames)))
-            lines.append(reader.line_num)
-            values.append(pair)
-    except (ValueError, csv.Error) as error:
-        remedy = (
-            remedy or f"the first line must be {','.join(names)}, then numbers in m"
+        columns = [_column(table, name) for name in COLUMNS]
+        _check_line(table, columns[0])
+    except ValueError as error:
+        raise InputError(str(error), place, PROFILE_REMEDY) from None
+    names = [table.names[at] for at in columns]
+    remedy = in_metres(names)
+    if remedy:
+        what = f"the columns are {', '.join(table.names)}"
+        raise InputError(what, place, remedy)
+    try:
+        marks = marks_of(cell for at in columns for cell in table.column(at))
+    except ValueError as error:
+        raise InputError(str(error), where, PROFILE_REMEDY) from None
+    lines, values = [], []
+    for line, cells in table.cells(columns):
+        try:
+            x, z = (
+                _number(cell, name, marks, most)
+                for cell, name, most in zip(
+                    cells, names, (LARGEST_X, LARGEST_NUMBER), strict=True
+                )
+            )
+        except ValueError as error:
+            raise InputError(
+                str(error), f"{where}: line {line}", PROFILE_REMEDY
+            ) from None
+        lines.append(line)
+        values.append((x, z))
+    return _in_order(lines, values, _understood(names, marks, values))
+
+
+def _in_order(
+    lines: list[int], values: list[tuple[float, float]], understood: str
+) -> _Points:
+    """Points by their x: those of a line that was levelled against it are turned."""
+    xs = [x for x, _ in values]
+    if len(xs) > 1 and all(b < a for a, b in pairwise(xs)):
+        understood += "; its lines go against x, and were turned"
+        return _Points(lines[::-1], values[::-1], understood)
+    return _Points(lines, values, understood)
+
+
+def _understood(
+    names: Sequence[str], marks: Marks, values: Sequence[tuple[float, float]]
+) -> str:
+    """What was understood of the points of a profile, in words."""
+    along, up = names
+    datum = name_of(up).datum
+    words = [f"x from {along!r}, z from {up!r}, in m"]
+    if datum:
+        words.append(f"levels above {datum}")
+    if marks.said:
+        words.append(marks.said)
+    if values:
+        xs, zs = zip(*values, strict=True)
+        words.append(
+            f"{counted(len(values), 'point')}, x {min(xs):.9g} to {max(xs):.9g} m, "
+            f"z {min(zs):.6g} to {max(zs):.6g} m"
         )
-        place = f"{where}: line {reader.line_num or 1}"
-        raise InputError(str(error), place, remedy) from None
-    return lines, values
+    return "; ".join(words)
 
 
-def _column(header: Sequence[str], name: str, names: tuple[str, str]) -> str:
-    """What a header calls a column, by its own name or by one of `ALSO`.
+def _names_both(cells: Sequence[str]) -> bool:
+    """Whether some cells name the places along a line, and its heights."""
+    plain = [name_of(cell).plain for cell in cells]
+    return all(any(name in called for name in plain) for called in COLUMNS.values())
+
+
+def _remedy_of(text: str) -> str:
+    """What helps a file without names that are known, by what it seems to have."""
+    first = next(line for line in text.splitlines() if line.strip())
+    words = {word.lower() for word in re.findall(r"[^\W\d_]+", first)}
+    if words & {*DEPTHS}:
+        return f"depths go down: write heights; {KNOWN_NAMES}"
+    if words & {*DEGREES}:
+        return f"degrees are no lengths; {KNOWN_NAMES}"
+    return KNOWN_NAMES
+
+
+def _column(table: TextTable, name: str) -> int:
+    """The column of the table that has the places, or the heights.
 
     It is a ValueError unless just one column is meant.
     """
-    if header.count(name) == 1:
-        return name
-    meant = [cell for cell in header if _is_called(cell, ALSO.get(name, ()))]
-    if name not in header and len(meant) == 1:
-        return meant[0]
-    if name not in header and len(meant) > 1:
-        listed = " or ".join(meant)
-        raise ValueError(f"which column is {name}: {listed}? Name that one {name}")
-    what = f"not one column {names[0]} and one {names[1]} in {','.join(header)!r}"
-    if len(header) == 1 and ";" in header[0]:
-        what = f"{what}: commas between the cells, no semicolons"
-    in_another_unit = in_metres(header)
-    if in_another_unit and names[0] in ALSO:
-        what = f"{what}: {in_another_unit}"
-    raise ValueError(what)
+    names = table.names
+    if names.count(name) == 1:
+        return names.index(name)
+    meant = [
+        at for at, cell in enumerate(names) if name_of(cell).plain in COLUMNS[name]
+    ]
+    # a column of one number, as the offset of a line of levels, says nothing of it
+    varying = [at for at in meant if len({*table.column(at)}) > 1]
+    found = varying or meant
+    if len(found) == 1:
+        return found[0]
+    listed = " or ".join(names[at] for at in found)
+    raise ValueError(f"which column is {name}: {listed}? Name that one {name}")
 
 
-def _is_called(cell: str, names: Sequence[str]) -> bool:
-    """Whether a column has one of some names, and no other unit than m."""
-    name = name_of(cell)
-    return name.plain in names and name.is_in_metres
+def _check_line(table: TextTable, along: int) -> None:
+    """Refuse a line whose other axis of a map varies, too."""
+    axis = name_of(table.names[along]).plain
+    if axis not in EAST:
+        return
+    for at, name in enumerate(table.names):
+        if name_of(name).plain in NORTH and len({*table.column(at)}) > 1:
+            both = f"{table.names[along]} or {name}"
+            what = f"which column is x_m: {both}"
+            raise ValueError(f"{what}? Name that one x_m, or add one of the chainage")
 
 
-def _cell(row: Mapping[str | None, Any], name: str) -> float:
+def _number(text: str, name: str, marks: Marks, largest: float) -> float:
     """The number in a cell; a ValueError for any other text."""
-    largest = LARGEST_NUMBER
-    if name == "x_m" or _is_called(name, ALSO["x_m"]):
-        largest = LARGEST_X
-    text = row[name]
-    if text is None or not text.strip():
+    if not text.strip():
         raise ValueError(f"the cell of {name} is empty")
+    station = STATION.fullmatch(text.strip())
+    if station:
+        return _station(station, name)
     try:
-        value = number(text)
+        value = marks.number(text)
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
     if not abs(value) <= largest:
         raise ValueError(f"{name}: {text.strip()} is not a number up to {largest:g}")
     return value
+
+
+def _station(station: re.Match[str], name: str) -> float:
+    """The metres of a station of kilometres, 1+250.5; a ValueError for others."""
+    whole, behind = station[1], station[2]
+    if len(behind.partition(".")[0]) != 3:
+        what = f"{name}: {station[0]} may count hundreds of feet or of metres"
+        raise ValueError(f"{what}: write metres")
+    return 1000.0 * int(whole) + float(behind)
 
 
 @dataclass(frozen=True)
@@ -604,11 +626,12 @@ def read_profile(
     InputError
         With the line and the remedy.
     """
-    lines, points = read_columns(text, ("x_m", "z_m"), where)
-    refusal = _Refusal(where, () if smoothing else lines)
-    if len(points) < 3:
-        raise refusal.whole(f"{len(points)} points make no bed", "write 3 at least")
-    x, z = np.array(points).T
+    points = _points_of(text, where)
+    refusal = _Refusal(where, () if smoothing else points.lines)
+    if len(points.values) < 3:
+        what = f"{len(points.values)} points make no bed"
+        raise refusal.whole(what, "write 3 at least")
+    x, z = np.array(points.values).T
     _check_steps(x, refusal)
     sign = 1
     if towards == AGAINST_X:
@@ -636,7 +659,9 @@ def read_profile(
     zs = tuple(on_grid(z - z[0], length).tolist())
     lines_of_corners = [f"{a!r},{b!r}" for a, b in zip(xs, zs, strict=True)]
     digest = digest_text("\n".join(lines_of_corners))
-    return Profile(name, xs, zs, text, digest, needs, origin, towards)
+    return Profile(
+        name, xs, zs, text, digest, needs, origin, towards, points.understood
+    )
 
 
 def _check_steps(x: FloatArray, refusal: _Refusal) -> None:

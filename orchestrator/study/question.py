@@ -30,6 +30,7 @@ from orchestrator.study.parts import (
     extremes,
     percentile,
 )
+from orchestrator.study.sieve import LARGEST_RATIO
 
 BUILDABLE_DEG = (1.0, 60.0)
 """Slopes of piles that can be meshed and packed."""
@@ -45,8 +46,6 @@ ROUGHEST = 1 / 3
 """Largest z0 over the diameter of the bed's grains; measured are up to 1/7."""
 LEAST_UPDATE = 0.02
 """Least part of the grains between two solves of the flow."""
-LARGEST_RATIO = 10.0
-"""Largest ratio of a mixture's grains: the time of DEM rises with its square."""
 OFF_SIEVE = 1e-5
 """Relative difference of the d50 of a sieve table from the diameter: messages and
 tables print it with six digits."""

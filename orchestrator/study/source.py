@@ -7,6 +7,7 @@ Nothing here imports a library: a finished study is told from its bytes in a ten
 second.
 """
 
+import codecs
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -18,6 +19,18 @@ from orchestrator.runs.files import digest_file, opened
 
 if TYPE_CHECKING:  # no file is read by what it loads
     from orchestrator.study.own_errors import OwnErrors
+
+BEGIN = 256
+"""Bytes by which the encoding of a file is told."""
+AS_CSV = "save its sheet as CSV in UTF-8, and name that file"
+UNPACK = "unpack it, and name the file in it"
+NO_TEXT = {
+    b"PK\x03\x04": ("it is a workbook of a spreadsheet, or an archive", AS_CSV),
+    b"\xd0\xcf\x11\xe0": ("it is a workbook of a spreadsheet", AS_CSV),
+    b"\x1f\x8b": ("it is compressed", UNPACK),
+    b"%PDF": ("it is a PDF", "write its table as CSV"),
+}
+"""Files that are given in place of texts, by their first bytes."""
 
 
 @dataclass(frozen=True)
@@ -142,15 +155,21 @@ def read_bytes(path: Path, largest: int, where: str) -> bytes:
     return content
 
 
-def decoded(content: bytes, where: str) -> str:
+def decoded(content: bytes, where: str, *, is_data: bool = False) -> str:
     """Decode a file of the user.
+
+    UTF-8 and UTF-16 are told by their bytes. Tables of numbers may also be in the
+    Western European code page of Windows, in which letters beyond ASCII stand in names
+    and units alone.
 
     Parameters
     ----------
     content
-        The content, text in UTF-8.
+        The content.
     where
         Its name in messages.
+    is_data
+        Whether it is a table of numbers; a study file is UTF-8 or UTF-16.
 
     Returns
     -------
@@ -162,14 +181,31 @@ def decoded(content: bytes, where: str) -> str:
     InputError
         For any other content.
     """
+    for mark, (what, remedy) in NO_TEXT.items():
+        if content.startswith(mark):
+            raise InputError(what, where, remedy)
     try:
-        # some editors begin with a mark of the encoding
-        text = content.decode("utf-8-sig")
+        text = content.decode(_encoding(content))
     except ValueError as error:
-        raise _unreadable(error, where) from None
+        if not is_data or b"\0" in content:
+            raise _unreadable(error, where) from None
+        text = content.decode("cp1252", errors="replace")
     if "\0" in text:
         raise _unreadable(ValueError("binary, not text"), where)
     return text
+
+
+def _encoding(content: bytes) -> str:
+    """The encoding of a text by its first bytes: its mark, or where its zeros are."""
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16"
+    for first, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
+        of_high, of_low = content[first:BEGIN:2], content[1 - first : BEGIN : 2]
+        # the high bytes of digits and signs are zero, and no low one is
+        if of_high and not of_high.strip(b"\0") and b"\0" not in of_low:
+            return encoding
+    # some editors begin with a mark of the encoding
+    return "utf-8-sig"
 
 
 def _unreadable(error: Exception, where: str) -> InputError:

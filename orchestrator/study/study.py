@@ -49,6 +49,7 @@ from orchestrator.study.reading import (
 from orchestrator.study.scene import Scene, roughness_length
 from orchestrator.study.scopes import BY
 from orchestrator.study.shapes import SHAPES
+from orchestrator.study.sieve import SieveTable
 from orchestrator.study.source import Source, presets
 
 BED = {"kind": "grain", "roughness": "d/30"}
@@ -261,6 +262,10 @@ class Study(Generic[S]):
         The numerical errors by which it is answered; None for those of the package.
     asked
         What is said of numbers that are usual in another unit.
+    understood
+        What was understood of each file that it names, in words, by name.
+    sieves
+        The sieve tables that it names, by their classes.
     kind
         The kind of its beds.
     """
@@ -281,6 +286,10 @@ class Study(Generic[S]):
     """None: those of the package."""
     asked: tuple[units.NumberRemark, ...] = ()
     """What is said of numbers that are usual in another unit; of a preset nothing."""
+    understood: Mapping[str, str] = field(default_factory=dict, compare=False)
+    sieves: Mapping[tuple[tuple[float, float], ...], SieveTable] = field(
+        default_factory=dict, compare=False
+    )
     kind: Kind[S] = field(kw_only=True, compare=False, repr=False)
 
     @property
@@ -460,6 +469,8 @@ def _study(
         erosion=file.erosion,
         text=text + files.added,
         asked=tuple(asked),
+        understood=dict(files.understood),
+        sieves=dict(files.sieves),
         kind=kind,
     )
 

@@ -5,7 +5,7 @@ from the ground around the form: a plane, level or with a gentle fall. A heap is
 rises above it.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from hashlib import sha256
 from math import atan2, degrees, hypot, pi, radians, tan
@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from orchestrator.digits import number as counted
 from orchestrator.digits import on_grid
 from orchestrator.errors import InputError
 from orchestrator.study.noise import MEDIAN
@@ -161,6 +162,8 @@ class Surface:
         Standard deviation of the heights of the rim off the ground, m.
     digest
         SHA-256 of the axes, of the heights above the ground and of the smoothing.
+    understood
+        What was understood of its file, in words; empty of a shape.
     """
 
     name: str = field(compare=False)
@@ -173,6 +176,7 @@ class Surface:
     system: str = field(compare=False, repr=False)
     noise: float = field(compare=False)
     digest: str
+    understood: str = field(default="", compare=False)
 
     def __str__(self) -> str:
         return f"{self.name} ({self.digest[:12]})"
@@ -462,6 +466,8 @@ class Raster:
         Heights, m, of shape (ny, nx).
     system
         Coordinate reference system as well-known text; empty without any.
+    understood
+        What its file says of its columns, its unit, its system and its empty cells.
     """
 
     name: str
@@ -469,6 +475,30 @@ class Raster:
     y: FloatArray
     z: FloatArray
     system: str = ""
+    understood: tuple[str, ...] = ()
+
+    @property
+    def steps(self) -> tuple[float, float]:
+        """Steps along x and along y, m."""
+        along_x = float(np.ptp(self.x)) / (len(self.x) - 1)
+        along_y = float(np.ptp(self.y)) / (len(self.y) - 1)
+        return along_x, along_y
+
+    @property
+    def said(self) -> str:
+        """What was understood of the file, in words, with its extent."""
+        empty = int(np.isnan(self.z).sum())
+        cells = counted(empty, "cell")
+        words = [
+            *self.understood,
+            f"{len(self.x)} x {len(self.y)} heights, "
+            "{:.4g} m by {:.4g} m apart".format(*self.steps),
+            f"x {self.x[0]:.9g} to {self.x[-1]:.9g} m, "
+            f"y {self.y[0]:.9g} to {self.y[-1]:.9g} m",
+            f"heights {np.nanmin(self.z):.6g} to {np.nanmax(self.z):.6g} m",
+            f"{cells} without a height" if empty else "no cell without a height",
+        ]
+        return "; ".join(words)
 
 
 def checked(raster: Raster, where: str) -> Surface:
@@ -533,7 +563,7 @@ def checked(raster: Raster, where: str) -> Surface:
         noise,
     )
     _check_slopes(surface, where)
-    return surface
+    return replace(surface, understood=raster.said)
 
 
 def _ground(raster: Raster, is_rim: BoolArray) -> Plane:

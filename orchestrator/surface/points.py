@@ -8,15 +8,18 @@ import io
 import re
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 
 from orchestrator.errors import InputError
+from orchestrator.study.cells import Marks, marks_of
 from orchestrator.study.heads import (
+    ALONG_LINE,
     DEGREES,
+    DEPTHS,
     EAST,
     HEIGHT,
     METRE,
@@ -25,6 +28,7 @@ from orchestrator.study.heads import (
     in_metres,
     more_cells,
     name_of,
+    one_word,
 )
 from orchestrator.study.units import number
 from orchestrator.surface.heights import FEWEST, MOST_NODES, Raster
@@ -32,7 +36,10 @@ from orchestrator.types import FloatArray, IntArray
 
 AXES = {"x": EAST, "y": NORTH, "z": HEIGHT}
 """What the columns of each axis are called."""
-CERTAIN = (*EAST[1:], *NORTH[1:])
+CERTAIN = (
+    *(name for name in EAST if "x" not in name),
+    *(name for name in NORTH if "y" not in name),
+)
 """Names that say which way a column goes; geodesists call the northing x."""
 OFF_GRID = 0.1
 """Largest distance of a point from its place on a grid, in steps."""
@@ -40,7 +47,12 @@ NORTHINGS, EASTINGS = 1e6, 1e5
 """Northings of maps lie above the one, eastings between the two, m."""
 COMMENT = re.compile(r"^\s*(#|//|%|!)+\s*")
 POINT_REMEDY = "x, y and z in m, with a decimal point"
-NAMES_REMEDY = "name them x, y and z, or easting, northing and height, all in m"
+NAMES_REMEDY = (
+    "name them x, y and z, or easting, northing and height, all in m; known are "
+    f"{one_word(EAST)}; {one_word(NORTH)}; {one_word(HEIGHT)}"
+)
+DECIMAL_COMMA = re.compile(r"(?<![\d,])(?:0|\d{4,}),\d|\d,(?:\d{1,2}|\d{4,})(?![\d,])")
+"""A comma that can only be a decimal mark."""
 
 
 def read_points(text: str, name: str, where: str) -> Raster:
@@ -69,19 +81,10 @@ def read_points(text: str, name: str, where: str) -> Raster:
     lines = _Lines(text.splitlines(), where)
     layout = lines.layout()
     lines.check_cells(layout)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # an empty file is refused below
-            points = np.loadtxt(
-                io.BytesIO(text.encode()),
-                delimiter=layout.separator,
-                quotechar='"',
-                skiprows=layout.first,
-                usecols=layout.columns,
-                ndmin=2,
-            )
-    except ValueError:
-        raise lines.wrong(layout) from None
+    marks = Marks()
+    points = _numbers(text, layout)
+    if points is None:
+        points, marks = _with_marks(text, lines, layout)
     is_place = np.isfinite(points[:, :2]).all(axis=1)
     if not is_place.all():
         what = "x or y is not a number"
@@ -90,7 +93,51 @@ def read_points(text: str, name: str, where: str) -> Raster:
         what = f"{len(points)} points are no surface"
         raise InputError(what, where, "x, y and z in m, a point in each line")
     _check_order(points, layout, where)
-    return _on_grid(points, lines, layout, name)
+    raster = _on_grid(points, lines, layout, name)
+    return replace(raster, understood=(*layout.said, *filter(None, [marks.said])))
+
+
+def _numbers(text: str, layout: "_Layout") -> FloatArray | None:
+    """The points of a text with decimal points; None if a cell is no number."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # an empty file is refused below
+            return np.loadtxt(
+                io.BytesIO(text.encode()),
+                delimiter=layout.separator,
+                quotechar='"',
+                skiprows=layout.first,
+                usecols=layout.columns,
+                ndmin=2,
+            )
+    except ValueError:
+        return None
+
+
+def _with_marks(
+    text: str, lines: "_Lines", layout: "_Layout"
+) -> tuple[FloatArray, Marks]:
+    """The points of a text with other numbers, and how these are written."""
+    if "." not in text and DECIMAL_COMMA.search(text) and layout.separator != ",":
+        # no comma marks thousands where another one is a decimal mark
+        points = _numbers(text.replace(",", "."), layout)
+        if points is not None:
+            return points, Marks(",")
+    cells = [each for _, each in lines.points(layout)]
+    if any(len(each) <= max(layout.columns) for each in cells):
+        raise lines.wrong(layout)
+    rows = [[each[column] for column in layout.columns] for each in cells]
+    try:
+        marks = marks_of(cell for row in rows for cell in row)
+    except ValueError as error:
+        raise InputError(str(error), lines.where, POINT_REMEDY) from None
+    found = np.empty((len(rows), 3))
+    for at, row in enumerate(rows):
+        try:
+            found[at] = [marks.number(cell) for cell in row]
+        except ValueError as error:
+            raise lines.refusal(layout, at, str(error), POINT_REMEDY) from None
+    return found, marks
 
 
 class _Layout(NamedTuple):
@@ -106,6 +153,18 @@ class _Layout(NamedTuple):
     """The names of all columns; empty without a head."""
     cells: int
     """How many cells a line has at most."""
+
+    @property
+    def said(self) -> tuple[str, ...]:
+        """What was understood of its columns, in words."""
+        if not self.names:
+            return ("its first three columns are x, y and z, in m",)
+        x, y, z = (self.names[column].strip() for column in self.columns)
+        words = [f"x from {x!r}, y from {y!r}, heights from {z!r}, in m"]
+        datum = name_of(z).datum
+        if datum:
+            words.append(f"levels above {datum}")
+        return tuple(words)
 
 
 @dataclass(frozen=True)
@@ -178,6 +237,15 @@ class _Lines:
             remedy = "project them to metres, with gdaltransform -t_srs EPSG:326NN"
             return InputError(what, self.place(place), remedy)
         what = f"the columns are {', '.join(cells)}"
+        plain = {name_of(cell).plain for cell in cells}
+        if plain & {*ALONG_LINE}:
+            what = f"{what}: along a line, not on a map"
+            remedy = "give easting and northing, from which winds have a direction"
+            return InputError(what, self.place(place), remedy)
+        if plain & {*DEPTHS} and not plain & {*HEIGHT}:
+            what = f"{what}: depths go down"
+            remedy = "give heights: levels of the water less depths"
+            return InputError(what, self.place(place), remedy)
         remedy = in_metres(cells) or f"{NAMES_REMEDY}, or remove the line"
         return InputError(what, self.place(place), remedy)
 

@@ -7,20 +7,25 @@ import re
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
+from math import radians, tan
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from orchestrator.digits import number as number_of
 from orchestrator.errors import InputError
 from orchestrator.extras import imported
+from orchestrator.study.cells import Marks, marks_of
 from orchestrator.study.heads import METRE
 from orchestrator.study.source import decoded, read_bytes
 from orchestrator.study.units import number
 from orchestrator.surface.heights import (
     FEWEST,
     MOST_NODES,
+    STEEPEST_DEG,
     Raster,
     Surface,
     checked,
@@ -45,9 +50,27 @@ STEPS = ("cellsize", "dx", "dy")
 EMPTY = "nodata_value"
 """The key for what stands in cells without a height."""
 GRID_KEYS = (*NEEDED, "xllcenter", "yllcenter", "dx", "dy", EMPTY)
+SYNONYMS = {
+    **dict.fromkeys(("cell_size", "cell", "resolution", "xycellsize"), "cellsize"),
+    **dict.fromkeys(("xdim", "cellsize_x", "xcellsize", "cellsizex"), "dx"),
+    **dict.fromkeys(("ydim", "cellsize_y", "ycellsize", "cellsizey"), "dy"),
+    **dict.fromkeys(("xll", "xcorner", "xllcorner_m", "xll_corner"), "xllcorner"),
+    **dict.fromkeys(("yll", "ycorner", "yllcorner_m", "yll_corner"), "yllcorner"),
+    **dict.fromkeys(("xllcentre", "xll_center", "xcenter"), "xllcenter"),
+    **dict.fromkeys(("yllcentre", "yll_center", "ycenter"), "yllcenter"),
+    **dict.fromkeys(("cols", "columns", "ncol", "nx"), "ncols"),
+    **dict.fromkeys(("rows", "nrow", "ny"), "nrows"),
+    **dict.fromkeys(
+        ("nodata", "no_data", "no_data_value", "nodatavalue", "null", "missing"), EMPTY
+    ),
+}
+"""Other names for the keys of a grid."""
+GRASS_KEYS = ("north", "south", "east", "west")
+"""Keys of the head of a grid of GRASS, which has edges in place of a corner."""
 UNNAMED_EMPTY = "-9999"
 """What stands in them by the format where the key is missing."""
-WORDS = ("null", "nan")
+GRID_REMEDY = "numbers with a decimal point, spaces between them"
+WORDS = ("null", "nan", "*", "na")
 """Words that stand there in place of a number."""
 NEAR_EMPTY = 1e-6
 """Largest difference of an empty cell from the number of empty cells, over that: it is
@@ -62,8 +85,24 @@ UNIT_OFF = 1e-4
 """Largest difference of a unit from the metre, m: the German legal metre."""
 FORMAT_OF = {"GTiff": "GeoTIFF", "AAIGrid": "ESRI grid"}
 """Formats by GDAL's names for them."""
+TEXTS = (".asc", ".xyz", ".csv", ".txt")
+OTHER_ENDINGS = {
+    **dict.fromkeys((".las", ".laz"), "a cloud of points: grid it with pdal; "),
+    **dict.fromkeys((".gz", ".zip"), "unpack it; "),
+    **dict.fromkeys((".xls", ".xlsx", ".ods"), "save its sheet as CSV; "),
+    **dict.fromkeys(
+        (".img", ".vrt", ".grd", ".dem", ".hgt", ".bil", ".flt", ".nc"),
+        "gdal_translate makes a .tif of it; ",
+    ),
+}
+"""What helps with files of other endings."""
 FORMATS = ".tif .tiff (GeoTIFF), .asc (ESRI), .xyz .csv .txt (x y z), .stl"
 POINT_REMEDY = "leave such points out"
+MARKS_OF_EMPTY = (99, 999, 9999, 99999, 999999, 9999999, 32767, 32768, 65535)
+"""Numbers of one sign or the other that stand for no height in many files."""
+ISOLATED = 10.0
+"""How many times the range of all other heights one that stands for none is off them,
+if several cells have it."""
 DECLARED = {
     ".tif": "declare it: gdal_edit -a_nodata {:.9g}",
     ".asc": "declare it in the head: NODATA_value {:.9g}",
@@ -118,27 +157,66 @@ def read_surface(path: Path, where: str) -> Surface:
     ending = path.suffix.lower().replace(".tiff", ".tif")
     if ending == ".tif":
         raster = _of_geotiff(path, where)
-    elif ending == ".asc":
-        raster = _of_grid(path, where)
-    elif ending in (".xyz", ".csv", ".txt"):
-        text = decoded(read_bytes(path, LARGEST, where), where)
-        raster = read_points(text, path.name, where)
+    elif ending in TEXTS:
+        text = decoded(read_bytes(path, LARGEST, where), where, is_data=True)
+        # a text is what it holds: agencies call both .asc, and both .txt
+        if _is_grid(text, ending):
+            raster = _of_grid(path, text, where)
+        else:
+            raster = read_points(text, path.name, where)
     elif ending == ".stl":
         raster = read_triangles(path, LARGEST, where)
     else:
         what = f"the ending {ending!r} is of no surface"
-        raise InputError(what, where, f"endings: {FORMATS}")
-    _check_heights(raster.z, DECLARED.get(ending, POINT_REMEDY), where)
+        remedy = OTHER_ENDINGS.get(ending, "")
+        raise InputError(what, where, f"{remedy}endings: {FORMATS}")
+    _check_heights(raster, DECLARED.get(ending, POINT_REMEDY), where)
     return checked(raster, where)
 
 
-def _check_heights(z: FloatArray, remedy: str, where: str) -> None:
+def _is_grid(text: str, ending: str) -> bool:
+    """Whether a text is a grid, and no list of points."""
+    first = next((line for line in text.splitlines() if line.strip()), "")
+    words = re.split(r"[\s:=]+", first.strip())
+    if _key_of(words[0]) in (*GRID_KEYS, *GRASS_KEYS) and len(words) == 2:
+        return True
+    try:
+        are_numbers = len([float(word) for word in words]) > 2
+    except ValueError:
+        are_numbers = False
+    return ending == ".asc" and not are_numbers
+
+
+def _check_heights(raster: Raster, remedy: str, where: str) -> None:
     """Refuse heights that no ground has, and that stand for no height."""
-    for value in (float(np.nanmin(z, initial=0.0)), float(np.nanmax(z, initial=0.0))):
-        if not -DEEPEST <= value <= HIGHEST and np.isfinite(value):
-            what = f"{value:.6g} in {int((z == value).sum())} cells"
-            what = f"{what} looks like a cell without a height"
+    z = raster.z[np.isfinite(raster.z)]
+    if not z.size:
+        return
+    for value in (float(z.min()), float(z.max())):
+        others = z[z != value]
+        count = int(z.size - others.size)
+        if not -DEEPEST <= value <= HIGHEST or _is_isolated(
+            value, count, others, max(raster.steps)
+        ):
+            cells = number_of(count, "cell")
+            what = f"{value:.6g} in {cells} looks like a cell without a height"
             raise InputError(what, where, remedy.format(value))
+
+
+def _is_isolated(value: float, count: int, others: FloatArray, step: float) -> bool:
+    """Whether a height is so far off all others that it stands for none.
+
+    No slope leads to it, and it is a number that files use so, or several cells have
+    it.
+    """
+    if not others.size:
+        return False
+    off = min(abs(value - float(others.min())), abs(value - float(others.max())))
+    spread = float(np.ptp(others))
+    if off <= max(spread, step * tan(radians(STEEPEST_DEG))):
+        return False
+    is_mark = abs(value) in MARKS_OF_EMPTY
+    return is_mark or (count > 1 and off > ISOLATED * spread)
 
 
 @contextmanager
@@ -166,7 +244,8 @@ def opened_raster(path: Path, where: str) -> Iterator["Opened"]:
         raise InputError("there is no such file", where, "a GeoTIFF, or .asc")
     ending = path.suffix.lower()
     if ending == ".asc":
-        with _grid(path, where) as opened:
+        text = decoded(read_bytes(path, LARGEST, where), where, is_data=True)
+        with _grid(path, text, where) as opened:
             yield opened
     elif ending in (".tif", ".tiff"):
         with _opened(path, "GTiff", where) as dataset:
@@ -187,11 +266,14 @@ class Opened(NamedTuple):
         Its coordinate reference system; None without one.
     empty
         The number of its empty cells; None where no number stands for them.
+    said
+        What was understood of a text, in words.
     """
 
     dataset: Any
     system: Any
     empty: float | None
+    said: tuple[str, ...] = ()
 
 
 def is_empty(values: FloatArray, empty: float | None) -> BoolArray:
@@ -223,7 +305,30 @@ def _of_geotiff(path: Path, where: str) -> Raster:
         if unit.lower() not in ("", *METRE):
             what = f"its heights are in {unit}"
             raise InputError(what, where, "they must be in m: gdal_calc")
-        return _raster(dataset, path.name, dataset.crs, dataset.nodata, where)
+        empty = dataset.nodata
+        words = [f"a GeoTIFF of {dataset.dtypes[0]}, {_said_of_empty(empty)}"]
+        if (dataset.scales[0], dataset.offsets[0]) != (1.0, 0.0):
+            scale, offset = dataset.scales[0], dataset.offsets[0]
+            words.append(f"its numbers times {scale:g} plus {offset:g} are heights")
+        raster = _raster(dataset, path.name, dataset.crs, empty, where)
+    return replace(raster, understood=(*words, _said_of_system(dataset.crs)))
+
+
+def _said_of_empty(empty: float | str | None) -> str:
+    """What is said of the mark of empty cells."""
+    if empty is None:
+        return "which declares no number for empty cells"
+    mark = empty if isinstance(empty, str) else f"{empty:.9g}"
+    return f"{mark} in empty cells"
+
+
+def _said_of_system(system: Any) -> str:
+    """What is said of a coordinate reference system; without one lengths are in m."""
+    if not system:
+        return "no coordinate system: lengths taken for m"
+    code = system.to_epsg()
+    name = f"EPSG:{code}" if code else system.to_dict(projjson=True)["name"]
+    return f"in {name}, in m"
 
 
 def _opened(path: Path | str, driver: str, where: str, **options: str) -> Any:
@@ -331,36 +436,77 @@ def _units(described: Mapping[str, Any]) -> Iterator[tuple[str, str, float | Non
                 yield quantity, unit["name"], metres
 
 
-def _of_grid(path: Path, where: str) -> Raster:
-    """The raster of an ESRI ASCII grid."""
-    with _grid(path, where) as (dataset, system, empty):
-        return _raster(dataset, path.name, system, empty, where)
+def _of_grid(path: Path, text: str, where: str) -> Raster:
+    """The raster of an ESRI ASCII grid, or of one of GRASS."""
+    with _grid(path, text, where) as opened:
+        raster = _raster(opened.dataset, path.name, opened.system, opened.empty, where)
+    return replace(raster, understood=opened.said)
 
 
 @contextmanager
-def _grid(path: Path, where: str) -> Iterator[Opened]:
-    """An ESRI ASCII grid as rasterio opens it."""
+def _grid(path: Path, text: str, where: str) -> Iterator[Opened]:
+    """An ESRI ASCII grid, or one of GRASS, as rasterio opens it."""
     system = _system_beside(path.with_suffix(".prj"), where)
-    text = decoded(read_bytes(path, LARGEST, where), where)
-    empty = _check_grid(text, where)
-    # a mark of the encoding is no part of the text
-    memory = rasterio(where).MemoryFile(text.encode(), ext=".asc")
+    text, marks = _with_points(text, where)
+    grid = _check_grid(text, where)
+    by = "" if grid.is_declared else " by the format"
+    said = [f"a grid with {_said_of_empty(grid.empty)}{by}", _said_of_system(system)]
+    if marks.said:
+        said.insert(1, marks.said)
+    empty = None if isinstance(grid.empty, str) else grid.empty
+    memory = rasterio(where).MemoryFile(grid.text.encode(), ext=".asc")
     # numbers as they are written: 32-bit ones have seven digits
     precise = {"DATATYPE": "Float64"}
     with memory, _opened(memory.name, "AAIGrid", where, **precise) as dataset:
-        yield Opened(dataset, system, empty)
+        yield Opened(dataset, system, empty, tuple(said))
 
 
-def _check_grid(text: str, where: str) -> float | None:
+def _with_points(text: str, where: str) -> tuple[str, Marks]:
+    """The text of a grid with decimal points, and how its numbers are written."""
+    if "," not in text:
+        return text, Marks()
+    words = [word for line in text.splitlines() for word in line.split()]
+    try:
+        marks = marks_of(words)
+        if marks.decimal == "." and not marks.thousands:
+            return text, marks
+        mark = marks.thousands
+        bare = text.replace(mark, "") if mark else text
+        return bare.replace(marks.decimal, "."), marks
+    except ValueError as error:
+        of_commas = (i for i, line in enumerate(text.splitlines(), 1) if "," in line)
+        place = f"{where}: line {next(of_commas)}"
+        raise InputError(str(error), place, GRID_REMEDY) from None
+
+
+class _Grid(NamedTuple):
+    """A grid as its reader takes it.
+
+    Attributes
+    ----------
+    text
+        The grid, with the keys of ESRI.
+    empty
+        The number of empty cells, or a word.
+    is_declared
+        Whether the head has it.
+    """
+
+    text: str
+    empty: float | str
+    is_declared: bool
+
+
+def _check_grid(text: str, where: str) -> _Grid:
     """Refuse a grid that its reader would take for another one.
 
     It takes a word for 0, a decimal comma for a point, an unknown key for none, and a
-    file that is cut off for a whole one. Returned is the number of empty cells; None
-    for a word, which the reader knows.
+    file that is cut off for a whole one.
     """
     lines = text.splitlines()
-    head = _head_of_grid(lines, where)
-    before = len(head)
+    head, before = _head_of_grid(lines, where)
+    given = dict(head)
+    is_declared = EMPTY in head
     empty = head.pop(EMPTY, UNNAMED_EMPTY)
     sizes = {key: _number(word, f"{where}: {key}") for key, word in head.items()}
     for key, value in sizes.items():
@@ -371,7 +517,18 @@ def _check_grid(text: str, where: str) -> float | None:
     is_word = empty.lower() in WORDS
     word = empty if is_word else "nan"
     widths = _widths(lines[before:], before, word, where)
-    columns, rows = sizes["ncols"], sizes["nrows"]
+    _check_counts(widths, sizes["ncols"], sizes["nrows"], where)
+    body = "\n".join(lines[before:])
+    if is_word:
+        given[EMPTY] = "nan"
+        body = re.sub(rf"(?<!\S){re.escape(empty)}(?!\S)", "nan", body)
+    written = "".join(f"{key} {value}\n" for key, value in given.items())
+    mark = empty if is_word else _number(empty, f"{where}: {EMPTY}")
+    return _Grid(f"{written}{body}\n", mark, is_declared)
+
+
+def _check_counts(widths: list[int], columns: float, rows: float, where: str) -> None:
+    """Refuse a grid whose lines have other counts of heights than its head."""
     if columns % 1 or columns * rows != sum(widths) or min(columns, rows) < FEWEST:
         what = f"{sum(widths)} heights, not {columns:.9g} x {rows:.9g}"
         remedy = f"nrows lines of ncols numbers, {FEWEST} of each at least"
@@ -379,23 +536,37 @@ def _check_grid(text: str, where: str) -> float | None:
     if {*widths} == {rows} and rows != columns:
         what = f"its lines have {rows:.9g} numbers, and ncols is {columns:.9g}"
         raise InputError(what, where, "are ncols and nrows exchanged?")
-    return None if is_word else _number(empty, f"{where}: {EMPTY}")
 
 
-def _head_of_grid(lines: list[str], where: str) -> dict[str, str]:
-    """The words at the head of a grid by their keys, a line for each."""
+def _key_of(word: str) -> str:
+    """The key of a grid that a word is, or the word itself in small letters."""
+    key = word.lower().rstrip(":=")
+    return SYNONYMS.get(key, key)
+
+
+def _head_of_grid(lines: list[str], where: str) -> tuple[dict[str, str], int]:
+    """The words at the head of a grid by their keys, and how many lines it has."""
     head: dict[str, str] = {}
+    before = 0
     for line in lines:
-        words = line.split()
-        if len(words) != 2 or not words[0][0].isalpha() or words[0] in WORDS:
+        words = re.split(r"[\s:=]+", line.strip().strip(":="))
+        if not words[0]:
+            before += 1
+            continue
+        is_mark = words[0].lower() in WORDS and ":" not in line
+        if not words[0][0].isalpha() or is_mark or len(words) != 2:
             break
-        key = words[0].lower()
+        key = _key_of(words[0])
         if key in head:
             raise InputError(f"{key} stands twice", where, "remove one of the lines")
-        if key not in GRID_KEYS:
+        if key not in (*GRID_KEYS, *GRASS_KEYS):
             what = f"{words[0]} is no key of a grid"
-            raise InputError(what, where, f"its head has {', '.join(GRID_KEYS)}")
+            remedy = f"its head has {', '.join(GRID_KEYS)}; or {', '.join(GRASS_KEYS)}"
+            raise InputError(what, where, remedy)
         head[key] = words[1]
+        before += 1
+    if any(key in head for key in GRASS_KEYS):
+        head = _of_edges(head, where)
     for one, others in NEEDED.items():
         if one in head and others & head.keys():
             what = f"its head has {one} and {' and '.join(others & head.keys())}"
@@ -403,7 +574,30 @@ def _head_of_grid(lines: list[str], where: str) -> dict[str, str]:
         if one not in head and not (others and others <= head.keys()):
             remedy = "its head has ncols, nrows, xllcorner, yllcorner, cellsize"
             raise InputError(f"{one} is missing", where, remedy)
-    return head
+    return head, before
+
+
+def _of_edges(head: Mapping[str, str], where: str) -> dict[str, str]:
+    """The head of a grid of GRASS with the keys of ESRI."""
+    for key in (*GRASS_KEYS, "ncols", "nrows"):
+        if key not in head:
+            remedy = f"its head has {', '.join(GRASS_KEYS)}, rows and cols"
+            raise InputError(f"{key} is missing", where, remedy)
+    north, south, east, west, columns, rows = (
+        _number(head[key], f"{where}: {key}") for key in (*GRASS_KEYS, "ncols", "nrows")
+    )
+    if not (north > south and east > west and columns >= 1 and rows >= 1):
+        what = f"north {north:g}, south {south:g}, east {east:g}, west {west:g}"
+        raise InputError(what, where, "north lies above south, and east above west")
+    made = {
+        "ncols": head["ncols"],
+        "nrows": head["nrows"],
+        "xllcorner": head["west"],
+        "yllcorner": head["south"],
+        "dx": repr((east - west) / columns),
+        "dy": repr((north - south) / rows),
+    }
+    return made | ({EMPTY: head[EMPTY]} if EMPTY in head else {"nodata_value": "*"})
 
 
 def _widths(lines: list[str], before: int, word: str, where: str) -> list[int]:
@@ -427,7 +621,7 @@ def _number(word: str, where: str) -> float:
     try:
         return number(word)
     except ValueError:
-        remedy = "numbers with a decimal point, spaces between them"
+        remedy = GRID_REMEDY
         raise InputError(f"{word!r} is no number", where, remedy) from None
 
 

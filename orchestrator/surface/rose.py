@@ -46,11 +46,14 @@ class Rose:
         and share of time; the shares add up to 1.
     digest
         SHA-256 of the rows.
+    understood
+        What was understood of its file, in words.
     """
 
     name: str = field(compare=False)
     rows: tuple[tuple[float, float, float], ...] = field(compare=False, repr=False)
     digest: str
+    understood: str = field(default="", compare=False)
 
     def __str__(self) -> str:
         return f"{self.name} ({self.digest[:12]})"
