@@ -201,7 +201,7 @@ def _unit(opened: Opened, asked: str | None, where: str) -> tuple[str, bool]:
 
 def _sizes(opened: Opened) -> tuple[FloatArray, str]:
     """The area of a cell of each row, and its unit: m2, or cells."""
-    dataset, system, _ = opened
+    dataset, system = opened.dataset, opened.system
     transform = dataset.transform
     count = dataset.height
     if transform.is_identity:
@@ -228,7 +228,7 @@ def _windows(opened: Opened) -> Iterator[Any]:
 
 def _stress(opened: Opened, unit: float, where: str, **part: Any) -> FloatArray:
     """The stress of a part of a raster, Pa, NaN in empty cells."""
-    dataset, _, empty = opened
+    dataset, empty = opened.dataset, opened.empty
     try:
         stored = dataset.read(1, masked=True, **part)
     except rasterio(WHERE).errors.RasterioError as error:
@@ -267,7 +267,7 @@ def _ratios(stress: FloatArray, row: Row) -> FloatArray:
 
 def _written(opened: Opened, row: Row, unit: float, out: Path, where: str) -> Summary:
     """Write the map as a GeoTIFF, and count what it has."""
-    dataset, system, _ = opened
+    dataset, system = opened.dataset, opened.system
     _check_kind(dataset, where)
     library = rasterio(WHERE)
     areas, _ = _sizes(opened)
