@@ -23,7 +23,7 @@ from orchestrator.report.subjects import WIND, length, place_of_file
 from orchestrator.runs.case import said_of
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
-from orchestrator.study.sieve import Cut, said_of
+from orchestrator.study.sieve import Cut
 from orchestrator.tables.facts import packs_grains
 from orchestrator.tables.kinds import INTERLOCKED
 
@@ -212,7 +212,7 @@ def _cut(results: Results, scene: Scene, cut: Cut) -> Remark:
     size = end / scene.grain.diameter
     factor = float(wilcock_crowe_hiding(size))
     text = (
-        f"{said_of(cut)[:1].upper()}{said_of(cut)[1:]}: these grains are not in the "
+        f"{cut.said[:1].upper()}{cut.said[1:]}: these grains are not in the "
         "bed. By the hiding function of Wilcock and Crowe (2003), a formula that was "
         f"fitted to transport, grains of {length(end)} need {factor:.2f} times the "
         "stress of d50"

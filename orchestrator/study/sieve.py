@@ -177,6 +177,14 @@ class Cut:
         """Whether it is finer than all that is kept."""
         return math.isfinite(self.high)
 
+    @property
+    def said(self) -> str:
+        """What was cut, in words."""
+        part = f"{100 * self.fraction:.3g} % of the mass"
+        if self.is_fine:
+            return f"{part} is finer than {1e3 * self.high:.3g} mm and was cut"
+        return f"{part} is coarser than {1e3 * self.low:.3g} mm and was cut"
+
 
 @dataclass(frozen=True)
 class SieveTable:
@@ -711,27 +719,8 @@ class _Sieving:
             f"openings from {names[self.size]!r}, {kinds[self.values[column]]} from "
             f"{names[column]!r}: {counted(len(rows), 'size')} of {ends}"
         )
-        words = [_with_marks(said, self.marks), *notes, *map(said_of, cuts)]
+        words = [_with_marks(said, self.marks), *notes, *(cut.said for cut in cuts)]
         return "; ".join(words)
-
-
-def said_of(cut: Cut) -> str:
-    """Say what was cut from a sieve table.
-
-    Parameters
-    ----------
-    cut
-        What was cut.
-
-    Returns
-    -------
-    str
-        The words.
-    """
-    part = f"{100 * cut.fraction:.3g} % of the mass"
-    if cut.is_fine:
-        return f"{part} is finer than {1e3 * cut.high:.3g} mm and was cut"
-    return f"{part} is coarser than {1e3 * cut.low:.3g} mm and was cut"
 
 
 def _widest(classes: Sequence[_Class]) -> list[_Class]:

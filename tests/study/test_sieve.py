@@ -9,7 +9,7 @@ from orchestrator.digits import rounded
 from orchestrator.errors import InputError
 from orchestrator.report import remarks
 from orchestrator.study import study
-from orchestrator.study.sieve import Cut, read_sieve, said_of
+from orchestrator.study.sieve import Cut, read_sieve
 
 SIZES = (0.000707106781, 0.00141421356, 0.00282842712)
 """Between 0.5, 1, 2 and 4 mm, of whose grains 10, 50 and 40 % lie between two."""
@@ -97,9 +97,7 @@ def test_the_ten_to_one_with_most_of_the_mass_is_kept() -> None:
     assert [size for size, _ in table.rows] == pytest.approx(kept[::-1])
     assert [part for _, part in table.rows] == pytest.approx([40 / 70, 30 / 70])
     assert table.cuts == (Cut(0.0, 0.001, 0.2), Cut(0.016, float("inf"), 0.1))
-    assert (
-        said_of(table.cuts[1]) == "10 % of the mass is coarser than 16 mm and was cut"
-    )
+    assert table.cuts[1].said == "10 % of the mass is coarser than 16 mm and was cut"
     assert table.rows[-1][0] <= 10 * table.rows[0][0]
 
 
