@@ -53,6 +53,8 @@ OF_GRAINS = {
     "shields": ("shields_dem", "shields_closed_form"),
 }
 """Columns of single grains, by DEM and by the closed form, for those of piles."""
+DICTIONARY = "study"
+"""Name of a study from a dictionary."""
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
@@ -232,7 +234,7 @@ def _column(name: str, values: Any) -> "NDArray[Any]":
 
 
 def run(
-    source: str | Path,
+    source: str | Path | Mapping[str, Any],
     *,
     out: str | Path | None = None,
     workers: int | None = None,
@@ -243,9 +245,11 @@ def run(
     Parameters
     ----------
     source
-        The study file, or the name of a preset.
+        The study file, the name of a preset, or a dictionary with the tables of a
+        study file, such as ``{"grain": {"diameter": 1e-3}}``; files that it names are
+        those of the working directory.
     out
-        The directory, by default ``results/NAME``.
+        The directory, by default ``results/NAME``, of a dictionary ``results/study``.
     workers
         Number of cases at a time, by default one for each processor that the process
         may use.
@@ -272,11 +276,14 @@ def run(
         raise InputError(f"{workers!r} is no whole number", where="workers")
     if workers < 1:
         raise InputError(f"{workers} is below 1", where="workers")
-    _check_path("source", source)
     if out is not None:
         _check_path("out", out)
     [*guests.offers()]  # they have hints on the keys of their own beds
-    asked = study.load(source, tolerance)
+    if isinstance(source, Mapping):
+        asked = study.of_dictionary(source, DICTIONARY, tolerance)
+    else:
+        _check_path("source", source)
+        asked = study.load(source, tolerance)
     place = Path(out or Path("results") / asked.name)
     finished = pipeline.run(asked, place, workers=workers)
     if finished.failures:

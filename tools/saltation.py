@@ -1,10 +1,13 @@
-"""The table of thresholds of grains that hop, at the nodes of `orchestrator.physics.saltation`.
+"""The tables of thresholds of grains that hop, at the nodes of `orchestrator.physics.saltation`.
 
 python tools/saltation.py > orchestrator/physics/saltation.csv
+python tools/saltation.py roughness > orchestrator/physics/saltation_roughness.csv
 
-It takes some ten minutes of one core. Rows are in the order of Galileo number, density ratio and
-slope, the last of them fastest.
+The first takes some ten minutes of one core, the second half a minute. Rows are in the order of
+Galileo number, density ratio and slope, or z0/d, the last of them fastest.
 """
+
+import sys
 
 import numpy as np
 
@@ -12,11 +15,28 @@ from orchestrator.physics.grain import Grain
 from orchestrator.physics.saltation import (
     DENSITY_NODES,
     GALILEO_NODES,
+    OTHER_DENSITY_NODES,
+    OTHER_GALILEO_NODES,
+    RATIO_NODES,
     SLOPE_NODES_DEG,
+    cessation_thresholds,
     thresholds,
 )
 
-if __name__ == "__main__":
+
+def of_roughness() -> None:
+    """Print the table of beds of other roughness."""
+    galileo, density_ratio, ratio = np.meshgrid(
+        OTHER_GALILEO_NODES, OTHER_DENSITY_NODES, RATIO_NODES, indexing="ij"
+    )
+    grains = Grain.of_numbers(galileo, density_ratio, ratio=ratio).flat
+    print("cessation")
+    for value in cessation_thresholds(grains):
+        print(f"{value:.4g}")
+
+
+def of_slopes() -> None:
+    """Print the table of beds of d/30."""
     galileo, density_ratio, slope_deg = np.meshgrid(
         GALILEO_NODES, DENSITY_NODES, SLOPE_NODES_DEG, indexing="ij"
     )
@@ -25,3 +45,7 @@ if __name__ == "__main__":
     print("steady,cessation")
     for row in zip(found.steady, found.cessation, strict=True):
         print(",".join(f"{value:.4g}" for value in row))
+
+
+if __name__ == "__main__":
+    of_roughness() if sys.argv[1:] == ["roughness"] else of_slopes()

@@ -154,7 +154,6 @@ def _of_all_laws(
         each.column: grains[name] for name, each in PARAMETERS.items() if name in grains
     }
     grain = Grain.of_table(inputs)
-    level = grain.changed(slope_deg=0.0)
     by_law = {name: of_grains(grain, name, criterion) for name in LAWS}
     in_steady_flow = {name: at.leaving for name, at in by_law.items()}
     regimes = regime(in_steady_flow["low"], in_steady_flow["high"]).astype(object)
@@ -168,7 +167,7 @@ def _of_all_laws(
         block["regime"] = regimes
         rows_beside = beside({**block, **kind})
         block |= rows_beside
-        block["level_ustar_m_s"] = of_grains(level, name, criterion).friction_velocity
+        block["level_ustar_m_s"] = _on_level(at, criterion)
         with_inputs = {**inputs, **rows_beside}
         block["compared_level_ustar_m_s"] = compared_level_ustar(with_inputs)
         block[COMPARED_WITH] = compared_with(with_inputs)
@@ -180,6 +179,16 @@ def _of_all_laws(
         table[name] = np.stack(of_laws, axis=1).ravel()
     by_grain = zip(*(at.reasons() for at in by_law.values()), strict=True)
     return table, [*itertools.chain.from_iterable(by_grain)]
+
+
+def _on_level(at: Onset, criterion: str) -> NDArray[Any]:
+    """Friction velocities of the same grains on level beds, m/s."""
+    ustar = at.friction_velocity.copy()
+    slopes = np.flatnonzero(at.grain.slope_deg)
+    if len(slopes):
+        level = at.grain.at(slopes).changed(slope_deg=0.0)
+        ustar[slopes] = of_grains(level, at.law, criterion).friction_velocity
+    return ustar
 
 
 def _block(at: Onset, inputs: Table) -> Table:

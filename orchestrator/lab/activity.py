@@ -100,7 +100,7 @@ def compare_activity() -> pd.DataFrame:
     of_site = _measured_thresholds().loc[rows["site"]]
     # in gusts that are followed one by one, a threshold is that of a steady stress
     by_model = {
-        "stops": saltation.tabulated(grains).cessation,
+        "stops": saltation.cessation(grains),
         "starts": of_grains(grains, LAW, SUSTAINED, gust=1.0).shields,
     }
     stress = rows["rho_f_kg_m3"] * rows["ustar_m_s"] ** 2

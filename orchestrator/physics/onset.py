@@ -80,7 +80,7 @@ class Criteria:
         A grain that hops in the wind keeps the speed that it has won, and goes on below
         the stress that sets it in motion.
         """
-        return np.fmin(saltation.tabulated(self.spheres).cessation, self.sustained)
+        return np.fmin(saltation.cessation(self.spheres), self.sustained)
 
     def columns(self) -> dict[str, Any]:
         """Make the columns of both criteria.

@@ -599,17 +599,8 @@ def thresholds(
     def from_pocket(part: Grain, shields: FloatArray) -> IntArray:
         return fate(part, shields, rebound=rebound, steps=steps)
 
-    def from_motion(part: Grain, shields: FloatArray) -> IntArray:
-        return fate(
-            part,
-            shields,
-            speed=_fast(part, shields),
-            angle_deg=GRAZING_DEG,
-            rebound=rebound,
-            steps=steps,
-        )
-
-    return HoppingThresholds(least(grains, from_pocket), least(grains, from_motion))
+    ceasing = cessation_thresholds(grains, rebound=rebound, steps=steps)
+    return HoppingThresholds(least(grains, from_pocket), ceasing)
 
 
 def under_gust(
@@ -707,6 +698,119 @@ GALILEO_NODES = np.geomspace(0.3, 1e5, 51)
 DENSITY_NODES = np.geomspace(1.1, 1e5, 27)
 SLOPE_NODES_DEG = np.linspace(-30.0, 30.0, 13)
 """Nodes of the table."""
+
+
+ROUGHNESS_TABLE = Path(__file__).with_name("saltation_roughness.csv")
+"""Thresholds of cessation on level beds of other roughness, by the same tool."""
+OTHER_GALILEO_NODES = np.geomspace(0.3, 1e5, 26)
+OTHER_DENSITY_NODES = np.array(
+    [1.1, 1.3, 1.6, 2.0, 2.65, 4, 8, 20, 60, 200, 700, 2200, 7000, 2.5e4, 1e5]
+)
+RATIO_NODES = np.concatenate(
+    [np.geomspace(1e-3, 0.01, 5), np.geomspace(0.01, 0.1, 10)[1:]]
+)
+"""Nodes of that table; the last are of z0/d."""
+
+
+def cessation_thresholds(
+    grains: Grain, *, rebound: Rebound = BEADS, steps: int = STEPS
+) -> FloatArray:
+    """Find the thresholds at which grains in motion stop, without those of starting.
+
+    Parameters
+    ----------
+    grains
+        The grains.
+    rebound
+        What happens where a grain meets the bed.
+    steps
+        Time steps of a hop.
+
+    Returns
+    -------
+    FloatArray
+        Shields numbers, shape (n,), as in `HoppingThresholds`.
+
+    Examples
+    --------
+    >>> print(cessation_thresholds(Grain.of_numbers(127.0, 2.65)).round(4))
+    [0.0327]
+    """
+
+    def from_motion(part: Grain, shields: FloatArray) -> IntArray:
+        return fate(
+            part,
+            shields,
+            speed=_fast(part, shields),
+            angle_deg=GRAZING_DEG,
+            rebound=rebound,
+            steps=steps,
+        )
+
+    return least(grains, from_motion)
+
+
+def cessation(grains: Grain) -> FloatArray:
+    """Find the thresholds of cessation, also on beds of another roughness, at once.
+
+    That of z0 = d/30 is the table's. On others it has the factor of a level bed of that
+    roughness, which is interpolated in logarithms of Galileo number, density ratio and
+    z0/d. Of 230 grains at random on level beds this differs from `thresholds` by 0.1 %
+    in the median, by 1.2 % or less for 95 % and by 7.5 % at most; of 85 on slopes by 4
+    % or less for 95 %, and by 11 % at most. Beyond the tables trajectories are
+    followed.
+
+    Parameters
+    ----------
+    grains
+        The grains.
+
+    Returns
+    -------
+    FloatArray
+        Shields numbers, shape (n,), as in `HoppingThresholds`.
+
+    Examples
+    --------
+    >>> sand = Grain.of_numbers(127.0, 2.65, ratio=[1 / 30, 1 / 10])
+    >>> print(cessation(sand).round(3))
+    [0.033 0.063]
+    """
+    usual = grains.changed(roughness=grains.diameter / SAND_GRAIN)
+    points = np.log([grains.galileo, grains.density_ratio, grains.ratio])
+    ends = np.array([[axis[0], axis[-1]] for axis in _OTHER_AXES])
+    is_inside = is_tabulated(usual)
+    is_inside &= ((points >= ends[:, :1]) & (points <= ends[:, 1:])).all(axis=0)
+    found = np.full(len(grains), np.nan)
+    inside = np.flatnonzero(is_inside)
+    if len(inside):
+        of_table = _other_table()
+        here = points[:, inside].T
+        on_usual = here.copy()
+        on_usual[:, 2] = -np.log(SAND_GRAIN)
+        factor = np.exp(of_table(here) - of_table(on_usual))
+        found[inside] = tabulated(usual.at(inside)).cessation * factor
+    outside = np.flatnonzero(~is_inside)
+    if len(outside):
+        found[outside] = tabulated(grains.at(outside)).cessation
+    return found
+
+
+_OTHER_AXES = (
+    np.log(OTHER_GALILEO_NODES),
+    np.log(OTHER_DENSITY_NODES),
+    np.log(RATIO_NODES),
+)
+
+
+@cache
+def _other_table() -> "RegularGridInterpolator":
+    """Logarithms of the thresholds of cessation on level beds of other roughness."""
+    from scipy.interpolate import RegularGridInterpolator  # slow to import
+
+    numbers = np.loadtxt(ROUGHNESS_TABLE, skiprows=1)
+    shape = [len(axis) for axis in _OTHER_AXES]
+    return RegularGridInterpolator(_OTHER_AXES, np.log(numbers).reshape(shape))
 
 
 def tabulated(grains: Grain) -> HoppingThresholds:

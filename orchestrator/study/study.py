@@ -51,6 +51,7 @@ from orchestrator.study.scopes import BY
 from orchestrator.study.shapes import SHAPES
 from orchestrator.study.sieve import SieveTable
 from orchestrator.study.source import Source, presets
+from orchestrator.study.written import toml_of
 
 BED = {"kind": "grain", "roughness": "d/30"}
 """Fields of a bed that a file may leave out."""
@@ -380,13 +381,7 @@ def load_any(source: str | Path, tolerance: float | None, beds: Beds) -> Study[A
     InputError
         With the file, the field and the remedy.
     """
-    given: Any = tolerance  # Python gives what it likes
-    is_number = isinstance(given, Real) and not isinstance(given, bool)
-    if given is not None and not (is_number and 0 < given < 1):
-        what = f"{tolerance!r} is not a relative error above 0 and below 1"
-        raise InputError(
-            what, "tolerance", f"0.05 allows tau_c to be 5 % off; or {NO_TOLERANCE}"
-        )
+    _check_tolerance(tolerance)
     inputs = read(source)
     files = Files(inputs.path.parent)
     # a file's name may be bytes that are no text; the page and the tables are text
@@ -394,10 +389,59 @@ def load_any(source: str | Path, tolerance: float | None, beds: Beds) -> Study[A
     kind = _kind_of(inputs.tables, beds)
     study = _study(kind, inputs.tables, inputs.text, name, str(inputs.path), files)
     study = replace(study, source=inputs.source(files.digests, tolerance))
+    return _asked(study, tolerance)
+
+
+def of_dictionary(
+    tables: Mapping[str, Any], name: str, tolerance: float | None = None
+) -> Study:
+    """Make a study of a dictionary in place of a file.
+
+    Parameters
+    ----------
+    tables
+        The tables of a study file. Files that it names are those of the working
+        directory.
+    name
+        The name of the study.
+    tolerance
+        Relative error that tau_c may have, in place of the dictionary's.
+
+    Returns
+    -------
+    Study
+        The study.
+
+    Raises
+    ------
+    InputError
+        With the field and the remedy.
+    """
+    _check_tolerance(tolerance)
+    where = "the dictionary"
+    files = Files(Path())
+    text = toml_of(tables, where)
+    study = _study(PLANE, tables_of(text, where), text, name, where, files)
+    return _asked(study, tolerance)
+
+
+def _check_tolerance(tolerance: float | None) -> None:
+    """Refuse a tolerance that is none."""
+    given: Any = tolerance  # Python gives what it likes
+    is_number = isinstance(given, Real) and not isinstance(given, bool)
+    if given is not None and not (is_number and 0 < given < 1):
+        what = f"{tolerance!r} is not a relative error above 0 and below 1"
+        raise InputError(
+            what, "tolerance", f"0.05 allows tau_c to be 5 % off; or {NO_TOLERANCE}"
+        )
+
+
+def _asked(study: Study[S], tolerance: float | None) -> Study[S]:
+    """A study with the tolerance that is asked for; its questions are warnings."""
     if tolerance is not None:
         study = replace(study, tolerance=tolerance)
     if study.questions:
-        warnings.warn("; ".join(study.questions), stacklevel=3)
+        warnings.warn("; ".join(study.questions), stacklevel=4)
     return study
 
 

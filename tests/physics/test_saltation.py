@@ -420,3 +420,45 @@ def test_the_table_knows_zero_from_what_is_not_known() -> None:
     assert found.cessation[0] == 0
     endless = least(steep, lambda g, theta: np.full(len(g), ENDLESS))
     assert np.isnan(endless).all()
+
+
+def test_the_table_of_roughness_is_the_trajectories(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """At nodes to the digits that are written, between them to some per cent."""
+    places = (12, 4, 5), (20, 11, 9), (17, 11, 13), (6, 2, 0)
+    galileo, density, ratio = np.array(
+        [
+            (
+                saltation.OTHER_GALILEO_NODES[one],
+                saltation.OTHER_DENSITY_NODES[two],
+                saltation.RATIO_NODES[three],
+            )
+            for one, two, three in places
+        ]
+    ).T
+    nodes = Grain.of_numbers(galileo, density, ratio=ratio)
+    written = np.exp(
+        saltation._other_table()(np.log(np.column_stack([galileo, density, ratio])))
+    )
+    followed = saltation.cessation_thresholds(nodes)
+    np.testing.assert_allclose(written, followed, rtol=2e-3)
+    between = Grain.of_numbers(
+        [55.0, 130.0, 900.0, 40.0],
+        [2.65, 2.65, 2.65, 2208.0],
+        ratio=[0.004, 0.05, 0.02, 0.07],
+    )
+    followed = saltation.cessation_thresholds(between)
+    monkeypatch.setattr(saltation, "fate", None)  # nothing is followed
+    np.testing.assert_allclose(saltation.cessation(between), followed, rtol=0.03)
+
+
+def test_cessation_is_the_table_of_the_usual_roughness_and_follows_beyond() -> None:
+    usual = Grain.of_numbers([40.0, 127.0], [2208.0, 2.65], slope_deg=[0.0, 12.0])
+    np.testing.assert_allclose(
+        saltation.cessation(usual), tabulated(usual).cessation, rtol=1e-12
+    )
+    rough = Grain.of_numbers(127.0, 2.65, ratio=0.2)
+    np.testing.assert_array_equal(
+        saltation.cessation(rough), saltation.cessation_thresholds(rough)
+    )
