@@ -313,14 +313,25 @@ def read_table(
     for place, line in enumerate(lines[:LONGEST_HEAD]):
         for mark in dict.fromkeys([separator, ";", "\t", ",", None]):
             names = split(COMMENT.sub("", line), mark)
-            if is_head(names):
-                inner = separator if _is_data(lines[place + 1 :], separator) else mark
+            if not is_head(names):
+                continue
+            inner = separator if _is_data(lines[place + 1 :], separator) else mark
+            # a comment may speak of columns without being their names
+            if not COMMENT.match(line) or _fits(lines[place + 1 :], names, inner):
                 return _table(lines, place, names, inner, where)
     first, shown = next(
         ((i, line) for i, line in enumerate(lines, 1) if line.strip()), (1, "")
     )
     what = f"no names of columns that are known, in {shown.strip()!r}"
     raise InputError(what, f"{where}: line {first}", remedy)
+
+
+def _fits(lines: Sequence[str], names: Sequence[str], separator: str | None) -> bool:
+    """Whether the next line that is no comment has a cell for each name."""
+    for line in lines:
+        if line.strip() and not COMMENT.match(line):
+            return len(split(line, separator)) >= len(names)
+    return True
 
 
 def _is_data(lines: Sequence[str], separator: str | None) -> bool:

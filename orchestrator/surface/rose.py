@@ -1,7 +1,5 @@
 """Wind roses: the share of time of each direction and speed."""
 
-import csv
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -10,15 +8,10 @@ import pandas as pd
 
 from orchestrator.errors import InputError
 from orchestrator.runs.files import digest_text
-from orchestrator.study.heads import more_cells
-from orchestrator.study.units import number
+from orchestrator.study.wind import read_winds
 from orchestrator.types import BoolArray, FloatArray
 
 COLUMNS = ("from_deg", "speed_m_s", "share")
-OFF = 0.01
-"""Largest difference of the sum of the shares from 1."""
-FASTEST = 150.0
-"""Largest speed, m/s."""
 WINDIEST = 20.0
 """Mean speed above which it is likelier in another unit, m/s: Cape Denison, of the
 windiest places, has 19."""
@@ -42,18 +35,21 @@ class Rose:
     name
         The name of its file.
     rows
-        Direction where the wind comes from, degrees from 0 to 360, speed at 10 m, m/s,
-        and share of time; the shares add up to 1.
+        Where the wind comes from, degrees from 0 to 360, speed, m/s, and share of time;
+        the shares add up to 1.
     digest
         SHA-256 of the rows.
     understood
         What was understood of its file, in words.
+    height
+        Height of its speeds above the ground, m; None where its file says none.
     """
 
     name: str = field(compare=False)
     rows: tuple[tuple[float, float, float], ...] = field(compare=False, repr=False)
     digest: str
     understood: str = field(default="", compare=False)
+    height: float | None = field(default=None, compare=False)
 
     def __str__(self) -> str:
         return f"{self.name} ({self.digest[:12]})"
@@ -164,8 +160,7 @@ def read_rose(text: str, name: str, where: str) -> Rose:
     Parameters
     ----------
     text
-        CSV with the columns ``from_deg``, ``speed_m_s`` and ``share``, whose shares add
-        up to 1, or to 100 as percentages.
+        A file that `read_winds` reads.
     name
         The name of the file.
     where
@@ -174,57 +169,13 @@ def read_rose(text: str, name: str, where: str) -> Rose:
     Returns
     -------
     Rose
-        The rose, its shares divided by their sum.
+        The rose.
 
     Raises
     ------
     InputError
         With the line and the remedy.
     """
-    rows = _rows(text, where)
-    total = sum(share for _, _, share in rows)
-    whole = 100.0 if total > 50 else 1.0
-    if not abs(total / whole - 1) <= OFF:
-        what = f"its shares add up to {total:.6g}, not to 1 or 100"
-        remedy = "add the calms, with a speed of 0, or divide the shares by their sum"
-        raise InputError(what, where, remedy)
-    normed = tuple(
-        (direction, speed, share / total) for direction, speed, share in rows
-    )
-    return Rose(name, normed, digest_text(repr(normed)))
-
-
-def _rows(text: str, where: str) -> list[tuple[float, float, float]]:
-    """The directions from 0 to 360 degrees, the speeds and the shares of a file."""
-    reader = csv.DictReader(io.StringIO(text))
-    header = [cell.strip() for cell in reader.fieldnames or ()]
-    remedy = f"the first line is {','.join(COLUMNS)}, then numbers"
-    if any(header.count(column) != 1 for column in COLUMNS):
-        what = f"no columns {', '.join(COLUMNS)} in {','.join(header)!r}"
-        raise InputError(what, f"{where}: line 1", remedy)
-    reader.fieldnames = header
-    rows = []
-    for row in reader:
-        place = f"{where}: line {reader.line_num}"
-        if None in row:
-            cells = len(header) + len(row[None])
-            raise InputError(more_cells(cells, len(header)), place, remedy)
-        try:
-            direction, speed, share = [number(row[name] or "") for name in COLUMNS]
-        except ValueError as error:
-            raise InputError(str(error), place, remedy) from None
-        _check(direction, speed, share, place)
-        rows.append((direction % 360, speed, share))
-    return rows
-
-
-def _check(direction: float, speed: float, share: float, place: str) -> None:
-    """Refuse a row with a value that no rose has."""
-    if not -360 <= direction <= 360:
-        what = f"from_deg {direction:g}"
-        raise InputError(what, place, "degrees from north over east, 0 to 360")
-    if not 0 <= speed <= FASTEST:
-        what = f"speed_m_s {speed:g}"
-        raise InputError(what, place, "wind at 10 m in m/s, from 0")
-    if not share >= 0:
-        raise InputError(f"share {share:g}", place, "a part of the time, from 0")
+    winds = read_winds(text, where)
+    digest = digest_text(repr((winds.rows, winds.height)))
+    return Rose(name, winds.rows, digest, winds.understood, winds.height)

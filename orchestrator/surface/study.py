@@ -36,7 +36,7 @@ from orchestrator.surface.raster import rasterio, read_surface
 from orchestrator.surface.rose import Rose, read_rose
 
 MOST_FLOWS = 360
-LARGEST_ROSE = 2**22
+LARGEST_ROSE = 2**27
 """Most bytes of a wind rose."""
 TABLES: Mapping[str, type[Part]] = {
     "fluid": Fluid,
@@ -153,7 +153,7 @@ def rose_of(study: SurfaceStudy) -> Rose | None:
 def _rose(path: Path, where: str) -> Rose:
     """The wind rose of a file."""
     content = read_bytes(path, LARGEST_ROSE, where)
-    return read_rose(decoded(content, where), path.name, where)
+    return read_rose(decoded(content, where, is_data=True), path.name, where)
 
 
 def _named(name: str) -> Callable[[Path, str], Surface]:

@@ -143,9 +143,12 @@ def test_wind_from_where_no_flow_is_is_refused() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("from,speed,share\n0,5,1\n", "line 1: no columns from_deg"),
-        (HEAD + "0,5,0.5\n0,6,0.3\n", "shares add up to 0.8, not to 1 or 100"),
-        (HEAD + "0,5,1\n0,x,0\n", "line 3: 'x' is no number"),
+        ("way,speed,share\n0,5,1\n", "line 1: no names of columns that are known"),
+        (
+            HEAD + "0,5,0.5\n0,6,0.3\n",
+            "shares add up to 0.8, not to 1, 100 or the 8760",
+        ),
+        (HEAD + "0,5,1\n0,x,0\n", "line 3: speed_m_s: 'x' is no number"),
         (HEAD + "400,5,1\n", "line 2: from_deg 400"),
         (HEAD + "0,-1,1\n", "line 2: speed_m_s -1"),
         (HEAD + "0,500,1\n", "line 2: speed_m_s 500"),
