@@ -3,6 +3,7 @@
 import difflib
 import errno
 import os
+import re
 import shutil
 import traceback
 from collections.abc import Iterable
@@ -104,7 +105,7 @@ def one_line(text: str) -> str:
     Examples
     --------
     >>> one_line("two\nlines")
-    'two\\nlines'
+    'two lines'
     >>> one_line("a" * 500).count("a")
     400
     """
@@ -116,6 +117,8 @@ def one_line(text: str) -> str:
 
 def printable(text: str) -> str:
     r"""Escape control characters and bytes that are no text, for any terminal.
+
+    Line ends and tabs become a blank.
 
     Parameters
     ----------
@@ -132,7 +135,8 @@ def printable(text: str) -> str:
     >>> print(printable("red: \x1b[31m"))
     red: \x1b[31m
     """
-    return "".join(_escaped(character) for character in text)
+    line = re.sub(r"\s*[\t\n\v\f\r]\s*", " ", text)
+    return "".join(_escaped(character) for character in line)
 
 
 def _escaped(character: str) -> str:

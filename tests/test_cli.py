@@ -1,5 +1,6 @@
 """The commands as a user runs them, in processes of their own, and their messages."""
 
+import ast
 import errno
 import os
 import re
@@ -13,7 +14,7 @@ import pytest
 from orchestrator import cli, pipeline
 from orchestrator.benchmark import commands as benchmark
 from orchestrator.errors import LONGEST, Fault, InputError, of_exception
-from orchestrator.runs import workspace
+from orchestrator.runs import files, workspace
 from orchestrator.runs.workspace import EXPERIMENT, Workspace
 from tests.conftest import Command
 
@@ -213,6 +214,21 @@ def test_the_command_that_draws_an_experiment_names_no_file_that_is_not_there(
     assert f"FILE is mine.toml, which is not in {tmp_path / 'moved'}" in message
 
 
+def test_no_message_has_an_escaped_line_end() -> None:
+    for module in files.PACKAGE.rglob("*.py"):
+        tree = ast.parse(module.read_text(encoding="utf-8"))
+        for said in ast.walk(tree):
+            is_said = isinstance(said, ast.Call) and getattr(said.func, "id", "") in (
+                *("print", "say"),
+                *("OrchestratorError", "InputError", "SolverError", "Remark"),
+            )
+            for part in (
+                ast.walk(said) if is_said or isinstance(said, ast.Raise) else ()
+            ):
+                text = part.value if isinstance(part, ast.Constant) else ""
+                assert "\\n" not in str(text), (module.name, said.lineno)
+
+
 def test_any_failure_has_a_message_of_one_printable_line() -> None:
     error = InputError("is negative", where="a.toml: grain.diameter", remedy="raise it")
     assert str(error) == "a.toml: grain.diameter: is negative (raise it)"
@@ -220,6 +236,8 @@ def test_any_failure_has_a_message_of_one_printable_line() -> None:
     text = str(InputError("a\x1b[2J\n\x9b" + "b" * 10_000))
     assert text.isprintable()
     assert len(text) < LONGEST + 40
+    told = str(InputError("one\n two\r\n\tthree", "a\nb", "c\nd"))
+    assert told == "a b: one two three (c d)"
     full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "file")
     for failure, words in (
         (full, "file: no space is left on the disk"),

@@ -10,11 +10,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from filelock import FileLock
-
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.extras import imported
-from orchestrator.runs import engine, process
+from orchestrator.runs import engine, locks, process
 from orchestrator.runs.case import Case, done_state, names_in
 from orchestrator.runs.engine import Pool
 from orchestrator.runs.files import PACKAGE
@@ -154,7 +152,11 @@ def execute_unless_done(case: Case, cases: Path, limit_s: float) -> float:
     float
         Its time, s.
     """
-    with FileLock(_lock_of(case.name, cases)):
+    lock = _lock_of(case.name, cases)
+    # the other one's solver is killed after that time; what it leaves is read quickly
+    waits_s = 2 * limit_s
+    else_ = "wait for its end, then give the same command again"
+    with locks.held(lock, limit_s=waits_s, else_=else_):
         state = done_state(case, cases)
         if state:
             return float(state["wall_s"])

@@ -2,20 +2,15 @@
 
 import contextlib
 import csv
-import fcntl
-import os
-import socket
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from filelock import FileLock, Timeout
-
 from orchestrator import __version__
 from orchestrator.errors import InputError, OrchestratorError, printable
 from orchestrator.runs import case as case_states
-from orchestrator.runs import files, process
+from orchestrator.runs import files, locks, process
 from orchestrator.runs.case import DONE, SAID, failure, names_in
 from orchestrator.runs.files import (
     RECORD,
@@ -87,34 +82,22 @@ def claimed(
     if shortage:
         raise OrchestratorError(shortage)
     folder = Folder(root)
-    # a process that is ending may hold the lock for a moment
-    lock = FileLock(root / LOCK, timeout=1.0)
+    remedy = "wait for its end, or choose another directory with --out"
+    held = locks.held(root / LOCK, limit_s=locks.AT_ONCE_S, else_=remedy)
+    holding = contextlib.ExitStack()
     try:
         root.mkdir(parents=True, exist_ok=True)
         _check(folder, kind, name)
-        lock.acquire()
-    except Timeout:
-        holder = (root / LOCK).read_text(errors="replace").strip() or "another process"
-        remedy = "wait for its end, or choose another directory with --out"
-        what = f"it is in use by {holder}"
-        raise OrchestratorError(what, str(root), remedy) from None
+        holding.enter_context(held)
     except OSError as error:
         what = f"the output directory cannot be used: {error.strerror or error}"
         where = str(error.filename or root)
         raise InputError(what, where, "choose another one: --out") from None
-    try:
-        holder = f"process {os.getpid()} on {socket.gethostname()}\n"
-        # a full disk holds no note, but gives the lock
-        with contextlib.suppress(OSError):
-            (root / LOCK).write_text(holder)
+    with holding:
         _check(folder, kind, name)  # another process may have been first
         if new and not read_marker(root, kind):
             folder.note(kind.marker, files.text_of({"kind": kind.word, "name": name}))
         yield folder
-    finally:
-        with contextlib.suppress(OSError):
-            os.truncate(root / LOCK, 0)
-        lock.release()
 
 
 def read_marker(root: Path, kind: DirectoryKind) -> dict[str, Any]:
@@ -190,12 +173,7 @@ class Workspace(Folder):
         bool
             Whether one does; nothing is written.
         """
-        try:
-            with files.opened(self.root / LOCK) as stream:
-                fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except OSError as error:
-            return isinstance(error, BlockingIOError)
-        return False
+        return locks.is_held(self.root / LOCK)
 
     def check(
         self, kind: DirectoryKind, name: str, source: Mapping[str, object]

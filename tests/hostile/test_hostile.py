@@ -63,6 +63,11 @@ class Shell:
             printed,
         )
         assert len(printed) < 1000
+        # a line end of its own is a blank; one that the file quotes stays as it wrote it
+        given = source.read_text(encoding="utf-8", errors="replace")
+        assert (
+            "\\n" not in printed or "\\n" in given or '"""' in given or "'''" in given
+        )
         assert [*self.folder.rglob("*")] == [source]
 
 
