@@ -12,9 +12,10 @@ import numpy as np
 
 from orchestrator.digits import number
 from orchestrator.errors import InputError
-from orchestrator.fidelity import decision, flows, limits, measured, smoothing
+from orchestrator.fidelity import decision, few, flows, limits, measured, smoothing
 from orchestrator.fidelity.decision import Decision, as_written, decide
 from orchestrator.fidelity.domain import unmeasured
+from orchestrator.fidelity.few import Corrected
 from orchestrator.flow.between import MOST_ERROR
 from orchestrator.grains.cells import SingleGrainCase, batches
 from orchestrator.grains.pile import Pile
@@ -163,13 +164,17 @@ def make(study: Study, cases: Path | None = None) -> Plan:
         decisions = _by_own_errors(study, study.errors, decisions)
     if not study.tolerance:
         return of(decisions, {}, cases)
-    checks = decision.checks(decisions.values())
-    planned = of(*flows.shared(decisions, checks), cases)
+    answers = few.shared(decisions, study.tolerance)
+    checks = decision.checks(answers.values())
+    planned = of(*flows.shared(answers, checks), cases)
     return refined(planned, cases) if cases else planned
 
 
 def refined(plan: Plan, cases: Path) -> Plan:
-    """Solve the flows that finished ones show not to lie between them.
+    """Run what finished runs show to be missing.
+
+    That are flows that do not lie between solved ones, and piles by DEM for which the
+    factors of few are not enough.
 
     Parameters
     ----------
@@ -183,8 +188,19 @@ def refined(plan: Plan, cases: Path) -> Plan:
     Plan
         The same plan where there are none.
     """
-    groups = flows.solved(plan.decisions, plan.checked, cases)
-    return of(*groups, cases) if groups else plan
+    while groups := _refined(plan, cases):
+        plan = of(*groups, cases)
+    return plan
+
+
+def _refined(
+    plan: Plan, cases: Path
+) -> tuple[Mapping[str, Decision], Mapping[str, Decision]] | None:
+    """The decisions and checks of a plan that finished runs have changed, if any."""
+    if groups := flows.solved(plan.decisions, plan.checked, cases):
+        return groups
+    answers = few.solved(plan.decisions, plan.piles, cases)
+    return (answers, plan.checked) if answers else None
 
 
 def _by_own_errors(
@@ -253,11 +269,11 @@ def of(
 
 def _piles(decisions: Mapping[str, Decision], cases: Path | None) -> dict[str, Pile]:
     """The piles that answer, by the keys of their decisions."""
-    piles = {}
+    piles: dict[str, Pile] = {}
     for asked, answer in decisions.items():
         if isinstance(answer.scene.bed, PileBed):
             piles[asked] = Pile(answer.scene, cases)
-    return piles
+    return few.with_corrections(piles, decisions)
 
 
 def with_needs(cases: Iterable[Case]) -> dict[str, Case]:
@@ -334,11 +350,13 @@ def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
         yield f"  {number(len(plan.checks), 'check')} by DEM of answers without it:"
         named = Counter(_about(pile) for pile in plan.checks.values())
         yield from (f"    {name}" for name in sorted(named))
+    yield from _few(plan, pace() * BESIDE / workers)
     put = flows.lying([*plan.decisions.values(), *plan.checked.values()])
     if put:
         between = "lie between solved ones of other roughness"
+        more_s = pace() * BESIDE / workers * sum(flow.cost_s for flow in put)
         most = f"solved too if that is off by more than {MOST_ERROR:.1%}"
-        yield f"  {number(len(put), 'flow')} {between}; {most}"
+        yield f"  {number(len(put), 'flow')} {between}; {most}: {human(more_s)} more"
     if plan.smoothings:
         noisy = number(len(plan.smoothings), "noisy profile")
         other = "half and twice the smoothing, and with what it needs"
@@ -347,8 +365,26 @@ def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
     yield from expected(plan, directory, workers)
 
 
+def _few(plan: Plan, slower: float) -> Iterator[str]:
+    """Say which piles DEM runs on so that it need not run on others, and the gain."""
+    groups: dict[few.FewRuns, list[Corrected]] = {}
+    for answer in plan.decisions.values():
+        if isinstance(answer, Corrected):
+            groups.setdefault(answer.few, []).append(answer)
+    for runs, answers in groups.items():
+        instead = [Pile(one.instead.scene) for one in answers]
+        spared_s = slower * sum(pile.case.cost_s for pile in instead)
+        by_dem = [plan.piles[asked] for asked in (*runs.design, *runs.kept)]
+        cost_s = sum(pile.case.cost_s for pile in by_dem)
+        yield f"  {number(len(answers), 'pile')} by {runs.in_words}"
+        cost = f"{human(cost_s)} of DEM in place of {human(cost_s + spared_s)}"
+        yield f"    {cost}, which it takes if their error is beyond the tolerance:"
+        named = Counter(_about(pile) for pile in by_dem)
+        yield from (f"      {name}" for name in sorted(named))
+
+
 def _about(pile: Pile) -> str:
-    """Name the pile of a check."""
+    """Name a pile by DEM."""
     scene = pile.scene
     size = f"{1e3 * scene.grain.diameter:g} mm"
     words = [f"{scene.bed.slope_deg:g}°", size, pile.bed.packing, scene.forces.law]

@@ -7,7 +7,7 @@ other.
 """
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -131,6 +131,10 @@ class Decision:
         # rows without an end hold their grains by DEM: it is no check of places
         is_quasi_static = method.packs_grains and not method.is_resolved_in_time
         return is_pile and self.is_chosen and is_quasi_static
+
+
+Decisions = Mapping[str, Decision]
+"""Decisions by the ids of the asked scenes."""
 
 
 def _if_known(error: float) -> float | None:

@@ -6,11 +6,11 @@ others are put between them (`orchestrator.flow.between`). Where the solved ones
 that this is off by more than `between.MOST_ERROR`, all are solved.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from orchestrator.fidelity.decision import Decision
+from orchestrator.fidelity.decision import Decision, Decisions
 from orchestrator.flow import between
 from orchestrator.flow.case import FlowCase
 from orchestrator.flow.model import FlowModel, of_scene
@@ -19,7 +19,6 @@ from orchestrator.study.parts import PileBed
 from orchestrator.study.study import changed
 
 FIELD = "method.flow.between"
-Decisions = Mapping[str, Decision]
 
 
 def shared(answers: Decisions, checks: Decisions) -> tuple[Decisions, Decisions]:

@@ -150,6 +150,27 @@ class Motion:
         lifting = np.where(self.carried, flows, np.inf)
         return Motion.of_flows(flows, lifting)
 
+    def scaled(self, fractions: Sequence[float], ratios: Sequence[float]) -> "Motion":
+        """Make the motion under flows that are larger by some ratios.
+
+        Parameters
+        ----------
+        fractions
+            Fractions n/N, rising.
+        ratios
+            For each, the flow at which it has moved over that at which it had.
+
+        Returns
+        -------
+        Motion
+            The same grains in the same order; between fractions the ratios are
+            interpolated in their logarithm, and beyond all the nearest holds.
+        """
+        at = np.interp(self.fraction, fractions, np.log(ratios))
+        # a grain goes at no lower flow than those that went before it
+        flow = np.maximum.accumulate(self.flow * np.exp(at))
+        return replace(self, flow=flow)
+
     @classmethod
     def chained(cls, runs: "Sequence[tuple[BoolArray, Motion]]") -> "Motion":
         """Join the motion in runs that go on from one another.

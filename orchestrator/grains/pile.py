@@ -43,14 +43,19 @@ class Pile(Geometry):
         return METHODS[self.scene.method.facts](self)
 
     @cached_property
-    def runs(self) -> tuple[Case, ...]:
-        """The cases that its answer is read from, those of the flow first."""
+    def own_runs(self) -> tuple[Case, ...]:
+        """The cases of this pile, those of the flow first."""
         return (*self.solved, *self.pouring, *self.method.cases)
+
+    @cached_property
+    def runs(self) -> tuple[Case, ...]:
+        """The cases that its answer is read from: its own."""
+        return self.own_runs
 
     @property
     def last_run(self) -> str | None:
-        """Name of the last of these cases; None without a run."""
-        runs = self.runs
+        """Name of the last of its own cases; None without a run."""
+        runs = self.own_runs
         if not runs:
             return None
         return runs[-1].name
@@ -182,6 +187,24 @@ class Pile(Geometry):
         if not self.is_sustained or self.scene.is_followed:
             return motion
         return motion.until(*self.loads(cases).sustained())
+
+    def correction_error(self, fraction: float, cases: Path) -> float:
+        """Find the relative error of a correction of tau_c: 0 without one.
+
+        Parameters
+        ----------
+        fraction
+            Fraction n/N.
+        cases
+            The directory of the finished runs.
+
+        Returns
+        -------
+        float
+            The error.
+        """
+        del fraction, cases
+        return 0.0
 
     @property
     def is_sustained(self) -> bool:

@@ -7,9 +7,10 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.digits import percent
-from orchestrator.fidelity import crest
+from orchestrator.fidelity import crest, flows
 from orchestrator.fidelity.decision import floor_of
 from orchestrator.fidelity.limits import FROZEN_BED
+from orchestrator.grains.corrected import CorrectedPile, Correction
 from orchestrator.physics.fluids import is_gas
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.measured import wilcock_crowe_hiding
@@ -277,7 +278,46 @@ def _of_piles(results: Results, piles: pd.DataFrame) -> Iterator[Remark]:
     if "check" in results.tables:
         text = caption("checked", checks=results.tables["check"])
         yield Remark("Some beds were checked by DEM.", text)
+    yield from _corrected(results, piles)
+    yield from _between(results, piles)
     yield from _tolerance(results, piles)
+
+
+def _corrected(results: Results, piles: pd.DataFrame) -> Iterator[Remark]:
+    """Which beds were corrected by DEM of others, a text for each class of them."""
+    groups: dict[Correction, list[str]] = {}
+    for asked, pile in results.plan.piles.items():
+        if isinstance(pile, CorrectedPile):
+            groups.setdefault(pile.correction, []).append(asked)
+    for by, asked_ids in groups.items():
+        rows = piles[piles["scene_id"].isin(asked_ids)]
+        if rows.empty:
+            continue
+        methods = {results.plan.piles[each].scene.method.kind for each in asked_ids}
+        text = caption(
+            "corrected",
+            rows=rows,
+            methods=sorted(methods),
+            made_from=len(by.design),
+            kept=len(by.kept),
+            confidence=by.confidence,
+        )
+        yield Remark("Some beds were corrected by DEM of others.", text)
+
+
+def _between(results: Results, piles: pd.DataFrame) -> Iterator[Remark]:
+    """Which flows lie between solved ones."""
+    if "between_error" not in piles or piles["between_error"].isna().all():
+        return
+    models = [pile.model for pile in results.plan.piles.values()]
+    solved = {run.name for one in models if one.is_between for run in one.cases}
+    text = caption(
+        "between",
+        put=len(flows.lying(results.plan.decisions.values())),
+        solved=len(solved),
+        error=piles["between_error"].max(),
+    )
+    yield Remark("Some flows were interpolated.", text)
 
 
 def _jumps(row: pd.Series, piles: pd.DataFrame) -> Iterator[Remark]:

@@ -619,6 +619,9 @@ def fidelities(results: Results) -> pd.DataFrame | None:
     meanings = {
         one.name: one.meaning for one in (*FIDELITIES, *PAIRS, LOCAL, OWN_NUMBERS)
     }
+    for decision in results.plan.decisions.values():
+        if decision.fidelity is not None:
+            meanings[decision.fidelity.name] = decision.fidelity.meaning
     table = results.joined("pile_threshold")
     rows = []
     for (name, why), group in split_by(table, "fidelity", "why"):

@@ -73,6 +73,7 @@ TABLES: Mapping[str, Listed] = {
             rows.DECIDED,
             rows.SMOOTHING,
             rows.BETWEEN,
+            rows.CORRECTED,
             usable.SCATTER,
             verdict.COLUMNS,
             beside.MEASURED,

@@ -3,7 +3,7 @@
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
-from math import ceil, log, nan
+from math import ceil, hypot, isfinite, log, nan
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,6 +15,7 @@ from orchestrator.fidelity.decision import Decision
 from orchestrator.flow.stress import bubble
 from orchestrator.grains import threshold
 from orchestrator.grains.cells import SingleGrainCase
+from orchestrator.grains.corrected import CorrectedPile
 from orchestrator.grains.motion import MODES, Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold
@@ -551,7 +552,9 @@ class Answer:
         return self.pile.model.error(self.cases)
 
     def error_at(self, fraction: float) -> float | None:
-        """Find the numerical error at a fraction, with that of a flow between others.
+        """Find the numerical error at a fraction, with what its runs show of it.
+
+        That is the error of a flow between others, and of a correction by DEM.
 
         Parameters
         ----------
@@ -564,7 +567,11 @@ class Answer:
             The relative error; None where it is not known.
         """
         error = self.decision.error_at(fraction)
-        return error if error is None else float(np.hypot(error, self.between))
+        if error is None:
+            return None
+        of_correction = self.pile.correction_error(fraction, self.cases)
+        found = hypot(error, self.between, of_correction)
+        return found if isfinite(found) else None
 
     def at(self, fraction: float, chosen: BoolArray | None = None) -> PileThreshold:
         """Find the threshold of the pile, or of some of its counted grains.
@@ -752,6 +759,12 @@ PILE_THRESHOLD: Mapping[str, str] = {
         "fractions beside it the larger; empty where none was measured: of such beds, "
         "or at such fractions"
     ),
+    "numerical_error_coverage": (
+        "share of the scenes on which numerical_error was measured that it holds, each "
+        "by what was found from all other geometries; with factors of few piles by "
+        "DEM at most the share that the piles kept apart hold"
+    ),
+    "numerical_error_count": "how many scenes, or piles kept apart, these are at least",
     "shields_model_low": (
         "lower end of the model's interval of shields: the choices that all methods "
         "share, changed one at a time by `orchestrator budget`; empty where they were "
@@ -827,6 +840,7 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
             "shields_numerical_low": low,
             "shields_numerical_high": high,
             "numerical_error": error,
+            **_coverage(answer, fraction, error),
             "smooth_bed": smooth,
             "shields_model_low": value * (1 - model.low),
             "shields_model_high": value * (1 + model.high),
@@ -846,6 +860,7 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
             **_decided(answer),
             **_smoothing(answer),
             **_between(answer),
+            **_corrected(answer, fraction),
             "case": pile.last_run,
         }
 
@@ -976,6 +991,53 @@ def _between(answer: Answer) -> Row:
     if not answer.pile.model.is_between:
         return {}
     return {"between_error": answer.between}
+
+
+def _coverage(answer: Answer, fraction: float, error: float | None) -> Row:
+    """The columns of what a numerical error holds."""
+    if error is None:
+        return {"numerical_error_coverage": nan, "numerical_error_count": nan}
+    known = answer.decision.known.at(fraction)
+    coverage = known.coverage
+    count = nan if known.scenes is None else float(known.scenes)
+    if isinstance(answer.pile, CorrectedPile):
+        by = answer.pile.correction
+        coverage = float(np.fmin(coverage, by.confidence))
+        count = float(np.fmin(count, len(by.kept)))
+    return {"numerical_error_coverage": coverage, "numerical_error_count": count}
+
+
+CORRECTED: Mapping[str, str] = {
+    "correction": (
+        "factor of shields from other piles by DEM: the median of theirs by DEM over "
+        "theirs without it; empty where nothing was corrected"
+    ),
+    "correction_piles": "how many piles by DEM that factor is made from",
+    "correction_error": (
+        "largest relative difference of a corrected threshold from DEM, of the piles "
+        "kept apart; numerical_error contains it"
+    ),
+    "correction_kept": (
+        "how many piles by DEM were kept apart, drawn at random; of n the largest "
+        "difference holds n/(n + 1) of all such piles"
+    ),
+}
+"""Columns of a threshold that is corrected by DEM of other piles."""
+
+
+def _corrected(answer: Answer, fraction: float) -> Row:
+    """The columns of a correction."""
+    pile = answer.pile
+    if not isinstance(pile, CorrectedPile):
+        return {}
+    by = pile.correction
+    factors = by.factors(pile.stratum, answer.cases)
+    return {
+        "correction": factors[by.fractions.index(fraction)],
+        "correction_piles": by.made_from(pile.stratum),
+        "correction_error": by.error(fraction, answer.cases),
+        "correction_kept": len(by.kept),
+    }
 
 
 SMOOTHING: Mapping[str, str] = {
