@@ -16,6 +16,8 @@ RE_AXIS = "Re* = u* d/ν"
 TAU_AXIS = r"critical Shields number $θ_c$"
 WIDTH = 52
 """Letters of a line over a panel."""
+DIGEST = re.compile(r" \([0-9a-f]{12}\)$")
+"""What stands behind the file of a profile in tables."""
 OTHERS = {
     "fraction": Info("part that has moved", "n/N", "%"),
     "by": Info("by"),
@@ -66,7 +68,7 @@ def value_text(column: str, value: Any) -> str:
     """
     info = info_of(column)
     if isinstance(value, str):
-        return info.choices.get(value, f"{info.label} {value}")
+        return info.choices.get(value, f"{info.label} {_named(column, value)}")
     if pd.isna(value):
         return f"no {info.label}"
     symbol = info.symbol.replace("_0", "₀") or info.label
@@ -95,10 +97,15 @@ def value(column: str, value: Any) -> str:
     """
     info = info_of(column)
     if isinstance(value, str):
-        return info.choices.get(value, value)
+        return info.choices.get(value, _named(column, value))
     if pd.isna(value):
         return "none"
     return amount(value, info.unit)
+
+
+def _named(column: str, value: str) -> str:
+    """A text of a column; a profile by its file alone, without its digest."""
+    return DIGEST.sub("", value) if column == "profile" else value
 
 
 def cells(rows: pd.DataFrame, columns: Sequence[str]) -> dict[str, list[str]]:
@@ -119,6 +126,8 @@ def cells(rows: pd.DataFrame, columns: Sequence[str]) -> dict[str, list[str]]:
     written = {}
     for column in columns:
         texts = [value(column, item) for item in rows[column]]
+        if len({*texts}) < rows[column].nunique():
+            texts = [str(item) for item in rows[column]]
         written[info_of(column).label] = texts
     return written
 
@@ -303,6 +312,8 @@ def varying(table: pd.DataFrame, *shown: str) -> list[str]:
 
 def _rank(column: str) -> int:
     """Place of a field among those that tell rows apart; the lowest comes first."""
+    if column == "profile":  # the beds of a series are called by their files
+        return -1
     if column == "method":
         return 1
     if column == "asked":

@@ -40,6 +40,10 @@ MOST_LISTED = 12
 """Piles, or values of a parameter, that are listed each; of more the range is told."""
 EACH = ("alpha_deg", "d_m", "force_law")
 """Columns that each row of a table of single piles tells."""
+SERIES = ("profile", "d_m", "force_law")
+"""The same where the beds are several profiles."""
+MOST_WITH_FRACTIONS = 2
+"""Profiles of which every fraction is listed; more have a row each, however many."""
 RANGES = ("alpha_deg", "force_law")
 """Columns that each row of a table of ranges tells."""
 
@@ -119,7 +123,11 @@ def short(results: Results) -> Sheet | None:
 def _of_piles(results: Results, every: pd.DataFrame) -> Sheet:
     """The thresholds of piles at every fraction, or at one."""
     here = results.at_fraction
-    keys = [*EACH, *labels.varying(here, *EACH)]
+    is_series = here["profile"].nunique() > 1
+    each = SERIES if is_series else EACH
+    keys = [*each, *labels.varying(here, *each)]
+    if here["profile"].nunique() > MOST_WITH_FRACTIONS:
+        return _of_series(results, _in_order(here), keys)
     if not _fits(every, [*keys, "fraction"]):
         return _sheet(here, keys if _fits(here, keys) else RANGES, "pile_threshold")
     sheet = _sheet(every, [*keys, "fraction"], "pile_threshold")
@@ -131,6 +139,23 @@ def _of_piles(results: Results, every: pd.DataFrame) -> Sheet:
     return replace(sheet, frame=first)
 
 
+def _of_series(results: Results, rows: pd.DataFrame, keys: Sequence[str]) -> Sheet:
+    """The thresholds of many profiles at one fraction, and where motion starts."""
+    sheet = _sheet(rows, keys, "pile_threshold")
+    if len(sheet.frame) != len(rows):  # replicates share a row
+        return sheet
+    told = quantity_of_rows(rows)
+    first = []
+    for _, row in rows.iterrows():
+        value = row[f"first_{told.column()}"]
+        bed = results.plan.piles[str(row["scene_id"])].bed
+        spot = counted.spot(float(row["first_x_m"]), bed)
+        first.append(f"{value:#.3g} {told.unit}, {spot}" if value > 0 else "—")
+    frame = sheet.frame.copy()
+    frame.insert(len(_heads_of(keys, frame)), "first grain", first)
+    return replace(sheet, frame=frame)
+
+
 def _first_grains(
     results: Results, every: pd.DataFrame, keys: Sequence[str], frame: pd.DataFrame
 ) -> pd.DataFrame:
@@ -139,7 +164,7 @@ def _first_grains(
     The row says where it lies. Replicates have none.
     """
     # as the rows of the table are
-    every = every.sort_values(["alpha_deg", "d_m"], kind="stable")
+    every = _in_order(every)
     beds = every.groupby(list(keys), dropna=False, sort=False)
     parts = []
     start = 0
@@ -159,6 +184,14 @@ def _first_grains(
             part = _first_grain(row, part, named)
         parts.append(part)
     return pd.concat(parts, ignore_index=True)
+
+
+def _in_order(rows: pd.DataFrame) -> pd.DataFrame:
+    """Rows by slope and size; of a series of profiles as the study lists them."""
+    first: Any = rows["alpha_deg"]
+    if "profile" in rows and rows["profile"].nunique() > 1:
+        first = pd.factorize(rows["profile"])[0]
+    return rows.iloc[np.lexsort([rows["d_m"], first])]
 
 
 def _heads_of(keys: Sequence[str], frame: pd.DataFrame) -> list[str]:
@@ -309,7 +342,7 @@ def _thresholds(
         keys = [*_different(rows, "rho_f_kg_m3", "nu_m2_s"), *keys]
         rows = rows.sort_values([*keys], kind="stable")
     else:
-        rows = rows.sort_values(["alpha_deg", "d_m"], kind="stable")
+        rows = _in_order(rows)
     told = quantity_of_rows(rows)
     rows = _open_ended(rows, "shields_low", "shields_high")
     rows = _open_ended(rows, told.column("_low"), told.column("_high"))

@@ -46,6 +46,7 @@ METHOD: Mapping[str, type[Part]] = {
 """The tables of a study file that say how to answer."""
 PARTS: Mapping[str, type[Part]] = {**QUESTION, **METHOD}
 """The tables of a study file."""
+PROFILE = "bed.profile"
 SEED = "bed.seed"
 """The field that tells apart beds that are alike."""
 FIDELITY = "method.fidelity"

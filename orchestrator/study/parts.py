@@ -375,8 +375,8 @@ class PileBed(Bed):
     spacing: Length | None = field(None, scope="shapes of trains", unit="m")
     """from one form of a train to the next; by default they touch"""
     profile: File | None = _pile(None)
-    """file with the bed line, in place of a shape: columns x_m and z_m; its path is
-    relative to the study file"""
+    """file with the bed line, in place of a shape: columns x_m and z_m; of a folder
+    each file .csv or .txt is a bed; its path is relative to the study file"""
     smoothing: float = field(0.0, unit="m", scope="profiles", ge=0, le=1e3)
     """length over which a noisy profile is smoothed"""
     obstacles: Annotated[tuple[Obstacle, ...], List] = _pile((), read="obstacles")

@@ -33,7 +33,7 @@ from orchestrator.study.heads import (
 from orchestrator.study.noise import needed_smoothing
 from orchestrator.study.shapes import SHAPES
 from orchestrator.study.sieve import SieveTable, read_sieve
-from orchestrator.study.source import decoded, read_bytes
+from orchestrator.study.source import beds_in, decoded, read_bytes
 from orchestrator.types import FloatArray
 
 LARGEST, LARGEST_NUMBER = 20 * 2**20, 1e5  # bytes of a file, and largest number, m
@@ -315,6 +315,44 @@ class Files:
         profile = read_profile(text, Path(name).name, place, smoothing, towards)
         self.understood[name] = profile.understood
         return _fields(profile) | _from_first_point(bed, profile)
+
+    def series(self, name: str, where: str) -> list[str]:
+        """List the profiles that a name stands for.
+
+        Parameters
+        ----------
+        name
+            The name of a file, or of a folder of profiles.
+        where
+            The study file, for messages.
+
+        Returns
+        -------
+        list of str
+            The name itself, or of a folder those of the files in it.
+
+        Raises
+        ------
+        InputError
+            If a folder has no profile.
+        """
+        start = f"{name.rstrip('/')}/"
+        carried = [each for each in self.carried if each.startswith(start)]
+        if carried:
+            self.digests[name] = None
+            return carried
+        if self.folder is None or not os.path.isdir(self.folder / name):
+            return [name]
+        place = f"{where}: bed.profile: {self.folder / name}"
+        try:
+            names = beds_in(self.folder / name)
+        except OSError as error:
+            raise InputError(f"{error.strerror}", place, "may it be read?") from None
+        if not names:
+            remedy = "a folder of profiles has files .csv, one for each bed"
+            raise InputError("there is no profile in it", place, remedy)
+        self.digests[name] = digest_text("\n".join(names))
+        return [f"{start}{each}" for each in names]
 
     def sieve(self, name: str, where: str) -> list[list[float]]:
         """Read a sieve table.

@@ -9,13 +9,14 @@ second.
 
 import codecs
 import os
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from orchestrator.errors import InputError, suggestion
-from orchestrator.runs.files import digest_file, opened
+from orchestrator.runs.files import digest_file, digest_text, opened
 
 if TYPE_CHECKING:  # no file is read by what it loads
     from orchestrator.study.own_errors import OwnErrors
@@ -43,8 +44,8 @@ class Source:
         Absolute path of the study file.
     digests
         SHA-256 of the study file, and of each file that it names, by their paths
-        relative to the folder of the study file; None for a file that is not there,
-        whose text the study file brings itself.
+        relative to the folder of the study file, of a folder that of the names in it;
+        None for a file that is not there, whose text the study file brings itself.
     tolerance
         The tolerance that was given in place of the file's, if one was.
     errors
@@ -214,6 +215,54 @@ def _unreadable(error: Exception, where: str) -> InputError:
     return InputError(f"not a readable text file: {why}", where, remedy)
 
 
+def beds_in(folder: Path) -> list[str]:
+    """List the files of profiles in a folder: .csv and .txt, section2 before section10.
+
+    Parameters
+    ----------
+    folder
+        The folder.
+
+    Returns
+    -------
+    list of str
+        Their names.
+
+    Raises
+    ------
+    OSError
+        For a folder that cannot be read.
+    """
+    names = [
+        name
+        for name in os.listdir(folder)
+        if name.lower().endswith((".csv", ".txt")) and not name.startswith(".")
+    ]
+    return sorted(names, key=counted_names)
+
+
+def counted_names(name: str) -> list[tuple[int, str]]:
+    """Order names by the numbers in them, as people do.
+
+    Parameters
+    ----------
+    name
+        A name.
+
+    Returns
+    -------
+    list of tuple
+        What `sorted` compares.
+
+    Examples
+    --------
+    >>> sorted(["b10", "b9", "a"], key=counted_names)
+    ['a', 'b9', 'b10']
+    """
+    parts = re.split(r"(\d+)", name, flags=re.ASCII)
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts]
+
+
 def digests_now(folder: Path, names: Iterable[str]) -> dict[str, str | None]:
     """Compute the digests of files as they are now.
 
@@ -227,7 +276,8 @@ def digests_now(folder: Path, names: Iterable[str]) -> dict[str, str | None]:
     Returns
     -------
     dict
-        SHA-256 by path; None for a file that is not there.
+        SHA-256 by path, of a folder that of the names in it; None for a file that is
+        not there.
 
     Raises
     ------
@@ -237,5 +287,8 @@ def digests_now(folder: Path, names: Iterable[str]) -> dict[str, str | None]:
     found: dict[str, str | None] = {}
     for name in names:
         path = folder / name
-        found[name] = digest_file(path) if os.path.lexists(path) else None
+        if os.path.isdir(path):
+            found[name] = digest_text("\n".join(beds_in(path)))
+        else:
+            found[name] = digest_file(path) if os.path.lexists(path) else None
     return found

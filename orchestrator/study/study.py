@@ -25,7 +25,14 @@ from orchestrator.study import units
 from orchestrator.study.closed_form import resolved
 from orchestrator.study.declare import List, Part, UnfitError
 from orchestrator.study.fidelities import AUTO, fields_of
-from orchestrator.study.fields import FIELDS, PARTS, SEED, Quantity, default_of
+from orchestrator.study.fields import (
+    FIELDS,
+    PARTS,
+    PROFILE,
+    SEED,
+    Quantity,
+    default_of,
+)
 from orchestrator.study.hints import HINTS
 from orchestrator.study.keys import Table, Tables, by_name, nested
 from orchestrator.study.models import FLAT
@@ -553,14 +560,15 @@ def _groups(
     count = 0
     for group, place in zip(tables_of, places, strict=True):
         axes = _axes(file, group, place)
-        count += math.prod(map(len, axes.values()))
-        if count > kind.most:
-            what = f"more than {kind.most} scenes in the study"
-            raise InputError(what, f"{place}: axes", "shorten the lists")
         tables = by_name(dict(file), parts)
         own = by_name(dict(group), parts)
         for part, table in own.items():
             tables[part] |= table
+        _list_profiles(tables["bed"], axes, files, place)
+        count += math.prod(map(len, axes.values()))
+        if count > kind.most:
+            what = f"more than {kind.most} scenes in the study"
+            raise InputError(what, f"{place}: axes", "shorten the lists")
         make = partial(kind.make, where=place, files=files)
         listed.append([*scenes_at(tables, axes, place, make, numbers)])
         _check_effect(kind.fields, own, listed[-1], place)
@@ -606,6 +614,20 @@ def _axes(file: File, table: "_Group", where: str) -> dict[str, list[Any]]:
         raise InputError(what, f"{where}: seeds", "leave out one of the two")
     axes[SEED] = [*range(seeds)]
     return axes
+
+
+def _list_profiles(
+    bed: Table, axes: dict[str, list[Any]], files: Files, where: str
+) -> None:
+    """Write an axis of profiles in place of the folders that have them."""
+    given = axes.get(PROFILE, [bed.get("profile")])
+    if not any(isinstance(name, str) for name in given):
+        return
+    listed: list[Any] = []
+    for name in given:
+        listed += files.series(name, where) if isinstance(name, str) else [name]
+    if listed != given:
+        axes[PROFILE] = listed
 
 
 def make_scene(

@@ -119,7 +119,7 @@ UNFIT = [
     ('"scan.csv", smoothing = -1.0', "bed.smoothing: -1.0 is not accepted"),
     ('"scan.csv", smoothing = 0.1', r"smoothing over 0.1 m leaves nothing of 0.14 m"),
     ('"scan.csv", smoothing = 1e-300', r"more than the 3000 .*raise bed.smoothing"),
-    ('"."', "not a readable text file"),
+    ('"empty"', "there is no profile in it"),
     ('"pipe"', "not a readable text file"),
     (f'"{"x" * 5000}"', "not a readable text file"),
     ("3", r"bed.profile: 3 is not accepted"),
@@ -137,6 +137,7 @@ def test_a_bad_profile_is_refused_in_one_line(name: str, tmp_path: Path) -> None
 
 def test_what_does_not_go_with_a_profile_is_refused(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "empty").mkdir()
     for fields, message in UNFIT:
         with pytest.raises(InputError, match=message):
             scene_of(tmp_path, GOOD, STUDY.replace('"scan.csv"', fields))
