@@ -502,9 +502,8 @@ GALILEO = np.geomspace(0.3, 1e5, 22)
 """Galileo numbers of level beds of quartz in water, and in air."""
 FEWER = np.geomspace(0.3, 1e5, 11)
 """Those of level beds at other density ratios."""
-FEW_GALILEO = np.geomspace(0.3, 1e5, 5)
-"""Those over which a factor of water is a parabola, and the three of other factors."""
-THREE = FEW_GALILEO[::2]
+OF_FACTORS = np.geomspace(0.3, 1e5, 9)
+"""Those of the factors of slope, size and roughness."""
 OF_SHALLOW = (100.0, 3e3, 7e4)
 DENSITY = (1.1, 1.3, 1.65, 2.65, 5.0, 12.0, 40.0, 150.0, 600.0, 2200.0, 1e4, 1e5, 1e6)
 """Density ratios."""
@@ -514,8 +513,8 @@ SLOPES_DEG = (-20.0, 20.0, -10.0, 10.0, -30.0, 30.0)
 SHALLOW = (0.01, 0.03, 0.06, 0.12, 0.24)
 SIZES = (0.35, 0.6, 1.6, 2.83)
 ROUGHNESS = (0.1, 0.3)
-COUNT = 16
-"""Spheres over each of the beds."""
+COUNT = 64
+"""Spheres over each of the beds. Points that were computed first have 16."""
 
 
 def plan() -> Iterator[Sphere]:
@@ -535,16 +534,16 @@ def chains() -> Iterator[tuple[dict[str, float], Sequence[float]]]:
         chain = {"density_ratio": WATER, "slope_deg": slope, "shallow": shallow}
         yield chain, OF_SHALLOW
     for slope in SLOPES_DEG:
-        yield {"density_ratio": WATER, "slope_deg": slope}, FEW_GALILEO
+        yield {"density_ratio": WATER, "slope_deg": slope}, OF_FACTORS
     for s in sorted(set(DENSITY) - {WATER, AIR}, key=lambda s: abs(np.log(s / 40))):
         yield {"density_ratio": s}, FEWER
     for slope in SLOPES_DEG:
-        yield {"density_ratio": AIR, "slope_deg": slope}, THREE
+        yield {"density_ratio": AIR, "slope_deg": slope}, OF_FACTORS
     for s in (WATER, AIR):
         for roughness in ROUGHNESS:
-            yield {"density_ratio": s, "roughness": roughness}, THREE
+            yield {"density_ratio": s, "roughness": roughness}, OF_FACTORS
         for size in SIZES:
-            yield {"density_ratio": s, "relative_size": size}, THREE
+            yield {"density_ratio": s, "relative_size": size}, OF_FACTORS
 
 
 def main(directory: Path) -> None:
@@ -627,59 +626,50 @@ def _along(rows: pd.DataFrame, name: str, galileo: FloatArray) -> FloatArray:
 def factors(points: pd.DataFrame) -> pd.DataFrame:
     """Make the factors of slope, shallow flow, size and roughness, those of level beds over a `table`.
 
-    Each is a parabola over the logarithm of the Galileo number, by least squares; it is 1 for the usual value.
-    That of a shallow flow is over a deep one on the same slope, in water, and taken at every density ratio.
+    Each is a smoothing spline over the logarithm of the Galileo number, as stiff as the errors of the points
+    allow; it is 1 for the usual value. That of a shallow flow is over a deep one on the same slope, in water,
+    and taken at every density ratio.
     """
-    rows = []
+    rows: list[dict[str, Any]] = []
     for kind, usual in USUAL.items():
         others = [name for name in USUAL if name not in {kind, "slope_deg"}]
         is_kind = ~np.isclose(points[kind], usual)
         for name in others:
             is_kind &= np.isclose(points[name], USUAL[name])
-        part = points[is_kind].copy()
-        start, after = _over_level(part, points)
+        part = _over_level(points[is_kind], points)
         if kind == "shallow":
             of_slopes = pd.DataFrame(rows)
-            start = start / _of_slope(of_slopes, part, "start")
-            after = after / _of_slope(of_slopes, part, "after")
+            for name in ("start", "after"):
+                part[name] /= _of_slope(of_slopes, part, name)
             part = pd.concat([part, part.assign(density_ratio=AIR)])
-            start, after = np.tile(start, 2), np.tile(after, 2)
-        part = part.assign(start=start, after=after)
         for s in part["density_ratio"].unique():
-            nodes = [
-                {"galileo": each, "start": 1.0, "after": 1.0} for each in FEW_GALILEO
-            ]
-            found = [(usual, nodes)]
+            ones = {"galileo": OF_FACTORS, "start": 1.0, "after": 1.0}
+            found = [(usual, pd.DataFrame(ones))]
             for value, of_value in part[part["density_ratio"] == s].groupby(kind):
-                found.append((value, _parabolas(of_value)))
+                numbers = {name: _smooth(of_value, name) for name in ("start", "after")}
+                found.append((value, pd.DataFrame({"galileo": OF_FACTORS, **numbers})))
             for value, numbers in found:
-                for each in numbers:
-                    rows.append(
-                        {"kind": kind, "value": value, "density_ratio": s, **each}
-                    )
+                given = numbers.assign(kind=kind, value=value, density_ratio=s)
+                rows += given.to_dict("records")
     made = pd.DataFrame(rows).sort_values(["kind", "value", "galileo", "density_ratio"])
     return made[["kind", "value", "galileo", "density_ratio", "start", "after"]]
 
 
-def _over_level(
-    part: pd.DataFrame, points: pd.DataFrame
-) -> tuple[FloatArray, FloatArray]:
-    """Both numbers of some points over those of level beds."""
+def _over_level(part: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
+    """Some points with `start` and `after`, both numbers over those of level beds, and their errors."""
     level = of_level(points)
-    start, after = np.empty(len(part)), np.empty(len(part))
+    made = part.assign(start=np.nan, after=np.nan)
     for s in part["density_ratio"].unique():
-        here = (part["density_ratio"] == s).to_numpy()
+        here = made["density_ratio"] == s
         alike = level[np.isclose(level["density_ratio"], s)]
-        galileo = part.loc[here, "galileo"]
-        start[here] = part.loc[here, "start_50"] / np.exp(
-            _along(alike, "start_50", galileo)
-        )
-        after[here] = part.loc[here, "after_20_50"] / np.exp(
-            _along(alike, "after_20_50", galileo)
-        )
+        for name, column in (("start", "start_50"), ("after", "after_20_50")):
+            of_level_bed = np.exp(_along(alike, column, part.loc[here, "galileo"]))
+            made.loc[here, name] = part.loc[here, column] / of_level_bed
     # where none was tried below, the other number says how it changes
     is_floor = part["after_20_50"] < 1.02 * FLOOR / PEAK * part["start_50"]
-    return start, np.where(is_floor, start, after)
+    for end in ("", "_error"):
+        made[f"after{end}"] = made[f"after{end}"].mask(is_floor, made[f"start{end}"])
+    return made
 
 
 def _of_slope(rows: pd.DataFrame, part: pd.DataFrame, name: str) -> FloatArray:
@@ -691,14 +681,16 @@ def _of_slope(rows: pd.DataFrame, part: pd.DataFrame, name: str) -> FloatArray:
     return np.asarray(at(np.column_stack([part["slope_deg"], np.log(part["galileo"])])))
 
 
-def _parabolas(rows: pd.DataFrame) -> list[dict[str, float]]:
-    """Both factors of the points of one value, at the Galileo numbers of the factors."""
-    x = np.log(rows["galileo"])
-    at = np.clip(np.log(FEW_GALILEO), x.min(), x.max())
-    made = {"galileo": FEW_GALILEO}
-    for name in ("start", "after"):
-        made[name] = np.maximum(np.polyval(np.polyfit(x, rows[name], 2), at), 0)
-    return pd.DataFrame(made).to_dict("records")
+def _smooth(rows: pd.DataFrame, name: str) -> FloatArray:
+    """A factor of the points of one value, smooth, at the Galileo numbers of the factors."""
+    rows = rows.sort_values("galileo")
+    x, factor = np.log(rows["galileo"]), rows[name]
+    error = factor * np.maximum(rows[f"{name}_error"], LEAST_ERROR)
+    spline = UnivariateSpline(
+        x, factor, 1 / error, k=min(3, len(rows) - 1), s=len(rows)
+    )
+    at = np.clip(np.log(OF_FACTORS), x.min(), x.max())
+    return np.maximum(spline(at), 0)
 
 
 def make_tables() -> None:

@@ -10,7 +10,7 @@ python tools/tested.py results/validate/tables/measured.csv > orchestrator/physi
 
 import itertools
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -40,6 +40,7 @@ from orchestrator.physics.beside import (
     NUMBERS_OF_STRIPS,
     OF_STRIPS,
     SUSTAINED,
+    window_weight,
 )
 from orchestrator.physics.curves import GAMMA
 from orchestrator.physics.laws import DEFAULT, LAWS
@@ -48,7 +49,7 @@ from orchestrator.study import fields as columns
 from orchestrator.study import study
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import changed
-from orchestrator.types import Row
+from orchestrator.types import FloatArray, Row
 
 FLUMES = ("flumes, visual", "flumes, fixed intensity", "flumes, reference transport")
 """Sets of level beds in flumes, whose rows an interval holds."""
@@ -58,11 +59,13 @@ WIND = ("wind, field", IVERSEN_WHITE)
 """Sets in air: three sites, and a formula at some sizes."""
 IN_AIR = (1.1, 52.0)
 """Range of Re* of the intervals in air: within 2 of those of the rows, 2.2 to 26."""
-DECADES = (0.1, 1.0, 10.0, 100.0, 1000.0, 1e4)
+WINDOWS = tuple((10 ** (n / 2 - 1), 10 ** (n / 2)) for n in range(9))
+"""Windows of Re* of the intervals in liquids, each a decade: every half of a decade."""
 LEAST = 10
-"""Ranges of Re* of the intervals, and the fewest rows of one."""
+"""Fewest rows of a window, and of those that predict a set."""
 COVERED = 0.8
-"""Share of the rows left out that an interval contains."""
+WIDER = 1.005
+"""Share of the rows left out that an interval contains, and by how much it is made wider at a time."""
 OF_SUSTAINED = (DEFAULT, LAWS[DEFAULT].extended_by)
 """Force laws of the sustained motion whose intervals are found: those of the default."""
 BETAS = {60.0: (55.0, 60.0), 50.0: (47.5, 55.0), 45.0: (42.5, 47.5)}
@@ -76,11 +79,11 @@ COHESIONS = (0.0, MOST_COHESION)
 
 
 class Found(NamedTuple):
-    """What a range of Re* says.
+    """What a window of Re* says.
 
-    Ends of the interval, the number of rows and of their sets, the share of the rows
-    that it contains where their set is left out, and the factor by which it is wider
-    than the tenth to ninetieth percentile.
+    Ends of the interval in the middle of its window, the number of rows and of their
+    sets, the share of the rows that are contained where their set is left out, and the
+    factor by which it is wider than the tenth to ninetieth percentile.
     """
 
     low: float
@@ -102,10 +105,10 @@ def ends(parts: Ratios) -> tuple[float, float]:
     return min(lows), max(highs)
 
 
-def needed(
+def predicted(
     parts: Ratios, sets: "pd.Series[str]", every: Ratios, fewest: int = LEAST
-) -> list["pd.Series[float]"] | None:
-    """Find the factor that each row needs when its set is left out.
+) -> dict[str, tuple[float, float]] | None:
+    """Find the percentiles that the other sets have for each set that is left out.
 
     Parameters
     ----------
@@ -121,56 +124,148 @@ def needed(
 
     Returns
     -------
-    list of Series
-        For each answer, by how much wider than the percentiles of the other sets an
-        interval is that contains the row; at least 1. None where a set is alone: no
-        other says what it needs.
+    dict of str to tuple
+        The ends by set. None where a set is alone: no other predicts it.
     """
-    found: list[list[pd.Series[float]]] = [[] for _ in parts]
+    found = {}
     for name in sets[parts[0].index.union(parts[-1].index)].unique():
         others = [part[sets[part.index] != name] for part in parts]
         if min(map(len, others)) < fewest:
             others = [part[sets[part.index] != name] for part in every]
         if min(map(len, others)) < fewest:
             return None
-        low, high = ends(others)
-        for place, part in enumerate(parts):
-            left_out = part[sets[part.index] == name]
-            beyond = np.fmax(low / left_out, left_out / high)
-            found[place].append(beyond.clip(lower=1.0))
-    return [pd.concat(each) for each in found]
+        found[name] = ends(others)
+    return found
+
+
+class Window(NamedTuple):
+    """What the rows in a window of Re* say: ends, and those that predict each set."""
+
+    span: tuple[float, float]
+    parts: list["pd.Series[float]"]
+    ends: tuple[float, float]
+    of_sets: dict[str, tuple[float, float]]
+
+
+def windows_of(
+    ratios: Ratios,
+    reynolds: Ratios,
+    sets: "pd.Series[str]",
+    spans: Iterable[tuple[float, float]],
+    fewest: int,
+) -> Iterator[Window]:
+    """The windows that have rows enough, and whose sets are predicted."""
+    for span in spans:
+        low, high = span
+        parts = [
+            ratio[(at > low) & (at <= high)]
+            for ratio, at in zip(ratios, reynolds, strict=True)
+        ]
+        if min(map(len, parts)) < fewest:
+            continue
+        of_sets = predicted(parts, sets, ratios, fewest)
+        if of_sets is not None:
+            yield Window(span, parts, ends(parts), of_sets)
 
 
 def calibrated(
-    parts: Ratios, sets: "pd.Series[str]", every: Ratios, fewest: int = LEAST
-) -> Found | None:
-    """Make the interval that is right for several answers to the same measurements.
+    ratios: Ratios,
+    reynolds: Ratios,
+    sets: "pd.Series[str]",
+    spans: Iterable[tuple[float, float]],
+    fewest: int = LEAST,
+) -> list[tuple[Window, Found]]:
+    """Make the intervals that are right for several answers to the same measurements.
 
     Parameters
     ----------
-    parts, sets, every, fewest
-        As `needed` takes them.
+    ratios, reynolds
+        For each answer, the ratios of the measurements to it, and its Re*.
+    sets
+        The set of each measurement.
+    spans
+        The windows of Re*.
+    fewest
+        Fewest rows of a window, and of those that predict a set.
 
     Returns
     -------
-    Found
-        The percentiles of all rows, widened so that `COVERED` of the rows are contained
-        whose set is left out, and up to the answer itself; of several answers the
-        widest, the fewest rows and the least share. None where `needed` is.
+    list of tuple
+        For each window that has an interval the percentiles of all rows, widened so
+        that `COVERED` of its rows are contained whose set is left out, by what is
+        between the windows that they are in, and up to the answer itself; of several
+        answers the widest, the fewest rows and the least share.
     """
-    factors = needed(parts, sets, every, fewest)
-    if factors is None:
-        return None
-    widened = max(each.quantile(COVERED, interpolation="higher") for each in factors)
-    low, high = ends(parts)
-    return Found(
-        low=min(low / widened, 1.0),
-        high=max(high * widened, 1.0),
-        rows=min(map(len, parts)),
-        sets=min(sets[part.index].nunique() for part in parts),
-        held=min(float((each <= widened).mean()) for each in factors),
-        widened=float(widened),
-    )
+    windows = [*windows_of(ratios, reynolds, sets, spans, fewest)]
+    if not windows:
+        return []
+    beyond = [
+        _beyond(windows, ratio, at, sets)
+        for ratio, at in zip(ratios, reynolds, strict=True)
+    ]
+    widened = np.zeros(len(windows))
+    while True:
+        held = np.array([_held(each, widened) for each in beyond]).min(axis=0)
+        if (held >= COVERED).all():
+            break
+        widened[held < COVERED] += np.log(WIDER)
+    made = []
+    for window, factor, share in zip(windows, np.exp(widened), held, strict=True):
+        low, high = window.ends
+        found = Found(
+            low=min(low / factor, 1.0),
+            high=max(high * factor, 1.0),
+            rows=min(map(len, window.parts)),
+            sets=min(sets[part.index].nunique() for part in window.parts),
+            held=float(share),
+            widened=float(factor),
+        )
+        made.append((window, found))
+    return made
+
+
+class Beyond(NamedTuple):
+    """How far rows of an answer are beyond what predicts them, without widening.
+
+    By how much the logarithm of each is beyond an end, shape (n,), and what each window
+    counts for it, shape (windows, n).
+    """
+
+    logs: FloatArray
+    weights: FloatArray
+
+
+def _beyond(
+    windows: Sequence[Window],
+    ratio: "pd.Series[float]",
+    at: "pd.Series[float]",
+    sets: "pd.Series[str]",
+) -> Beyond:
+    """Place the rows of an answer beside the windows that they are in."""
+    reynolds = at.to_numpy(float)
+    weights, logs = [], []
+    for window in windows:
+        low, high = window.span
+        inside = (reynolds > low) & (reynolds <= high)
+        weights.append(window_weight(reynolds, window.span, inside))
+        pairs = [
+            window.of_sets[name] if here else (1.0, 1.0)
+            for name, here in zip(sets[ratio.index], inside, strict=True)
+        ]
+        logs.append(np.log(pairs).T)
+    total = np.sum(weights, axis=0)
+    known = total > 0
+    part = np.array(weights)[:, known] / total[known]
+    low, high = (part[:, None] * np.array(logs)[:, :, known]).sum(axis=0)
+    log = np.log(ratio.to_numpy(float))[known]
+    return Beyond(np.maximum(low - log, log - high), part)
+
+
+def _held(beyond: Beyond, widened: FloatArray) -> FloatArray:
+    """Share of the rows of each window that are contained where their set is left out."""
+    is_held = beyond.logs <= widened @ beyond.weights + 1e-12
+    in_window = beyond.weights > 0
+    return np.asarray((is_held & in_window).sum(axis=1) / in_window.sum(axis=1))
 
 
 def of_grains() -> pd.DataFrame:
@@ -244,26 +339,15 @@ def _sorted(made: list[Row], words: list[str], numbers: list[str]) -> pd.DataFra
 def _of_liquids(
     beds: pd.DataFrame, answers: Sequence["pd.Series[float]"]
 ) -> Iterator[Row]:
-    """The intervals of some answers in a liquid, by decades of their Re*."""
-    every = [(beds["measured"] / answer[beds.index]).dropna() for answer in answers]
-    for low, high in itertools.pairwise(DECADES):
-        parts = []
-        for answer in answers:
-            value = answer[beds.index]
-            reynolds = np.sqrt(value) * beds["galileo"]
-            here = (reynolds > low) & (reynolds <= high)
-            parts.append((beds["measured"] / value)[here])
-        if min(map(len, parts)) < LEAST:
-            continue
-        found = calibrated(parts, beds["group"], every)
-        if found is None:
-            continue
+    """The intervals of some answers in a liquid, by windows of their Re*."""
+    ratios, reynolds = _beside(beds, answers)
+    for window, found in calibrated(ratios, reynolds, beds["group"], WINDOWS):
         # measured beside every answer of the range
-        ratios = [beds.loc[part.index, "density_ratio"] for part in parts]
+        density = [beds.loc[part.index, "density_ratio"] for part in window.parts]
         yield {
             "medium": LIQUID,
-            **_range("reynolds", low, high),
-            **_range("density_ratio", max(map(min, ratios)), min(map(max, ratios))),
+            **_range("reynolds", *window.span),
+            **_range("density_ratio", max(map(min, density)), min(map(max, density))),
             **_range("cohesion_n_m", 0.0, 0.0),
             **found._asdict(),
         }
@@ -271,10 +355,9 @@ def _of_liquids(
 
 def _of_air(beds: pd.DataFrame, answers: Sequence["pd.Series[float]"]) -> Row:
     """The interval of some answers in air."""
-    parts = [beds["measured"] / answer[beds.index] for answer in answers]
+    ratios, reynolds = _beside(beds, answers)
     # each site, and the formula, is left out once
-    found = calibrated(parts, beds["group"], parts, fewest=2)
-    assert found is not None
+    ((_, found),) = calibrated(ratios, reynolds, beds["group"], [IN_AIR], fewest=2)
     return {
         "medium": GAS,
         **_range("reynolds", *IN_AIR),
@@ -284,6 +367,18 @@ def _of_air(beds: pd.DataFrame, answers: Sequence["pd.Series[float]"]) -> Row:
     }
 
 
+def _beside(
+    beds: pd.DataFrame, answers: Sequence["pd.Series[float]"]
+) -> tuple[Ratios, Ratios]:
+    """Measured thresholds over each answer, where there is one, and its Re*."""
+    ratios, reynolds = [], []
+    for answer in answers:
+        value = answer[beds.index].dropna()
+        ratios.append(beds["measured"][value.index] / value)
+        reynolds.append(np.sqrt(value) * beds["galileo"][value.index])
+    return ratios, reynolds
+
+
 def of_strips(rows: pd.DataFrame, strip: Scene) -> pd.DataFrame:
     """The intervals of strips, by the fields of a strip and the model's Re*.
 
@@ -291,9 +386,7 @@ def of_strips(rows: pd.DataFrame, strip: Scene) -> pd.DataFrame:
     """
     flumes = rows[rows["set"].isin(FLUMES)]
     made: list[Row] = []
-    of_strips = (
-        each for each in MODELS if each.name != PAPER and not each.is_sustained
-    )
+    of_strips = [each for each in MODELS if each.is_of_strips and each.name != PAPER]
     for model, law in itertools.product(of_strips, OF_SUSTAINED):
         gusts = {"intensity": INTENSITY, "events": EVENTS} if model.gust > 1 else None
         scene = changed(strip, {**model.fields, "forces.law": law, "flow.gusts": gusts})

@@ -6,6 +6,7 @@ model's value to the measured one.
 """
 
 from collections.abc import Callable, Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -96,6 +97,11 @@ class Model(NamedTuple):
     is_sustained: bool = False
     is_entrained: bool = True
     formula: Callable[[pd.DataFrame], FloatArray] | None = None
+
+    @property
+    def is_of_strips(self) -> bool:
+        """Whether level beds are answered on strips, or by the paper's single grain."""
+        return self.formula is None and not self.is_sustained
 
 
 LONE = {"forces.exposure": "protrusion"}
@@ -564,6 +570,75 @@ def by_rows(rows: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(made)
 
 
+class Part(NamedTuple):
+    """Rows of some sets in a range of a number: above `low`, up to `high`."""
+
+    name: str
+    sets: tuple[str, ...]
+    number: str
+    low: float
+    high: float
+
+
+GALILEO = (0.0, 3.0, 10.0, 30.0, 60.0, 300.0, 2000.0, np.inf)
+"""Galileo numbers between which the rows by eye are scored."""
+VISUAL = ("flumes, visual",)
+PARTS = (
+    *(Part("Galileo number", VISUAL, "galileo", *two) for two in pairwise(GALILEO)),
+    *(
+        Part("Re*", VISUAL, "reynolds", *two)
+        for two in pairwise((0.0, 1.0, 400.0, np.inf))
+    ),
+    *(
+        Part("slope", ("steep flumes",), "slope", *two)
+        for two in pairwise((0.0, 0.12, np.inf))
+    ),
+)
+"""Parts of sets in which models are scored: the Re* are those of the measurements."""
+
+
+def by_parts(rows: pd.DataFrame) -> pd.DataFrame:
+    """Score each model on the `PARTS` of sets.
+
+    Parameters
+    ----------
+    rows
+        The comparison, as of `compare_models`.
+
+    Returns
+    -------
+    DataFrame
+        A row for each part and each model that answers it: what it is by, its range,
+        the sets, number of answered rows, median ratio, factor in the median and the
+        worst, and the share within 2.
+    """
+    rows = rows.assign(reynolds=np.sqrt(rows["measured"]) * rows["galileo"])
+    made = []
+    for part in PARTS:
+        here = rows["set"].isin(part.sets) & (rows[part.number] > part.low)
+        here &= rows[part.number] <= part.high
+        for model, of_model in rows[here].groupby("model", sort=False):
+            ratio = of_model["ratio"].dropna()
+            if ratio.empty:
+                continue
+            factor = np.exp(np.abs(np.log(ratio)))
+            made.append(
+                {
+                    "by": part.name,
+                    "low": part.low,
+                    "high": part.high,
+                    "sets": "; ".join(part.sets),
+                    "model": model,
+                    "rows": len(ratio),
+                    "ratio": ratio.median(),
+                    "factor": factor.median(),
+                    "worst": factor.max(),
+                    "within_2": (factor <= FAR).mean(),
+                }
+            )
+    return pd.DataFrame(made)
+
+
 class Validation(Experiment):
     """What was measured, answered on the strips, the hill and the hump of a study.
 
@@ -613,6 +688,7 @@ class Validation(Experiment):
             "measured": rows,
             "scores": scored,
             "rows": by_rows(rows),
+            "parts": by_parts(rows),
             "activity": activity.compare_activity(),
             "followed": followed.compare(followed.stored()),
             "hiding": stored_hiding(),

@@ -99,6 +99,10 @@ STRIPS = Path(__file__).with_name("tested_strips.csv")
 """The tested intervals of single grains, and of poured strips."""
 OF_THE_TOOL = ("sets", "widened")
 """Columns of both files that no answer needs: `tools/tested.py` explains them."""
+WINDOW = ("reynolds", "density_ratio")
+"""Columns of the ranges that tell the windows of Re* of an interval apart."""
+LEAST_WEIGHT = 1e-9
+"""What a window counts at its ends, where it alone may be there."""
 OF_STRIPS = ("sizes", "exposure", "sheltering")
 """Words that tell tested strips apart, beside those of all tested intervals."""
 NUMBERS_OF_STRIPS = (
@@ -120,7 +124,7 @@ numbers of a strip. So much of its weight may cohesion hold a grain that has non
 LEVEL_DEG = 1.0
 """Steepest slope of a bed that is like those of the flumes, degrees."""
 MOST_SLOPE_DEG = 30.0
-"""Slope to which an interval of grains in sustained motion is given, degrees."""
+"""Steepest slope on which sustained motion was found, and has an interval, degrees."""
 FRICTION_DEG = (32.0, 50.0)
 """Friction angles of the slope laws that bound that of sustained motion, degrees."""
 NO_ROWS = (np.nan, np.nan, np.nan, 0.0)
@@ -305,29 +309,67 @@ def tested(table: Any) -> FloatArray:
     """
     columns = _columns(table)
     count = len(columns["reynolds"])
-    found = np.array([[np.nan], [np.nan], [0.0], [np.nan]]).repeat(count, axis=1)
+    found = _none(count)
     is_lone, is_strip = _kinds(table, count)
     is_usual = _is_usual(table)
     for asked, path in ((is_lone, GRAINS), (is_strip, STRIPS)):
         asked &= is_usual
         if not asked.any():
             continue
-        for interval in _intervals(path):
-            here = interval.is_of(columns, asked)
+        for kind in _intervals(path):
+            here = kind.is_of(columns, asked)
             if here.any():
-                found[:, here] = interval.widest(found[:, here])
+                found[:, here] = kind.widest(found[:, here], columns, here)
     return found
 
 
-class TestedInterval(NamedTuple):
-    """A tested interval, and what it is of.
+def _none(count: int) -> FloatArray:
+    """No interval of each of some thresholds, shape (4, count)."""
+    return np.array([[np.nan], [np.nan], [0.0], [np.nan]]).repeat(count, axis=1)
+
+
+def window_weight(
+    reynolds: FloatArray, ends: tuple[float, float], inside: BoolArray
+) -> FloatArray:
+    """Find how much a window of Re* counts for thresholds in it.
+
+    Windows overlap. An interval is between those of the windows that its Re* is in, so
+    that it has no step where one ends.
+
+    Parameters
+    ----------
+    reynolds
+        Re* of the thresholds, shape (n,).
+    ends
+        The ends of the window.
+    inside
+        Which of them the window is of, shape (n,).
+
+    Returns
+    -------
+    ndarray
+        1 in its middle, next to nothing at its ends, 0 outside.
+
+    Examples
+    --------
+    >>> at = np.array([1.0, 10**0.25, 10**0.5, 10.0, 11.0])
+    >>> print(window_weight(at, (1.0, 10.0), at <= 10).round(6))
+    [0.  0.5 1.  0.  0. ]
+    """
+    low, high = np.log(ends)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        part = (np.log(reynolds) - low) / (high - low)
+    weight = np.maximum(1 - np.abs(2 * part - 1), LEAST_WEIGHT)
+    return np.where(inside, weight, 0.0)
+
+
+class TestedWindow(NamedTuple):
+    """A tested interval in a window of Re*.
 
     Attributes
     ----------
-    words
-        Words by the columns of a table.
     ranges
-        Ends of numbers, both included, by the columns.
+        Ends of Re* and of the ratio of densities, both included, by the columns.
     low, high
         Ends of the interval over the Shields number.
     rows
@@ -336,12 +378,34 @@ class TestedInterval(NamedTuple):
         Share of them that it held.
     """
 
-    words: Mapping[str, str]
     ranges: Mapping[str, tuple[float, float]]
     low: float
     high: float
     rows: float
     held: float
+
+    def is_of(self, columns: Mapping[str, NDArray[Any]]) -> BoolArray:
+        """Tell which of some thresholds are in the window."""
+        is_within = (_is_within(columns[name], self.ranges[name]) for name in WINDOW)
+        return np.asarray(np.logical_and.reduce([*is_within]))
+
+
+class TestedKind(NamedTuple):
+    """The tested intervals of thresholds of a kind, over Re*.
+
+    Attributes
+    ----------
+    words
+        Words by the columns of a table.
+    ranges
+        Ends of numbers, both included, by the columns.
+    windows
+        The intervals by windows of Re*.
+    """
+
+    words: Mapping[str, str]
+    ranges: Mapping[str, tuple[float, float]]
+    windows: tuple[TestedWindow, ...]
 
     def is_of(self, columns: Mapping[str, NDArray[Any]], asked: BoolArray) -> BoolArray:
         """Tell which of some thresholds it is of.
@@ -367,33 +431,81 @@ class TestedInterval(NamedTuple):
             here &= _is_within(columns[name], ends)
         return here
 
-    def widest(self, found: FloatArray) -> FloatArray:
+    def widest(
+        self,
+        found: FloatArray,
+        columns: Mapping[str, NDArray[Any]],
+        here: BoolArray,
+    ) -> FloatArray:
         """Join it to other intervals of the same thresholds: at the end of two ranges.
 
         Parameters
         ----------
         found
-            The other intervals, shape (4, n); those without rows are none.
+            The other intervals, shape (4, m); those without rows are none.
+        columns
+            The columns of n thresholds.
+        here
+            Which of these the m are, shape (n,).
 
         Returns
         -------
         ndarray
             The widest ends, the fewest rows, and the least part that was held.
         """
-        own = np.array([[self.low], [self.high], [self.rows], [self.held]])
-        low, _, rows, held = np.fmin(found, own)
-        high = np.fmax(found[1], self.high)
-        return np.stack([low, high, np.where(found[2] > 0, rows, self.rows), held])
+        own = self.between({name: columns[name][here] for name in WINDOW})
+        low, _, _, held = np.fmin(found, own)
+        high = np.fmax(found[1], own[1])
+        rows = np.where(found[2] > 0, found[2], own[2])
+        rows = np.where(own[2] > 0, np.minimum(rows, own[2]), rows)
+        return np.stack([low, high, rows, held])
+
+    def between(self, columns: Mapping[str, NDArray[Any]]) -> FloatArray:
+        """Find the interval of each of some thresholds between those of its windows.
+
+        Parameters
+        ----------
+        columns
+            Their columns of the `WINDOW`, each of shape (m,).
+
+        Returns
+        -------
+        ndarray
+            Ends, rows and part as of `tested`, the fewest and the least of the windows,
+            shape (4, m).
+        """
+        reynolds = columns["reynolds"]
+        total = np.zeros(len(reynolds))
+        logs = np.zeros((2, len(reynolds)))
+        rows, held = np.full((2, len(reynolds)), np.inf)
+        for window in self.windows:
+            inside = window.is_of(columns)
+            weight = window_weight(reynolds, window.ranges["reynolds"], inside)
+            total += weight
+            logs += weight * np.log([[window.low], [window.high]])
+            rows[inside] = np.minimum(rows[inside], window.rows)
+            held[inside] = np.minimum(held[inside], window.held)
+        is_known = total > 0
+        made = _none(len(reynolds))
+        made[:2, is_known] = np.exp(logs[:, is_known] / total[is_known])
+        made[2, is_known], made[3, is_known] = rows[is_known], held[is_known]
+        return made
 
 
 @cache
-def _intervals(path: Path) -> tuple[TestedInterval, ...]:
+def _intervals(path: Path) -> tuple[TestedKind, ...]:
     """The tested intervals of a file."""
     text = path.read_text(encoding="utf-8")
-    return tuple(map(_interval, csv.DictReader(text.splitlines())))
+    found: dict[Any, TestedKind] = {}
+    for row in csv.DictReader(text.splitlines()):
+        kind = _kind(row)
+        key = tuple(kind.words.items()), tuple(kind.ranges.items())
+        others = found[key].windows if key in found else ()
+        found[key] = kind._replace(windows=others + kind.windows)
+    return tuple(found.values())
 
 
-def _interval(row: Mapping[str, str]) -> TestedInterval:
+def _kind(row: Mapping[str, str]) -> TestedKind:
     """A tested interval of a row: numbers have columns for their two ends."""
     own = {name: float(row[name]) for name in ("low", "high", "rows", "held")}
     words, ranges = {}, {}
@@ -405,7 +517,8 @@ def _interval(row: Mapping[str, str]) -> TestedInterval:
             ranges[column] = (float(value), float(row[f"{column}_high"]))
         elif end != "high":
             words[name] = value
-    return TestedInterval(words, ranges, **own)
+    window = TestedWindow({name: ranges.pop(name) for name in WINDOW}, **own)
+    return TestedKind(words, ranges, (window,))
 
 
 def _columns(table: Any) -> dict[str, NDArray[Any]]:

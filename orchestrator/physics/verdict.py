@@ -9,9 +9,11 @@ from typing import Any, Literal, NamedTuple
 
 from orchestrator.physics.beside import (
     COMPARED_WITH,
+    ENTRAINED,
     FORMULA,
     LIKE,
     MOST_COHESION,
+    MOST_SLOPE_DEG,
     SUSTAINED,
 )
 from orchestrator.physics.curves import GAMMA
@@ -30,6 +32,8 @@ UNUSABLE: Word = "not usable"
 MOST_CORRECTION = 2.0
 """Factor from the friction velocity beside it up to which an answer may be corrected.
 The tested intervals of the usual roughness reach as far: 0.21 to 3.5 in the stress."""
+SLOPE_TOLERANCE_DEG = 1e-6
+"""By how much a slope may be beyond the steepest one, deg: round-off."""
 EXPOSED_FROM = 0.25
 """Part of a grain over the tops of its neighbours from which it is exposed."""
 NOT_REACHED = "not reached: the grain has not moved"
@@ -127,6 +131,7 @@ def of_measurements(row: Mapping[Any, Any], is_closed: bool) -> Iterator[Reason]
         yield Reason("not measured", what)
     if is_sustained:
         yield from _held_by_cohesion(row)
+        yield from _too_steep(row)
     # measured are grains among their like
     size = row.get("relative_size")
     is_other = size is not None and abs(size - 1) > LIKE
@@ -153,6 +158,15 @@ def _held_by_cohesion(row: Mapping[Any, Any]) -> Iterator[Reason]:
         what = f"cohesion holds such a grain by {times}"
         what = f"{what} (by the formula of Shao and Lu 2000 for dry grains in air)"
         yield Reason("cohesion", what, f"give a cohesion of {MOST_COHESION:g} N/m")
+
+
+def _too_steep(row: Mapping[Any, Any]) -> Iterator[Reason]:
+    """Why sustained motion is not known on a slope beyond those of its table."""
+    slope = float(row["alpha_deg"])
+    if abs(slope) > MOST_SLOPE_DEG + SLOPE_TOLERANCE_DEG:
+        what = f"sustained motion was found on slopes of up to {MOST_SLOPE_DEG:g}°"
+        what = f"{what}; it is extrapolated to {slope:g}°"
+        yield Reason("slope", what, f'ask for the criterion "{ENTRAINED}"')
 
 
 def correction(row: Mapping[Any, Any]) -> float:

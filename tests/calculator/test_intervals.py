@@ -88,6 +88,25 @@ def test_every_interval_contains_its_answer_and_has_a_width(
     assert min(counts["random"], counts["water"], counts["air"]) > 50
 
 
+@pytest.mark.parametrize("criterion", ["sustained", "entrained"])
+def test_an_interval_has_no_step_from_size_to_size(criterion: str) -> None:
+    """Where one window of Re* ends the next has begun: sizes are 1 % apart."""
+    sizes = np.exp(np.arange(np.log(5e-5), np.log(2e-2), 0.01))
+    water = {"fluid_density": 999.1, "viscosity": 1.139e-6, "density": 2650.0}
+    every = {name: [number] * len(sizes) for name, number in water.items()}
+    table = thresholds({"diameter": sizes, **every}, "bridged-gravel", criterion)
+    asked = table["law"] == "bridged-gravel"
+    assert asked.sum() == len(sizes)
+    reynolds = table["reynolds"][asked]
+    for end in ("tested_low", "tested_high"):
+        over = np.log(table[end][asked] / table["shields"][asked])
+        known = np.isfinite(over)
+        # from the first to the last that has one all have one
+        assert known[np.flatnonzero(known)[0] : np.flatnonzero(known)[-1] + 1].all()
+        assert reynolds[known].max() / reynolds[known].min() > 100
+        assert np.abs(np.diff(over[known])).max() < np.log(1.05)
+
+
 def test_no_measurement_is_told_of_another_world(tables: dict[str, Table]) -> None:
     table = tables["Titan"]
     assert not table["tested_rows"].any()

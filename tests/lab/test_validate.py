@@ -117,30 +117,56 @@ def test_what_is_taken_without_a_model_is_of_the_fluid() -> None:
 
 
 def test_an_interval_is_as_wide_as_sets_left_out_need() -> None:
-    calibrated = runpy.run_path(str(TOOL))["calibrated"]
+    tool = runpy.run_path(str(TOOL))
+    sets = pd.Series(["a"] * 10 + ["b"] * 10)
+
+    def calibrated(ratio: pd.Series, at: pd.Series) -> list[Any]:
+        found = tool["calibrated"]([ratio], [at], sets, [(1.0, 10.0)])
+        return [each for _, each in found]
+
     # two sets of ten, the second at four times the ratios of the first
     one = pd.Series(np.linspace(0.9, 1.1, 10))
-    sets = pd.Series(["a"] * 10 + ["b"] * 10)
+    here = pd.Series(3.0, sets.index)
     apart = pd.concat([one, 4 * one], ignore_index=True)
-    found = calibrated([apart], sets, [apart])
+    (found,) = calibrated(apart, here)
     # b is predicted by a, and a by b: eight rows in ten are contained
     assert (found.rows, found.sets) == (20, 2)
     assert 0.8 <= found.held < 0.9
     needed = np.sort(np.concatenate([4 * one / one.max(), 4 * one.min() / one]))
-    assert found.widened == pytest.approx(needed[16])
+    assert needed[15] <= found.widened <= needed[15] * tool["WIDER"]
     low, high = apart.iloc[1], apart.iloc[18]
     assert found.low == pytest.approx(low / found.widened)
     assert found.high == pytest.approx(high * found.widened)
     # sets that agree need no more than their own scatter
     alike = pd.concat([one, one], ignore_index=True)
-    assert calibrated([alike], sets, [alike]).widened == pytest.approx(1.0, abs=0.01)
+    assert calibrated(alike, here)[0].widened == pytest.approx(1.0, abs=0.01)
     # an interval on one side of the answer ends at it
-    assert calibrated([3 * alike], sets, [3 * alike]).low == 1.0
-    assert calibrated([alike / 3], sets, [alike / 3]).high == 1.0
+    assert calibrated(3 * alike, here)[0].low == 1.0
+    assert calibrated(alike / 3, here)[0].high == 1.0
     # a set that no other predicts says nothing of others
-    assert calibrated([one], sets, [one]) is None
+    assert not calibrated(one, here[:10])
     # with others at another Re* it does
-    assert calibrated([one], sets, [apart]) is not None
+    (lone,) = calibrated(apart, pd.Series([3.0] * 10 + [30.0] * 10))
+    assert (lone.rows, lone.sets) == (10, 1)
+
+
+def test_rows_are_held_by_what_is_between_two_windows() -> None:
+    calibrated = runpy.run_path(str(TOOL))["calibrated"]
+    chance = np.random.default_rng(4)
+    count = 400
+    at = pd.Series(10 ** chance.uniform(0, 2, count))
+    sets = pd.Series(chance.choice([*"abcd"], count))
+    # each set has its own median, and all fall with Re*
+    shift = sets.map({"a": -0.3, "b": -0.1, "c": 0.2, "d": 0.4})
+    ratio = np.exp(shift + chance.normal(0, 0.2, count)) / at**0.3
+    spans = [(1.0, 10.0), (10**0.5, 10**1.5), (10.0, 100.0)]
+    found = [each for _, each in calibrated([ratio], [at], sets, spans)]
+    assert [each.rows for each in found] == [
+        int(at.between(*span).sum()) for span in spans
+    ]
+    assert min(each.held for each in found) >= 0.8
+    # no window is wider than it must be: one of them is near what is asked
+    assert min(each.held for each in found) < 0.83
 
 
 def test_the_interval_of_a_kind_holds_its_rows_in_flumes() -> None:
@@ -257,7 +283,7 @@ def test_an_interval_is_of_strips_that_differ_in_nothing_else_than_the_tested() 
     # the word for a fluid names numbers, and a criterion where none is asked for
     assert rows(changed(strip, {"fluid.kind": "paper"})) == 81
     others.add("fluid.kind")
-    assert rows(changed(strip, {"forces.exposure": "protrusion"})) == 97
+    assert rows(changed(strip, {"forces.exposure": "protrusion"})) == 86
     assert asked - others <= SPANNED.keys() | UNTESTED.keys()
     shared = {"forces.exposure": "protrusion", "forces.sheltering": "balanced"}
     gusts = {"intensity": 0.4, "events": 100}

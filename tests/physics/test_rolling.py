@@ -2,40 +2,25 @@
 
 import runpy
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.physics import rolling
-from orchestrator.physics.beside import SUSTAINED
+from orchestrator.physics import rolling, verdict
+from orchestrator.physics.beside import ENTRAINED, MOST_SLOPE_DEG, SUSTAINED
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.gusts import PEAK
 from orchestrator.physics.onset import Criteria, of_grains
 
 TOOL = runpy.run_path(str(Path(__file__).parents[2] / "tools" / "rolling.py"))
-FLUIDS = {
-    "water": {"fluid_density": 1000.0, "viscosity": 1e-6},
-    "air": {"fluid_density": 1.2, "viscosity": 1.5e-5},
-    "Mars": {"fluid_density": 0.02, "viscosity": 6.5e-4, "gravity": 3.71},
-    "Titan": {"fluid_density": 5.3, "viscosity": 1.2e-6, "gravity": 1.35},
-}
-"""Of Titan the grains are of ice."""
-DENSITY = {"Titan": 950.0}
+CURVES = runpy.run_path(str(Path(__file__).parents[2] / "tools" / "curves.py"))
+FLUIDS, sized = CURVES["FLUIDS"], CURVES["sized"]
 STEP = 1.05
 """No threshold is further from that of a grain 1 % larger."""
 SIZES = np.exp(np.arange(0, np.log(400), 0.01)) * 5e-5
 """From 0.05 to 20 mm, by 1 %."""
-
-
-def sized(fluid: str, diameter: np.ndarray) -> Grain:
-    """Quartz, or on Titan ice, in a fluid."""
-    return Grain(
-        diameter=diameter,
-        density=DENSITY.get(fluid, 2650.0),
-        entrainment_angle_deg=60.0,
-        **FLUIDS[fluid],
-    )
 
 
 def steps(shields: np.ndarray) -> float:
@@ -59,6 +44,37 @@ def test_the_threshold_has_no_step_from_density_to_density() -> None:
         grains = Grain.of_numbers(np.full(len(ratios), galileo), ratios)
         at = rolling.sustained(grains).initiation(PEAK)
         assert steps(at) < STEP
+
+
+@pytest.mark.parametrize("fluid", FLUIDS)
+def test_the_threshold_has_no_step_from_slope_to_slope(fluid: str) -> None:
+    """On slopes a tenth of a degree apart, as far as sustained motion was found."""
+    slopes = np.arange(-300, 301) / 10.0
+    for diameter in (1e-4, 3e-4, 1e-3, 5e-3):
+        grains = sized(fluid, np.full(len(slopes), diameter))
+        found = of_grains(grains.changed(slope_deg=slopes), "bridged-gravel", SUSTAINED)
+        assert steps(found.shields) < STEP
+
+
+def test_the_threshold_has_no_step_from_depth_to_depth() -> None:
+    """In flows down slopes 1 % apart, from a depth of many grains to less than one."""
+    sines = np.exp(np.arange(np.log(1e-4), np.log(0.45), 0.01))
+    for ratio in (1.3, 2.65, 4.7):
+        for galileo in (50.0, 500.0, 5e3, 5e4):
+            slopes = -np.degrees(np.arcsin(sines))
+            grains = Grain.of_numbers(galileo, ratio, slope_deg=slopes, fall=sines)
+            at = rolling.sustained(grains).initiation(PEAK)
+            assert steps(at) < STEP
+
+
+def test_the_drawn_curves_have_no_step() -> None:
+    rows = CURVES["curves"]()
+    assert (rows.groupby(["over", "fluid"]).size() == 200).all()
+    found = CURVES["largest_steps"](rows)
+    assert len(found) == 12
+    # points are 3 % apart in size, 7 % in the ratio of densities, 0.3 degrees in slope
+    assert (found["factor"] < STEP).all()
+    assert CURVES["drawn"](rows).axes[2].lines
 
 
 def test_an_easier_criterion_never_has_a_higher_threshold() -> None:
@@ -91,6 +107,24 @@ def test_a_bed_that_falls_has_less_and_one_that_rises_has_more() -> None:
         grains = Grain.of_numbers(galileo, ratio, slope_deg=slopes)
         at = rolling.sustained(grains).initiation(PEAK)
         assert (np.diff(at) > 0).all()
+
+
+def test_a_slope_beyond_those_of_the_table_is_told() -> None:
+    rows = np.genfromtxt(rolling.FACTORS, delimiter=",", names=True, dtype=None)
+    slopes = rows["value"][rows["kind"] == "slope_deg"]
+    assert (slopes.min(), slopes.max()) == (-MOST_SLOPE_DEG, MOST_SLOPE_DEG)
+    row: dict[str, Any] = {
+        "criterion": SUSTAINED,
+        "reynolds": 20.0,
+        "rho_f_kg_m3": 1000.0,
+        "level_ustar_m_s": 0.02,
+        "compared_level_ustar_m_s": 0.02,
+    }
+    for slope, codes in ((30.0, []), (33.0, ["slope"]), (-33.0, ["slope"])):
+        against = verdict.of_measurements(row | {"alpha_deg": slope}, is_closed=False)
+        assert [each.code for each in against] == codes
+    leaving = row | {"criterion": ENTRAINED, "alpha_deg": 33.0}
+    assert not [*verdict.of_measurements(leaving, is_closed=False)]
 
 
 def test_the_tables_are_made_of_the_stored_points() -> None:
