@@ -774,7 +774,7 @@ def cessation(grains: Grain) -> FloatArray:
     --------
     >>> sand = Grain.of_numbers(127.0, 2.65, ratio=[1 / 30, 1 / 10])
     >>> print(cessation(sand).round(3))
-    [0.033 0.063]
+    [0.033 0.08 ]
     """
     usual = grains.changed(roughness=grains.diameter / SAND_GRAIN)
     points = np.log([grains.galileo, grains.density_ratio, grains.ratio])
