@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from orchestrator.study.study import Beds, Study
     from orchestrator.tables import Tables
 
-GUESTS = ("benchmark", "lab", "paper", "stockpile", "surface")
+GUESTS = ("benchmark", "hours", "lab", "paper", "stockpile", "surface")
 """The packages of the guests."""
 
 

@@ -1,0 +1,176 @@
+"""Hours a year by place: exact winds, exact shares, a bed by linear theory."""
+
+import io
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from orchestrator import cli
+from orchestrator.hours.places import Place, hours_above
+from orchestrator.physics.velocity import outer_roughness
+from orchestrator.study.wind import Winds
+
+STUDY = """\
+[fluid]
+kind = "air"
+[grain]
+density = 2650.0
+diameter = 3e-4
+[bed]
+kind = "pile"
+profile = "hump.csv"
+[method]
+kind = "local"
+[method.flow]
+model = "waves"
+"""
+WINDS = """\
+from_deg,speed_m_s,share
+270,6,0.2
+300,9,0.1
+240,12,0.04
+90,20,0.3
+0,0,0.36
+"""
+
+
+def test_winds_along_the_section_and_above_the_speed_count() -> None:
+    rows = (
+        (270.0, 8.0, 0.1),
+        (315.0, 8.0, 0.02),
+        (316.0, 8.0, 0.03),
+        (225.0, 7.9, 0.04),
+        (90.0, 30.0, 0.5),
+        (0.0, 0.0, 0.31),
+    )
+    winds = Winds(rows, 10.0, "")
+    assert hours_above(winds, 270.0, 8.0) == pytest.approx(8760 * 0.12)
+    assert hours_above(winds, 270.0, 7.0) == pytest.approx(8760 * 0.16)
+    assert hours_above(winds, 270.0, 0.0) == pytest.approx(8760 * 0.16)
+    assert hours_above(winds, 270.0, math.inf) == 0
+    # over north
+    assert hours_above(winds, 350.0, 8.0) == pytest.approx(8760 * 0.05)
+
+
+def test_a_part_of_a_place_is_a_part_of_its_length() -> None:
+    place = Place("foot", np.array([0.5, 0.2, np.inf]), np.array([1.0, 2.0, 1.0]))
+    assert [place.at(part) for part in (0.1, 0.5, 0.6, 0.75)] == [0.2, 0.2, 0.5, 0.5]
+    assert place.at(0.9) == math.inf
+
+
+@pytest.fixture(scope="module")
+def directory(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished study of a hump."""
+    folder = tmp_path_factory.mktemp("hours")
+    rows = ["x_m,z_m"]
+    for place in np.linspace(0, 30, 121):
+        rows.append(f"{place},{0.6 * math.exp(-(((place - 15) / 4) ** 2)):.5f}")
+    (folder / "hump.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    (folder / "study.toml").write_text(STUDY, encoding="utf-8")
+    (folder / "winds.csv").write_text(WINDS, encoding="utf-8")
+    out = folder / "out"
+    words = ["study", str(folder / "study.toml"), "--out", str(out), "--workers", "1"]
+    assert cli.main(words) == 0
+    return out
+
+
+def hours(directory: Path, *words: str) -> list[str]:
+    """The words of the command on a directory."""
+    winds = directory.parent / "winds.csv"
+    return ["hours", str(directory), "--wind", str(winds), "--from", "270", *words]
+
+
+def table(
+    directory: Path, capsys: pytest.CaptureFixture[str], *words: str
+) -> pd.DataFrame:
+    """The places of the hump with their winds and hours."""
+    assert cli.main(hours(directory, "--csv", *words)) == 0
+    return pd.read_csv(io.StringIO(capsys.readouterr().out)).set_index("place")
+
+
+def test_each_place_has_its_wind_and_its_hours_with_the_interval(
+    directory: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    capsys.readouterr()
+    places = table(directory, capsys)
+    assert [*places.index] == ["beach", "foot", "slope", "brink"]
+    # the flow grows up the hump: the brink moves first
+    winds = places["wind_half_m_s"]
+    assert winds["brink"] < winds["slope"] < winds["foot"]
+    for _, row in places.iterrows():
+        for end, other in (("", ""), ("_low", "_high"), ("_high", "_low")):
+            speed = row[f"wind_half{other}_m_s"]
+            share = 0.2 * (speed <= 6) + 0.1 * (speed <= 9) + 0.04 * (speed <= 12)
+            assert row[f"hours_half{end}"] == pytest.approx(8760 * share)
+        assert row["hours_half_low"] <= row["hours_half"] <= row["hours_half_high"]
+        assert row["wind_a_tenth_m_s"] <= row["wind_half_m_s"]
+
+
+def test_the_winds_are_those_of_the_tables(
+    directory: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    capsys.readouterr()
+    places = table(directory, capsys)
+    read = {
+        name: pd.read_csv(directory / "tables" / f"{name}.csv")
+        for name in ("pile_grain", "pile_threshold", "scenes")
+    }
+    threshold = read["pile_threshold"].iloc[0]
+    scene = read["scenes"].iloc[0]
+
+    def wind(ustar: float) -> float:
+        z0 = outer_roughness(scene["z0_m"], ustar, scene["nu_m2_s"])
+        return float(ustar / 0.41 * np.log1p(10 / z0))
+
+    grains = read["pile_grain"]
+    # the top quarter of the height of the hump, whose sand lies close to evenly
+    is_top = np.exp(-(((grains["x_m"] - 15) / 4) ** 2)) >= 0.75
+    for part, share in (("a_tenth", 0.1), ("half", 0.5)):
+        ustar = float(np.quantile(grains["ustar0_m_s"][is_top], share))
+        found = places[f"wind_{part}_m_s"]["brink"]
+        assert found == pytest.approx(wind(ustar), rel=0.003)
+    factor = threshold["ustar0_high_m_s"] / threshold["ustar0_m_s"]
+    half = places.loc["brink", ["wind_half_m_s", "wind_half_high_m_s"]]
+    assert half.iloc[1] / half.iloc[0] == pytest.approx(factor, rel=0.01)
+    # the beach is nearly level ground in the wind of the approach
+    level = wind(threshold["level_ustar_m_s"])
+    assert places["wind_half_m_s"]["beach"] == pytest.approx(level, rel=0.05)
+
+
+def test_rougher_ground_at_the_anemometer_needs_a_weaker_wind(
+    directory: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    capsys.readouterr()
+    bare = table(directory, capsys)
+    rough = table(directory, capsys, "--ground-roughness", "1e-3")
+    assert (rough["wind_half_m_s"] < bare["wind_half_m_s"]).all()
+    assert (rough["hours_half"] >= bare["hours_half"]).all()
+
+
+def test_people_read_places_and_what_is_not_counted(
+    directory: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(hours(directory)) == 0
+    text = capsys.readouterr().out
+    assert "2978 hours have wind from 270° ± 45°" in text
+    assert "2628 from elsewhere are not counted" in text
+    for place in ("beach", "foot", "slope", "brink"):
+        assert f" {place} " in text
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--from", "400"], "--from: 400 is no direction"),
+        (["--ground-roughness", "0"], "--ground-roughness: 0 is no length above 0"),
+        (["--wind", "no.csv"], "--wind no.csv: not a readable text file"),
+    ],
+)
+def test_what_is_no_wind_is_refused(
+    words: list[str], said: str, directory: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(hours(directory, *words)) == 2
+    assert said in capsys.readouterr().err
