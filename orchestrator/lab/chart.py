@@ -23,11 +23,12 @@ from orchestrator.lab.choices import (
     Choice,
     Kind,
     column,
+    column_of_reference,
     front,
 )
 from orchestrator.report import style
 from orchestrator.report.card import Card, Number, Worth
-from orchestrator.report.page import Element, Lines, Section, Table
+from orchestrator.report.page import Element, Lines, Paragraphs, Section, Table
 from orchestrator.report.style import Figure, Look
 from orchestrator.study.fidelities import Fields
 
@@ -40,14 +41,15 @@ LOOKS: Mapping[str, Look] = {
     "": {"marker": "D", "mec": style.INK, "mfc": "none", "mew": 1.3, "ms": 11},
 }
 """Marker and colour by how the grains are moved; the last is of the study itself."""
+KNOWN: Look = {"ls": "--", "color": "0.3", "lw": 1.2}
+"""Line of the share at which the reference itself is known within an error."""
+OF_REFERENCE = "reference itself known within it"
 OTHER = "the study itself"
 """What the legend calls the choices of a study, which differ from scene to scene."""
 BESIDE = tuple(one for one in WITHIN if one != AIM)
 """The other errors, a panel for each."""
 PANEL, LANE = 1.6, 0.2
 """Heights of the points of a panel and of the line of a name, inches."""
-LETTERS = 10.5
-"""Size of the letters, points: 12 pixels on a page of 400."""
 
 
 TEXTS = page_texts(__file__, "choices")
@@ -103,6 +105,7 @@ def sections(found: Sequence[Kind], table: pd.DataFrame, study: str) -> list[Sec
         content: list[Element] = [
             _card(rows),
             Figure(name, title, TEXTS["caption"], (), draw(rows, [AIM]), place="lead"),
+            Paragraphs(_reference(rows)),
             Lines("\n".join(advice(kind, rows, study))),
             Figure(
                 f"{name}-within",
@@ -115,6 +118,19 @@ def sections(found: Sequence[Kind], table: pd.DataFrame, study: str) -> list[Sec
         ]
         made.append(Section(kind.name if len(found) > 1 else "", content))
     return made
+
+
+def _reference(rows: pd.DataFrame) -> str:
+    """Say at which share of the thresholds the reference itself is known."""
+    first = rows.iloc[0]
+    within, most = (first[column_of_reference(each)] for each in (AIM, WITHIN[-1]))
+    text = (
+        f"The reference itself is known within {_percent(AIM)} at {_percent(within)} "
+        f"of these thresholds, and within {_percent(WITHIN[-1])} at {_percent(most)}."
+    )
+    if within < 1:
+        text += " At the others a choice that agrees with it is known no better."
+    return text
 
 
 def _share_text(row: pd.Series) -> str:
@@ -244,12 +260,15 @@ def draw(rows: pd.DataFrame, within: Sequence[float]) -> Canvas:
     ).ravel()
     for ax, error, labels in zip(panels, within, named, strict=True):
         _panel(ax, rows, error, labels)
-    panels[-1].set_xlabel("cost, core-s", fontsize=LETTERS)
+    panels[-1].set_xlabel("cost, core-s", fontsize=style.LETTERS)
     samples = []
     for name, look in LOOKS.items():
         if (rows["grains"] == name).any():
             samples.append(Line2D([], [], label=name or OTHER, ls="", **look))
-    canvas.legend(handles=samples, loc="outside upper left", ncols=2, fontsize=LETTERS)
+    samples.append(Line2D([], [], label=OF_REFERENCE, **KNOWN))
+    canvas.legend(
+        handles=samples, loc="outside upper left", ncols=2, fontsize=style.LETTERS
+    )
     return canvas
 
 
@@ -279,12 +298,14 @@ def _panel(
         ax.plot(*points, ls="", gid="points", label=name, **look)
     edge = rows.assign(share=share)[front(rows, within)].sort_values("core_s")
     ax.step(edge["core_s"], edge["share"], where="post", color="0.45", lw=0.9, zorder=1)
+    known = 100 * rows[column_of_reference(within)].iloc[0]
+    ax.axhline(known, gid="reference", zorder=1, **KNOWN)
     ax.set_xscale("log")
     ax.margins(x=0.08)
     style.plain_ticks(ax.xaxis)
-    ax.tick_params(which="both", labelsize=LETTERS)
-    ax.set_ylabel(f"% within {_percent(within)}", fontsize=LETTERS)
-    low = 20 * math.floor(share.min() / 20) - 5
+    ax.tick_params(which="both", labelsize=style.LETTERS)
+    ax.set_ylabel(f"% within {_percent(within)}", fontsize=style.LETTERS)
+    low = 20 * math.floor(min(share.min(), known) / 20) - 5
     ax.set_ylim(low, 105 + (105 - low) * LANE * len(labels) / PANEL)
     ax.set_yticks(range(low + 5, 101, 20))
     _name(ax, labels, (105 - low) * LANE / PANEL)
@@ -310,7 +331,7 @@ def _name(ax: Axes, labels: Mapping[Place, str], lane: float) -> None:
             f" {name}" if cost_s < middle else f"{name} ",
             ha="left" if cost_s < middle else "right",
             va="center",
-            fontsize=LETTERS,
+            fontsize=style.LETTERS,
             path_effects=halo,
         )
 

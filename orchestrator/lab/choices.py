@@ -320,7 +320,8 @@ def shares(found: Sequence[Kind], runs: Runs) -> pd.DataFrame:
     DataFrame
         A row for each kind and choice whose runs are all done: its cost, core-s, the
         number of thresholds that are compared, the share of them within each of
-        `WITHIN`, and the largest error. `on_front` marks those that none beats in cost
+        `WITHIN`, the largest error, and the share at which the reference itself is
+        known within each of `WITHIN`. `on_front` marks those that none beats in cost
         and in the share within `AIM`.
     """
     tables = []
@@ -328,6 +329,7 @@ def shares(found: Sequence[Kind], runs: Runs) -> pd.DataFrame:
         if not runs.are_done(*kind.reference.decisions):
             continue
         best = _thresholds(kind.reference, runs)
+        of_reference = _of_reference(kind, best)
         of_kind: list[Row] = []
         costs: dict[tuple[str, ...], float] = {}
         for choice in (kind.reference, *kind.choices):
@@ -336,7 +338,8 @@ def shares(found: Sequence[Kind], runs: Runs) -> pd.DataFrame:
             errors = _errors(_thresholds(choice, runs), best)
             if choice.scenes not in costs:  # the time of a part of a second is noise
                 costs[choice.scenes] = _cost(choice, runs)
-            of_kind.append(_row(kind, choice, errors, costs[choice.scenes]))
+            row = _row(kind, choice, errors, costs[choice.scenes])
+            of_kind.append({**row, **of_reference})
         table = pd.DataFrame(of_kind)
         tables.append(table.assign(on_front=front(table, AIM)))
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
@@ -380,6 +383,36 @@ def column(within: float) -> str:
         The name.
     """
     return f"within_{100 * within:g}"
+
+
+def column_of_reference(within: float) -> str:
+    """Name the column of the share at which the reference is known within an error.
+
+    Parameters
+    ----------
+    within
+        The relative error.
+
+    Returns
+    -------
+    str
+        The name.
+    """
+    return f"reference_{column(within)}"
+
+
+def _of_reference(kind: Kind, best: FloatArray) -> Row:
+    """The shares of thresholds at which the reference itself is known within errors."""
+    known = []
+    for answer in kind.reference.answers:
+        for fraction in answer.asked.threshold.fractions:
+            error = answer.error_at(fraction)
+            known.append(math.inf if error is None else error)
+    reached = np.array(known)[~np.isnan(best)]
+    return {
+        column_of_reference(within): float((reached <= within).mean())
+        for within in WITHIN
+    }
 
 
 def _row(kind: Kind, choice: Choice, errors: FloatArray, cost_s: float) -> Row:

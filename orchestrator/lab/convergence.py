@@ -52,6 +52,8 @@ from orchestrator.study.study import Study, changed
 from orchestrator.types import Row
 
 FILE = "tables/convergence.csv"
+PANEL, LEGEND = 2.2, 1.9
+"""Heights of a panel and of the legends of the chart, inches."""
 CHANGES = "Changes from the mesh and the load steps of the scene"
 TITLE = "What finer meshes and load steps change"
 REFINED = ((1.0, 2.0, 4.0), (0.5, 1.0, 2.0), (0.25, 0.5, 1.0))
@@ -659,17 +661,12 @@ def chart_of(found: pd.DataFrame, judged: pd.DataFrame) -> Canvas:
     names = list(dict.fromkeys(found["series"]))
     places = [at for at in dict.fromkeys(found["at"]) if at]
     colours = dict(zip(places, style.DIAMETERS, strict=False))
-    columns = min(len(names), 2)
-    lines = math.ceil(len(names) / columns)
-    canvas = style.canvas(2.4 * lines + 0.9)
-    grid = canvas.subplots(lines, columns, squeeze=False, sharey=True)
-    for ax, name in zip(grid.ravel(), names, strict=False):
+    canvas = style.canvas(PANEL * len(names) + LEGEND, style.NARROW)
+    panels = canvas.subplots(len(names), 1, squeeze=False, sharey=True).ravel()
+    for ax, name in zip(panels, names, strict=True):
         _panel(ax, found[found["series"] == name], colours)
-        ax.set_title(name, loc="left")
-    for ax in grid.ravel()[len(names) :]:
-        ax.set_axis_off()
-    for ax in grid[:, 0]:
-        ax.set_ylabel("change, %")
+        ax.set_title(name, loc="left", fontsize=style.LETTERS)
+        ax.set_ylabel("change, %", fontsize=style.LETTERS)
     drawn = set(found["quantity"])
     looks = [
         Line2D([], [], color=OTHER, ls=look, label=LABELS[name])
@@ -679,7 +676,10 @@ def chart_of(found: pd.DataFrame, judged: pd.DataFrame) -> Canvas:
     mark: Look = {"ls": "", "marker": "o", "ms": 4, "color": OTHER}
     if not set(verdicts["verdict"]) <= set(GOOD):
         looks.append(Line2D([], [], mfc="white", label="open: no order", **mark))
-    style.legends_below(canvas, [style.entry(*each) for each in colours.items()], looks)
+    entries = [style.entry(*each) for each in colours.items()]
+    size = style.LETTERS
+    canvas.legend(handles=entries, loc="outside upper left", ncols=2, fontsize=size)
+    canvas.legend(handles=looks, loc="outside lower left", fontsize=size)
     return canvas
 
 
@@ -699,4 +699,5 @@ def _panel(ax: Axes, rows: pd.DataFrame, colours: Mapping[str, str]) -> None:
     told = rows.drop_duplicates("finer").sort_values("finer")
     ax.set_xscale("log", base=2)
     ax.set_xticks(told["finer"], told["told"])
+    ax.tick_params(labelsize=style.LETTERS)
     ax.minorticks_off()

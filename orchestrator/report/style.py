@@ -51,6 +51,8 @@ WIDTH = 7.0
 """Width of a figure across two columns of a paper, inches."""
 NARROW = 4.4
 """Width of a drawing that a narrow page shows whole, with letters to read, inches."""
+LETTERS = 10.5
+"""Size of these letters, points: 12 pixels on a page of 400."""
 SIDES = (0.66, 0.12)
 """Margins of panels, left and right, inches."""
 UNDER = 0.42

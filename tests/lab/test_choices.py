@@ -187,6 +187,27 @@ def test_shares_count_thresholds_and_costs_each_case_once(shares: pd.DataFrame) 
     assert rows.loc["20 cells, pivot", choices.column(0.2)] == pytest.approx(1 / 3)
 
 
+def test_it_is_told_where_the_reference_itself_is_not_known_within_an_error(
+    shares: pd.DataFrame,
+) -> None:
+    (kind,) = choices.kinds(_study(TEXT))
+    errors = []
+    for answer in kind.reference.answers:
+        fractions = answer.asked.threshold.fractions
+        # no run reached the third
+        errors += [answer.error_at(fractions[at]) for at in (0, 1, 3)]
+    for within in WITHIN:
+        known = np.mean([error is not None and error <= within for error in errors])
+        column = choices.column_of_reference(within)
+        assert shares[column].tolist() == [known] * len(shares)
+        with style.settings():
+            (ax,) = chart.draw(shares, [within]).axes
+        (line,) = [each for each in ax.lines if each.get_gid() == "reference"]
+        assert np.asarray(line.get_ydata(), float) == pytest.approx(100 * known)
+    assert shares[choices.column_of_reference(0.2)].iloc[0] > 0
+    assert shares[choices.column_of_reference(0.01)].iloc[0] < 1
+
+
 def test_a_choice_is_charted_where_all_of_its_runs_are_done(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -16,6 +16,7 @@ from orchestrator.experiment import piles
 from orchestrator.fidelity import limits
 from orchestrator.lab import convergence
 from orchestrator.lab.convergence import FIRST, POWERS, SERIES, TITLE, Convergence
+from orchestrator.report import style
 from orchestrator.study import study
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study, value_of
@@ -205,6 +206,19 @@ def test_a_number_that_a_mesh_lacks_has_no_verdict() -> None:
     assert judged.loc["tau_c", "verdict"] == "not known"
     is_fine = (found["quantity"] == "ustar0") & (found["finer"] == 4.0)
     assert list(convergence.judge_all(found[~is_fine])["quantity"]) == ["tau_c"]
+
+
+def test_the_letters_of_the_figure_are_large_on_a_narrow_page() -> None:
+    found = _points(**{"ustar0": (1.16, 1.08, 1.04), "highest stress": (2.0, 2.1, 2.2)})
+    with style.settings():
+        canvas = convergence.chart_of(found, convergence.judge_all(found))
+    assert canvas.get_figwidth() == style.NARROW
+    texts = [text for legend in canvas.legends for text in legend.get_texts()]
+    for ax in canvas.axes:
+        texts += [ax.xaxis.label, ax.yaxis.label, ax.title]
+        texts += [*ax.get_xticklabels(), *ax.get_yticklabels()]
+    written = [text for text in texts if text.get_text()]
+    assert min(float(text.get_fontsize()) for text in written) >= style.LETTERS
 
 
 def test_the_figure_has_a_line_for_each_number() -> None:
