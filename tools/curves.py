@@ -160,5 +160,9 @@ def drawn(rows: pd.DataFrame) -> Canvas:
 if __name__ == "__main__":
     found = curves()
     print(largest_steps(found).to_string(index=False, float_format="%.4g"))
-    picture = Path(sys.argv[1]) if sys.argv[1:] else FIGURE
-    drawn(found).savefig(picture, metadata={"Date": None} if not sys.argv[1:] else None)
+    with style.settings():
+        canvas = drawn(found)
+        if sys.argv[1:]:
+            canvas.savefig(sys.argv[1])
+        else:
+            FIGURE.write_bytes(style.svg(canvas))

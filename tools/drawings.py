@@ -3,7 +3,8 @@
 python tools/drawings.py [DIRECTORY]
 
 Flow, stress and load steps are those of the preset `first-look`, which is run in the directory, by
-default results/first-look; the other drawings are geometry. They are written to docs/figures.
+default results/first-look; the ways of spheres are over a bed that is poured there, the other drawings
+are geometry. They are written to docs/figures.
 """
 
 import sys
@@ -16,11 +17,12 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.patches import Arc, Circle
 
 import orchestrator
-from orchestrator.physics import saltation
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.gusts import PEAK
 from orchestrator.report import style
-from orchestrator.types import FloatArray
+
+sys.path.insert(0, str(Path(__file__).parent))
+import rolling  # a tool beside this one
 
 FIGURES = Path(__file__).parents[1] / "docs" / "figures"
 ANSWER = "#c24e00"
@@ -30,8 +32,9 @@ GREY = "0.35"
 HEIGHT = 0.02  # of the pile of first-look, m
 AIR = {"fluid_density": 1.225, "viscosity": 1.48e-5}
 WATER = {"fluid_density": 999.1, "viscosity": 1.14e-6}
-THETA = 0.02
-MOST_D = 150.0
+FLUIDS = {"water": WATER, "air": AIR}
+THETA = 0.03
+SPHERES = 200
 FOOT = HEIGHT / np.tan(np.radians(15))  # its half width, m
 
 
@@ -196,48 +199,21 @@ def pocket() -> Canvas:
     return canvas
 
 
-def way(galileo: float, ratio: float, theta: float, gust: float) -> FloatArray:
-    """The way of a grain that leaves its pocket in a gust, in diameters; it ends where it is trapped.
-
-    The steps are those of `saltation.fate` in vacuum, 200 to a hop.
-    """
-    bed = saltation.BEADS
-    grains = Grain.of_numbers(galileo, ratio)
-    flow = saltation._Flow(grains, np.array([theta]), saltation.Gust(gust, 10.0), bed)
-    speed = np.sqrt(2 * saltation.EXCESS * flow.trapped)
-    angle = np.radians(saltation.LAUNCH_DEG)
-    start = saltation._Motion(np.zeros(1), speed * np.cos(angle), speed * np.sin(angle))
-    hopping = saltation._Hopping(flow, start, 200)
-    x = 0.0
-    path = [(x, 0.0)]
-    while x < MOST_D:
-        along = hopping.motion.along
-        time = -hopping.clock
-        lands, impact = hopping.fly()
-        time += hopping.clock
-        x += float(time[0] * (along[0] + hopping.motion.along[0]) / 2)
-        path.append((x, max(float(hopping.motion.height[0]), 0.0)))
-        if lands[0]:
-            is_trapped, _ = hopping.bounce(lands, impact, bed)
-            if is_trapped[0]:
-                break
-    return np.array(path)
-
-
-def hops() -> Canvas:
-    """A grain that leaves its pocket in a gust: trapped again in water, going on in air."""
+def hops(beds: Path) -> Canvas:
+    """How far spheres come in a gust and in the mean flow after it: in water, and in air."""
     canvas, panels = drawing(2.1, 2)
-    air = Grain(diameter=[2.5e-4], density=2650.0, **AIR)
-    water = Grain(diameter=[2.5e-4], density=2650.0, **WATER)
-    for axes, name, each in zip(panels, ("water", "air"), (water, air), strict=True):
-        path = way(float(each.galileo[0]), float(each.density_ratio[0]), THETA, PEAK)
-        axes.plot(*path.T, color=ANSWER)
-        axes.plot(*path[-1], "o", color=ANSWER, ms=4)
-        axes.fill_between(
-            [-1, max(path[-1, 0], 2) + 1], 0, -0.2 * path[:, 1].max(), color=SAND, lw=0
-        )
+    over = rolling.beds(beds, (1,))
+    for axes, (name, fluid) in zip(panels, FLUIDS.items(), strict=True):
+        grain = Grain(diameter=[2.5e-4], density=2650.0, **fluid)
+        sphere = rolling.Sphere(float(grain.galileo[0]), float(grain.density_ratio[0]))
+        in_gust, after = rolling.ways(sphere, over, (PEAK * THETA, THETA), SPHERES)
+        way = np.sort(in_gust + after)
+        share = 1 - np.arange(SPHERES) / SPHERES
+        axes.step([0, *way], [1, *share], where="pre", color=ANSWER)
+        axes.axvline(sphere.first, color=GREY, lw=0.8, ls=":")
         axes.set_title(f"quartz of 0.25 mm in {name}, θ = {THETA:g}", loc="left")
-        axes.set(xlabel="way along the bed, d", ylabel="height, d")
+        axes.set(xlabel="way along the bed, d", ylabel="share that came so far")
+        axes.set(xlim=(0, 2 * sphere.first), ylim=(0, 1.05))
     return canvas
 
 
@@ -281,7 +257,7 @@ def main(directory: Path) -> None:
         "how-stress": stress(wall),
         "how-forces": forces(),
         "how-pocket": pocket(),
-        "how-hops": hops(),
+        "how-hops": hops(directory / "beds"),
         "how-steps": steps(run.tables["pile_curve"], run.tables["pile_threshold"]),
     }
     for name, canvas in made.items():
