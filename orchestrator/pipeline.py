@@ -359,12 +359,12 @@ def _draw(
     causes = {name: str(error) for name, error in failures.items()}
     cards = guests.cards(study, made)
     with space.renewed():
-        tables.write_tables(made, space, "tables")
+        written = tables.write_tables(made, space, "tables")
         tables.write_tables({"timings": times}, space, "timings")
         answer = report.said(results, cards)
         try:
             rooms = guests.figures()
-            undrawn = report.write(results, causes, space, cards, every, rooms)
+            undrawn = report.write(results, causes, space, cards, every, rooms, written)
         except BaseException:
             # no memory for a picture, or an interrupt: the answer is found
             print(answer, file=sys.stderr)

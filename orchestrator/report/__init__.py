@@ -2,12 +2,12 @@
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from orchestrator.runs import second, terminal
 
 if TYPE_CHECKING:
+    from orchestrator.report.kept import Kept
     from orchestrator.report.page import Guest
     from orchestrator.report.results import Results
     from orchestrator.report.style import Figure
@@ -26,6 +26,7 @@ def write(
     guests: Sequence["Guest"] = (),
     every: bool = False,
     packages: Sequence[str] = (),
+    written: Mapping[str, str] | None = None,
 ) -> list[str]:
     """Draw the figures of a study and write its page into its directory.
 
@@ -43,6 +44,8 @@ def write(
         Whether the figures that the page folds away are drawn too.
     packages
         Packages of others with further figures, as of `figures.kinds`.
+    written
+        Digests of the tables where they are written already, as of `write_tables`.
 
     Returns
     -------
@@ -51,9 +54,11 @@ def write(
         page has the line in its place.
     """
     from orchestrator.report import page, sections
+    from orchestrator.report.kept import Kept
 
     is_paper = any(guest.is_paper for guest in guests)
-    figures, faults = _drawn(results, folder, every, is_paper, packages)
+    kept = Kept(folder, results, written or {}, every=every, is_paper=is_paper)
+    figures, faults = _drawn(results, kept, every, is_paper, packages)
     folder.put(LIST, _listed(figures))
     for guest in guests:
         for name, text in guest.files.items():
@@ -74,45 +79,37 @@ def write(
 
 def _drawn(
     results: "Results",
-    folder: "Folder",
+    kept: "Kept",
     every: bool,
     is_paper: bool,
     packages: Sequence[str],
 ) -> "tuple[list[Figure], list[str]]":
     """The figures of a study, and a line for each that failed."""
     from orchestrator.report import figures, style
+    from orchestrator.report.kept import Drawn
 
     kinds = figures.kinds(packages)
+    found: list[Drawn | None] = [kept.get(kind.name) for kind in kinds]
+    missing = [number for number, drawn in enumerate(found) if drawn is None]
 
-    def of_kind(number: int) -> "tuple[list[Figure], str]":
-        """The figures of one kind, and why others of it could not be drawn."""
-        made: list[Figure] = []
-        kind = kinds[number]
-        try:
-            for figure in kind.draw(results):
-                if is_paper and figure.follows:
-                    figure = replace(figure, place="")
-                is_drawn = every or figure.place != "folded"
-                made.append(
-                    style.drawn(figure) if is_drawn else replace(figure, drawing=None)
-                )
-        except Exception as error:
-            return made, f"{kind.name}: {type(error).__name__}: {error}"
+    def of_kind(place: int) -> Drawn:
+        """The figures of a kind that is missing."""
+        drawn = figures.drawn(results, kinds[missing[place]], every, is_paper)
         terminal.check_signals()
-        return made, ""
+        return drawn
 
-    found: list[Figure] = []
-    faults: list[str] = []
     with style.settings():
-        for made, fault in second.shared(of_kind, len(kinds)):
-            found += made
-            if fault:
-                faults.append(fault)
-                print(f"a figure could not be drawn: {fault}", file=sys.stderr)
-    for figure in found:
-        if figure.image:
-            folder.put(f"{style.FIGURES}/{figure.name}.svg", figure.image)
-    return found, faults
+        made = second.shared(of_kind, len(missing))
+    for number, drawn in zip(missing, made, strict=True):
+        found[number] = drawn
+        if drawn.fault:
+            print(f"a figure could not be drawn: {drawn.fault}", file=sys.stderr)
+    every_one = [each for each in found if each is not None]
+    for kind, each in zip(kinds, every_one, strict=True):
+        kept.put(kind.name, each)
+    kept.close()
+    faults = [each.fault for each in every_one if each.fault]
+    return [figure for each in every_one for figure in each.figures], faults
 
 
 def _listed(figures: "Sequence[Figure]") -> str:

@@ -1,25 +1,63 @@
 """The source of a report: the study, its cases and its tables."""
 
-from collections.abc import Hashable, Iterator
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
 
 from orchestrator.grains.pile import Pile
 from orchestrator.plan import Plan
-from orchestrator.runs.case import is_whole
+from orchestrator.runs.case import Case, is_whole
 from orchestrator.study import fields
 from orchestrator.study.method import HELD_FROM
 from orchestrator.study.study import Study
-from orchestrator.tables import Tables, with_methods, with_scenes
+from orchestrator.tables import with_methods, with_scenes
 from orchestrator.tables.facts import needs_run
 from orchestrator.tables.quoted import reported
 from orchestrator.tables.rows import measured_hill
 
 FRACTION = 0.3  # n/N at which one threshold stands for all of its pile
+Made = TypeVar("Made")
+
+
+@dataclass
+class Reads:
+    """What a part of a page was made from, by name.
+
+    Attributes
+    ----------
+    tables
+        The tables that were asked for, also in vain.
+    cases
+        The cases whose files were asked for, also in vain.
+    """
+
+    tables: set[str] = field(default_factory=set)
+    cases: set[str] = field(default_factory=set)
+
+
+class _Noted(Mapping[str, pd.DataFrame]):
+    """Tables that note which of them are read."""
+
+    def __init__(
+        self, tables: Mapping[str, pd.DataFrame], note: Callable[[str], None]
+    ) -> None:
+        self._tables = dict(tables)
+        self._note = note
+
+    def __getitem__(self, name: str) -> pd.DataFrame:
+        self._note(name)
+        return self._tables[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._tables)
+
+    def __len__(self) -> int:
+        return len(self._tables)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,20 +71,89 @@ class Results:
     plan
         How each scene is answered, and by which cases.
     tables
-        The tables by name.
+        The tables by name; which of them are read is noted.
     cases
         The directory of the cases.
     """
 
     study: Study
     plan: Plan
-    tables: Tables
+    tables: Mapping[str, pd.DataFrame]
     cases: Path
+    _reads: list[Reads] = field(default_factory=lambda: [Reads()], init=False)
+    _made: dict[Hashable, tuple[Any, Reads]] = field(default_factory=dict, init=False)
 
-    @cached_property
+    def __post_init__(self) -> None:
+        noted = _Noted(self.tables, lambda name: self._reads[-1].tables.add(name))
+        object.__setattr__(self, "tables", noted)
+
+    @contextmanager
+    def noted(self) -> Iterator[Reads]:
+        """Note what is read in a block.
+
+        Yields
+        ------
+        Reads
+            What was read, with what that was made from which had been made before.
+        """
+        self._reads.append(Reads())
+        try:
+            yield self._reads[-1]
+        finally:
+            inner = self._reads.pop()
+            self._add(inner)
+
+    def _add(self, reads: Reads) -> None:
+        self._reads[-1].tables |= reads.tables
+        self._reads[-1].cases |= reads.cases
+
+    def once(self, name: Hashable, make: Callable[[], Made]) -> Made:
+        """Make something once; whoever asks for it has read what it is made from.
+
+        Parameters
+        ----------
+        name
+            Its name.
+        make
+            Makes it.
+
+        Returns
+        -------
+        object
+            It, as it was made the first time.
+        """
+        if name not in self._made:
+            with self.noted() as reads:
+                self._made[name] = make(), reads
+        made, reads = self._made[name]
+        self._add(reads)
+        value: Made = made
+        return value
+
+    def is_whole(self, case: Case) -> bool:
+        """Say whether a case has all of its files, of which some may be read now.
+
+        Parameters
+        ----------
+        case
+            The case.
+
+        Returns
+        -------
+        bool
+            Whether it is done, and nothing was pruned.
+        """
+        self._reads[-1].cases.add(case.name)
+        return is_whole(case, self.cases)
+
+    @property
     def scenes(self) -> pd.DataFrame:
         """Every scene once, whichever groups asked for it, with its method."""
-        return with_methods(self.tables["scenes"], self.tables["methods"])
+
+        def make() -> pd.DataFrame:
+            return with_methods(self.tables["scenes"], self.tables["methods"])
+
+        return self.once("scenes", make)
 
     def beds(self, kind: str) -> pd.DataFrame:
         """Pick the scenes with one kind of bed.
@@ -63,9 +170,12 @@ class Results:
         """
         return self.scenes[self.scenes["bed"] == kind]
 
-    @cached_property
+    @property
     def flow_fields(self) -> list[str]:
         """The fields of the solved flow in which the piles differ."""
+        return self.once("flow_fields", self._flow_fields)
+
+    def _flow_fields(self) -> list[str]:
         count = self.beds("pile").nunique(dropna=False)
         solved = [
             name
@@ -73,8 +183,6 @@ class Results:
             if each.info.scope == "solved flows"
         ]
         return [name for name in solved if count[name] > 1]
-
-    _joins: dict[str, pd.DataFrame] = field(default_factory=dict, init=False)
 
     def joined(self, name: str) -> pd.DataFrame:
         """Join a table with the columns of its rows' scenes.
@@ -90,12 +198,12 @@ class Results:
             Its own columns and those of the scenes that it lacks; empty without the
             table.
         """
-        if name not in self._joins:
+
+        def make() -> pd.DataFrame:
             table = self.tables.get(name, pd.DataFrame())
-            if not table.empty:
-                table = with_scenes(table, self.scenes)
-            self._joins[name] = table
-        return self._joins[name]
+            return table if table.empty else with_scenes(table, self.scenes)
+
+        return self.once(("joined", name), make)
 
     def values(self, column: str) -> list[float]:
         """List the values that the study's scenes have in a column.
@@ -112,9 +220,12 @@ class Results:
         """
         return sorted({float(value) for value in self.scenes[column].dropna()})
 
-    @cached_property
+    @property
     def at_fraction(self) -> pd.DataFrame:
         """The thresholds of piles at the fraction of the sentences, nearest to 30 %."""
+        return self.once("at_fraction", self._at_fraction)
+
+    def _at_fraction(self) -> pd.DataFrame:
         rows = self.joined("pile_threshold")
         if rows.empty:
             return rows
@@ -123,13 +234,16 @@ class Results:
         )
         return rows[rows["fraction"] == nearest]
 
-    @cached_property
+    @property
     def exemplars(self) -> pd.DataFrame:
         """The thresholds at that fraction, seeds as one, rising by slope.
 
         Of each slope the usable first, then large grains, DEM, beds that wear, the
         least z0. Beds that do not reach the fraction are not among them.
         """
+        return self.once("exemplars", self._exemplars)
+
+    def _exemplars(self) -> pd.DataFrame:
         if self.at_fraction.empty:
             return self.at_fraction
         here = seeds_as_one(self.at_fraction)
@@ -159,11 +273,15 @@ class Results:
         return [pile for pile in piles if self._is_whole(pile)]
 
     def _is_whole(self, pile: Pile) -> bool:
-        return all(is_whole(run, self.cases) for run in pile.runs)
+        are_whole = [self.is_whole(run) for run in pile.runs]  # each is noted
+        return all(are_whole)
 
-    @cached_property
+    @property
     def flows(self) -> dict[str, Pile]:
         """A pile for each flow case whose stress is in the tables, by its name."""
+        return self.once("flows", self._flows)
+
+    def _flows(self) -> dict[str, Pile]:
         stress = self.tables.get("wall_stress", pd.DataFrame())
         done = set() if stress.empty else set(stress["flow_case"])
         found = {}

@@ -14,7 +14,6 @@ from orchestrator.report import labels, style
 from orchestrator.report.results import Results
 from orchestrator.report.style import Look
 from orchestrator.report.subjects import place_of_file
-from orchestrator.runs.case import is_whole
 from orchestrator.runs.files import state_of
 from orchestrator.study import fields
 from orchestrator.types import FloatArray
@@ -119,7 +118,7 @@ def piles_with_files(results: Results) -> list[Pile]:
     """
     found = []
     for kind in piles_by_kind(results):
-        kept = [pile for pile in kind if is_whole(pile.flow, results.cases)]
+        kept = [pile for pile in kind if results.is_whole(pile.flow)]
         found += kept[:1]
     return found
 

@@ -7,7 +7,7 @@ has grains of.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache
+from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -523,7 +523,6 @@ def _ustar(
     return curves.AIR[name](_sizes_in_air(of_air, first, last))
 
 
-@lru_cache(maxsize=1)
 def ranked(results: Results) -> list[Line]:
     """List the lines of a study's single grains on a flat bed, the nearest first.
 
@@ -538,12 +537,16 @@ def ranked(results: Results) -> list[Line]:
         The line that is within the measured range over most decades comes first; equal
         ones are in the order of their factor from the medians.
     """
-    grains = results.beds("grain")
-    every = measured_lines(grains[grains["alpha_deg"] == 0])
-    listed = [line for line in every if line.last]
-    return sorted(
-        listed, key=lambda line: (-round(line.decades, 2), line.median_factor)
-    )
+
+    def make() -> list[Line]:
+        grains = results.beds("grain")
+        every = measured_lines(grains[grains["alpha_deg"] == 0])
+        listed = [line for line in every if line.last]
+        return sorted(
+            listed, key=lambda line: (-round(line.decades, 2), line.median_factor)
+        )
+
+    return results.once("ranked", make)
 
 
 def best(listed: Sequence[Line]) -> list[Line]:

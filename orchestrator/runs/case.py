@@ -590,6 +590,25 @@ def is_whole(case: Case, cases: Path) -> bool:
     return all((directory / name).is_file() for name in names)
 
 
+def digest_of_results(case: Case, cases: Path) -> str:
+    """Compute one digest of the results of a case.
+
+    Parameters
+    ----------
+    case
+        The case.
+    cases
+        The directory of all cases.
+
+    Returns
+    -------
+    str
+        SHA-256 of the list of their digests; empty where the case has not ended.
+    """
+    listed = cases / case.name / CHECKSUMS
+    return files.digest_file(listed) if listed.is_file() else ""
+
+
 def prune_case(case: Case, cases: Path) -> None:
     """Drop the bulky files that the run of a finished case left, no others.
 

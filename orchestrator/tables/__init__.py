@@ -24,7 +24,7 @@ from orchestrator.grains.pile import Pile
 from orchestrator.physics import beside, verdict
 from orchestrator.physics.reported import OF_CHANNELS, REPORTED
 from orchestrator.plan import Plan
-from orchestrator.runs.files import Folder
+from orchestrator.runs.files import Folder, digest_text
 from orchestrator.study import fields
 from orchestrator.study.study import Study
 from orchestrator.tables import check, quoted, rows, usable
@@ -34,7 +34,7 @@ from orchestrator.tables.quoted import of_classes
 from orchestrator.tables.usable import with_scatter, with_usable
 from orchestrator.types import Row
 
-Tables = dict[str, pd.DataFrame]
+Tables = Mapping[str, pd.DataFrame]
 """Tables by their names."""
 
 
@@ -401,7 +401,7 @@ def _as_it_was(text: Any) -> Any:
 
 def write_tables(
     tables: Mapping[str, pd.DataFrame], folder: Folder, place: str
-) -> None:
+) -> dict[str, str]:
     """Write tables, and the meanings of their columns.
 
     Parameters
@@ -412,16 +412,24 @@ def write_tables(
         The directory of the study.
     place
         Its sub-directory for the tables.
+
+    Returns
+    -------
+    dict of str to str
+        The digest of each table as it is written, by name.
     """
     used: set[str] = set()
+    digests_of = {}
     for name, table in tables.items():
         text = csv(table)
         folder.put(f"{place}/{name}.csv", text)
+        digests_of[name] = digest_text(text)
         used.update(map(str, table))
     known = meanings()
     listed = [(column, known[column]) for column in sorted(used)]
     table = pd.DataFrame(listed, columns=["column", "meaning"])
     folder.put(f"{place}/columns.csv", csv(table))
+    return digests_of
 
 
 def read_tables(folder: Folder, place: str) -> Tables:

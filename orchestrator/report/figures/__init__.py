@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 from importlib import import_module
 from pkgutil import iter_modules
 
+from orchestrator.report import style
+from orchestrator.report.kept import Drawn
 from orchestrator.report.results import Results
 from orchestrator.report.style import Figure
 from orchestrator.runs.case import Case
@@ -121,3 +123,38 @@ def files(results: Results, packages: Sequence[str] = ()) -> list[Case]:
         The cases.
     """
     return [case for kind in kinds(packages) for case in kind.files(results)]
+
+
+def drawn(results: Results, kind: FigureKind, every: bool, is_paper: bool) -> Drawn:
+    """Draw the figures of one file.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+    kind
+        The file.
+    every
+        Whether the figures that the page folds away are drawn too.
+    is_paper
+        Whether figures that follow one of the paper are not folded away.
+
+    Returns
+    -------
+    Drawn
+        The figures that could be drawn, with what they were drawn from.
+    """
+    made: list[Figure] = []
+    fault = ""
+    with results.noted() as reads:
+        try:
+            for figure in kind.draw(results):
+                if is_paper and figure.follows:
+                    figure = replace(figure, place="")
+                is_drawn = every or figure.place != "folded"
+                made.append(
+                    style.drawn(figure) if is_drawn else replace(figure, drawing=None)
+                )
+        except Exception as error:
+            fault = f"{kind.name}: {type(error).__name__}: {error}"
+    return Drawn(made, reads, fault)
