@@ -40,7 +40,7 @@ entrainment_angle_deg = 50.0
 roughness = 0.005
 
 [axes]
-"flow.from_deg" = [0.0, 90.0, 180.0, 270.0]
+"flow.from_deg" = [0.0, 45.0, 90.0, 135.0, 180.0, 225.0, 270.0, 315.0]
 
 [erosion]
 wind = "year.csv"

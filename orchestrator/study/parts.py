@@ -189,8 +189,8 @@ class GrainPart(Sphere):
     pivots and peeling alone"""
     sizes: Sizes | None = _poured(None)
     """mixture of a poured bed, by mass, in one plane by area: a sieve table, rows of
-    diameter (m, rising) and fraction or a CSV file with columns diameter_m and
-    fraction, or sieve_mm and passing_percent, whose d50 is the diameter; or log-normal,
+    diameter (m, rising) and fraction or a file of these or of what passes or stays on
+    sieves (docs/your-files.md), whose d50 is the diameter; or log-normal,
     { sigma_g = 1.3, smallest = 0.6, largest = 1.7 }, cut off in d, by default at two
     geometric standard deviations"""
 

@@ -8,14 +8,19 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from orchestrator.physics.constants import GAS_BELOW
+from orchestrator.physics.beside import ENTRAINED as ENTRAINMENT
+from orchestrator.physics.beside import SUSTAINED as SUSTAINED_MOTION
+from orchestrator.physics.beside import beside
+from orchestrator.physics.constants import GAS_BELOW, GRAIN_COLUMNS
 from orchestrator.physics.grain import Grain
+from orchestrator.physics.onset import of_grains
 from orchestrator.physics.threshold import check_known
 from orchestrator.surface import onset
 from orchestrator.surface.heights import Plane, Surface
 from orchestrator.surface.maps import MapGrid
 from orchestrator.surface.mesh import wind_axes
 from orchestrator.surface.onset import Shares
+from orchestrator.surface.rose import MOST_APART_DEG, SolvedRose
 from orchestrator.surface.stress import SurfaceStress
 from orchestrator.types import FloatArray
 
@@ -131,6 +136,29 @@ class Ground:
         """Speed of the `stream` at which the grain moves on flat ground, m/s."""
         speed = onset.wind_of(self.level_ustar, self.roughness, self.stream.height)
         return float(speed)
+
+    @cached_property
+    def factors(self) -> tuple[float, float]:
+        """Ends of the tested interval of the grain on flat ground, over its u*.
+
+        They are NaN for a given threshold, and where nothing near was measured.
+        """
+        if self.threshold is not None:
+            return float("nan"), float("nan")
+        columns = {
+            column: np.array([getattr(self.grain, name)], float)
+            for name, column in GRAIN_COLUMNS.items()
+        }
+        criterion = SUSTAINED_MOTION if self.is_natural else ENTRAINMENT
+        at = of_grains(Grain.of_table(columns), self.law, criterion)
+        table: dict[str, Any] = {**columns, "shields": at.shields}
+        table |= {"reynolds": at.reynolds, "force_law": [self.law]}
+        table["criterion"] = [criterion]
+        held = beside(table)
+        if not held["tested_rows"][0]:
+            return float("nan"), float("nan")
+        ends = [held[name][0] / at.shields[0] for name in ("tested_low", "tested_high")]
+        return float(np.sqrt(ends[0])), float(np.sqrt(ends[1]))
 
     def faces(
         self, stress: SurfaceStress, from_deg: float, plane: Plane
@@ -360,7 +388,7 @@ class SurfaceAnswer:
     cell_m
         Length of the flow's cells over the form, m.
     rose
-        The table of a wind rose; None without one.
+        The wind rose with its flows; None without one.
     """
 
     name: str
@@ -368,7 +396,7 @@ class SurfaceAnswer:
     ground: Ground
     directions: Sequence[Direction]
     cell_m: float
-    rose: pd.DataFrame | None = None
+    rose: SolvedRose | None = None
 
     @cached_property
     def smooth(self) -> Surface:
@@ -406,24 +434,20 @@ class SurfaceAnswer:
         winds = [found[f"{MOVES}-{each.word}"] for each in self.directions]
         found[LEAST] = np.fmin.reduce(winds)
         if self.rose is not None:
-            found[HOURS] = self._hours(winds)
+            ways = [each.from_deg for each in self.directions]
+            by_way = dict(zip(ways, winds, strict=True))
+            found[HOURS] = onset.hours(by_way, self.rose.table)
         return found
 
-    def _hours(self, winds: Sequence[FloatArray]) -> FloatArray:
-        """The map of the hours a year in which each part moves."""
-        assert self.rose is not None
-        total = np.zeros_like(winds[0])
-        for each, wind in zip(self.directions, winds, strict=True):
-            total += onset.hours(wind, each.from_deg, self.rose)
-        return total
-
-    def hours_of(self, share: float) -> float:
+    def hours_of(self, share: float, factor: float = 1.0) -> float:
         """Give the hours a year in which at least a share of the surface moves.
 
         Parameters
         ----------
         share
             Share of the area, 0 to 1.
+        factor
+            What the winds in which it moves are multiplied by.
 
         Returns
         -------
@@ -431,11 +455,59 @@ class SurfaceAnswer:
             Hours a year, all directions of the rose together.
         """
         assert self.rose is not None
-        total = 0.0
-        for each in self.directions:
-            wind = np.array([each.shares().wind_for(share)])
-            total += float(onset.hours(wind, each.from_deg, self.rose)[0])
-        return total
+        winds = {
+            each.from_deg: np.array([each.shares().wind_for(share)])
+            for each in self.directions
+        }
+        return float(onset.hours(winds, self.rose.table, factor)[0])
+
+    def left_out(self, share: float) -> "LeftOut | None":
+        """Find how far flows between others are met, each left out once.
+
+        Parameters
+        ----------
+        share
+            The share of the area whose wind is compared.
+
+        Returns
+        -------
+        LeftOut or None
+            The largest difference; None if no flow has two others within the angle over
+            which they are interpolated.
+        """
+        ordered = sorted(self.directions, key=lambda each: each.from_deg)
+        count = len(ordered)
+        worst: LeftOut | None = None
+        for place, each in enumerate(ordered):
+            before, behind = ordered[place - 1], ordered[(place + 1) % count]
+            gap = (behind.from_deg - before.from_deg) % 360
+            if count < 3 or not 0 < gap <= MOST_APART_DEG:
+                continue
+            part = ((each.from_deg - before.from_deg) % 360) / gap
+            winds = [one.shares().wind_for(share) for one in (before, behind, each)]
+            met = float(onset.interpolated(winds[0], winds[1], part))
+            off = abs(met / winds[2] - 1)
+            if worst is None or off > worst.off:
+                worst = LeftOut(off, each.from_deg, gap)
+        return worst
+
+
+class LeftOut(NamedTuple):
+    """The flow that its neighbours meet worst.
+
+    Attributes
+    ----------
+    off
+        Relative difference of the wind.
+    from_deg
+        Its direction, degrees.
+    gap
+        The angle between the neighbours, degrees.
+    """
+
+    off: float
+    from_deg: float
+    gap: float
 
 
 def _of(share: float) -> str:

@@ -1,9 +1,10 @@
 """The answer on a surface in words: the card, and the sentences below it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
-from math import ceil, isfinite, log10
+from math import ceil, exp, hypot, isfinite, log, log10
 from pathlib import Path
+from typing import NamedTuple
 
 import pandas as pd
 
@@ -33,6 +34,7 @@ NOT_MEASURED = (
 )
 RMS = "rms of the differences"
 """Its quantity in the table, of each line of masts."""
+INTERVAL_OF_FLOW = "that of the flow"
 INTERVAL_OF = "other first cells, meshes and models, on a cone"
 WORTH = Worth(
     "care",
@@ -92,6 +94,29 @@ def heaps(answer: SurfaceAnswer) -> str:
     return f"{counted} of {answer.easiest.area:.3g} m²"
 
 
+def _of_winds(answer: SurfaceAnswer) -> Iterator[str]:
+    """The hours of the winds of the place, and how well flows between are known."""
+    tenth, half = hours(answer, TENTH), hours(answer, HALF)
+    yield (
+        f"By the winds of the place a tenth of it moves in {tenth.text} hours a year, "
+        f"half of it in {half.text}; the interval is {tenth.of}."
+    )
+    assert answer.rose is not None
+    yield answer.rose.said
+    if len(answer.directions) < 2:
+        return
+    told = "Between the flows u* on the surface is interpolated"
+    left_out = answer.left_out(TENTH)
+    if left_out is None:
+        yield (f"{told}; flows 45° apart would tell how well, each left out once.")
+        return
+    yield (
+        f"{told}: the flow from {left_out.from_deg:g}°, left out, has its wind for a "
+        f"tenth of the surface met within {left_out.off:.1%} by its neighbours, "
+        f"{left_out.gap:g}° apart, the worst of all."
+    )
+
+
 def _grain(answer: SurfaceAnswer, source: str) -> str:
     """What lies on the surface, in words."""
     ground = answer.ground
@@ -121,12 +146,16 @@ def _numbers(answer: SurfaceAnswer) -> Iterator[Number]:
         what = f"{stream.at} from {first.from_deg:g}° in which half of it moves"
         yield _wind(first, HALF, what)
     if answer.rose is not None:
+        some, half = hours(answer, onset.STARTS), hours(answer, HALF)
+        tenth = hours(answer, TENTH)
         yield Number(
-            answer.hours_of(TENTH),
+            tenth.value,
             "hours a year",
-            "in which a tenth of it moves or more, by the wind rose",
-            f"some of it {answer.hours_of(onset.STARTS):.0f}, "
-            f"half of it {answer.hours_of(HALF):.0f} hours",
+            "in which a tenth of it moves or more, by the winds of the place",
+            f"some of it {some.text}, half of it {half.text} hours",
+            low=tenth.low,
+            high=tenth.high,
+            interval_of=tenth.of,
             decimals=0,
         )
         return
@@ -141,6 +170,78 @@ def _numbers(answer: SurfaceAnswer) -> Iterator[Number]:
         interval_of=INTERVAL_OF,
         decimals=0,
     )
+
+
+class Hours(NamedTuple):
+    """Hours a year, with the interval of the threshold carried through.
+
+    Attributes
+    ----------
+    value, low, high
+        The hours and their ends.
+    of
+        What the interval is of.
+    """
+
+    value: float
+    low: float
+    high: float
+    of: str
+
+    @property
+    def text(self) -> str:
+        """The ends in words; one where they are alike."""
+        ends = dict.fromkeys(f"{end:,.0f}" for end in (self.low, self.high))
+        return " to ".join(ends)
+
+
+def hours(answer: SurfaceAnswer, share: float) -> Hours:
+    """Count the hours a year in which a share of a surface moves, with their interval.
+
+    Parameters
+    ----------
+    answer
+        The answer on it, with the winds of the place.
+    share
+        The share: `onset.STARTS`, `TENTH` or `HALF`.
+
+    Returns
+    -------
+    Hours
+        The hours. The interval of the wind is that of the flow, and of the grain's
+        threshold where it has one: both are independent.
+    """
+    of_flow = factors_of_wind(share if share in EXCEEDED else onset.STARTS)
+    of_grain = answer.ground.factors
+    words = INTERVAL_OF_FLOW
+    ends = of_flow
+    if all(map(isfinite, of_grain)):
+        words = f"{words} and of the grain's threshold"
+        low, high = (
+            hypot(log(one), log(other))
+            for one, other in zip(of_flow, of_grain, strict=True)
+        )
+        ends = exp(-low), exp(high)
+    value, low, high = (
+        answer.hours_of(share, factor) for factor in (1.0, ends[1], ends[0])
+    )
+    return Hours(value, low, high, words)
+
+
+def files_read(understood: Mapping[str, str]) -> list[str]:
+    """Say what was understood of the files of a study.
+
+    Parameters
+    ----------
+    understood
+        The words by the names of the files.
+
+    Returns
+    -------
+    list of str
+        A paragraph for each file.
+    """
+    return [f"Read from {name}: {text}." for name, text in understood.items()]
 
 
 def _wind(direction: Direction, share: float, meaning: str, note: str = "") -> Number:
@@ -271,6 +372,8 @@ def surface_sentences(answer: SurfaceAnswer, source: str) -> Iterator[str]:
             f"From {last.from_deg:g}° motion starts at {last.starts:.3g} m/s, "
             f"of the {len(answer.directions)} directions the highest{tied}."
         )
+    if answer.rose is not None:
+        yield from _of_winds(answer)
     entrained = first.entrained
     if entrained is not None:
         yield (

@@ -1,7 +1,7 @@
 """What wind takes from heaps in three dimensions, beside AP-42, section 13.2.5."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -101,7 +101,7 @@ class Heaps:
     speeds
         Winds at 10 m, one after another, m/s.
     rose
-        The table of the wind rose of the study; None without one.
+        The winds of the rose by the flows that answer them; None without one.
     """
 
     name: str
@@ -128,7 +128,8 @@ class Heaps:
         """
         winds = [Wind.of(answer, direction) for direction in answer.directions]
         winds.sort(key=lambda wind: -wind.loss_kg(speeds))
-        return cls(answer.name, answer.surface.heaps, winds, speeds, answer.rose)
+        rose = None if answer.rose is None else answer.rose.by_flow
+        return cls(answer.name, answer.surface.heaps, winds, speeds, rose)
 
     @property
     def worst(self) -> Wind:
@@ -251,9 +252,12 @@ class HeapErosion(OverSurfaces):
     def results_of(self, found: Sequence[SurfaceAnswer]) -> ExperimentResults:
         """List the losses of the heaps of each surface."""
         heaps = [Heaps.of(each, self.winds) for each in found]
-        return ExperimentResults(
-            {"erosion": heaps_rows(heaps)}, erosion_sections(heaps, self.threshold_from)
-        )
+        sections = erosion_sections(heaps, self.threshold_from)
+        said = [each.rose.said for each in found[:1] if each.rose is not None]
+        read = [*cards.files_read(self.understood), *said]
+        first = [*sections[0].content, *(Paragraphs(text) for text in read)]
+        sections[0] = replace(sections[0], content=first)
+        return ExperimentResults({"erosion": heaps_rows(heaps)}, sections)
 
 
 def heaps_rows(found: Sequence[Heaps]) -> pd.DataFrame:

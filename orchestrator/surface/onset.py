@@ -4,6 +4,7 @@ No grain is packed. Each face has an exposed grain in its pocket, under the stre
 the flow in its own direction on the slope of the face.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -277,27 +278,64 @@ class Shares:
         return float(self.wind[place])
 
 
-def hours(wind: FloatArray, from_deg: float, rose: pd.DataFrame) -> FloatArray:
-    """Count the hours a year in which the wind from one direction moves parts of a bed.
+def interpolated(first: ArrayLike, second: ArrayLike, part: float) -> FloatArray:
+    """Interpolate winds at which parts of a bed move, between those of two directions.
+
+    Linear is the inverse of the wind, which is as the friction velocity on the bed.
 
     Parameters
     ----------
-    wind
-        Wind from that direction at which each part moves, m/s; NaN where there is none.
-    from_deg
-        The direction, degrees.
+    first, second
+        The winds of both, m/s, of one shape; NaN where there is none.
+    part
+        The part of the second, 0 to 1.
+
+    Returns
+    -------
+    FloatArray
+        The winds, of the same shape; NaN where one of them is.
+
+    Examples
+    --------
+    >>> print(interpolated([4.0, np.inf], [12.0, 10.0], 0.5))
+    [ 6. 20.]
+    """
+    one, other = np.asarray(first, float), np.asarray(second, float)
+    if part in (0, 1):
+        return one if part == 0 else other
+    with np.errstate(divide="ignore"):
+        return np.asarray(1 / ((1 - part) / one + part / other))
+
+
+def hours(
+    winds: Mapping[float, FloatArray], rose: pd.DataFrame, factor: float = 1.0
+) -> FloatArray:
+    """Count the hours a year in which winds move parts of a bed.
+
+    Parameters
+    ----------
+    winds
+        Wind from each direction of a flow, degrees, at which each part moves, m/s, of
+        one shape; NaN where there is none.
     rose
-        A wind rose with the columns ``solved_deg``, the direction by whose flow a row
-        is answered, ``speed_m_s`` and ``share``.
+        A wind rose with the columns ``speed_m_s`` and ``share``, and the flows beside
+        each row: ``first_deg``, ``second_deg`` and ``second_part``.
+    factor
+        What the winds at which parts move are multiplied by.
 
     Returns
     -------
     FloatArray
         Hours a year, of the shape of the winds; NaN where these are.
     """
-    rows = rose[rose["solved_deg"] == from_deg].sort_values("speed_m_s")
-    speeds = rows["speed_m_s"].to_numpy(float)
-    above = np.cumsum(rows["share"].to_numpy(float)[::-1])[::-1]
-    place = np.searchsorted(speeds, wind)
-    found = HOURS * np.concatenate([above, [0.0]])[place]
-    return np.where(np.isnan(wind), np.nan, found)
+    total: FloatArray = np.zeros(np.shape(next(iter(winds.values()))))
+    flows = ["first_deg", "second_deg", "second_part"]
+    for _, rows in rose.groupby(flows):
+        first, second, part = rows[flows].to_numpy(float)[0].tolist()
+        wind = factor * interpolated(winds[first], winds[second], part)
+        ordered = rows.sort_values("speed_m_s")
+        above = np.cumsum(ordered["share"].to_numpy(float)[::-1])[::-1]
+        place = np.searchsorted(ordered["speed_m_s"].to_numpy(float), wind)
+        found = HOURS * np.concatenate([above, [0.0]])[place]
+        total = total + np.where(np.isnan(wind), np.nan, found)
+    return total

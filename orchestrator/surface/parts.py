@@ -160,7 +160,13 @@ class SurfaceErosion(Erosion):
     """What is asked of the wind, and by the command `erosion`."""
 
     wind: InstanceOf[Rose] | None = None
-    """wind rose, a CSV file with the columns from_deg, speed_m_s and share"""
+    """winds of the place, a text file: a series with a time, a speed and a direction in
+    each line, or a table of frequencies (docs/your-files.md)"""
+    wind_height: Annotated[float, Field(ge=0.1, le=1000)] | None = declared(
+        None, unit="m"
+    )
+    """height of these winds above the ground, from which they go to 10 m by the log law
+    over the roughness length of the ground; by default that in the file, or 10 m"""
 
 
 class SurfaceScene(Part):

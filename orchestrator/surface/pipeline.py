@@ -8,6 +8,7 @@ from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,7 @@ from orchestrator.study.scene import (
     VISCOUS_CELLS,
     default_first_cell_height,
 )
-from orchestrator.surface import cards, maps
+from orchestrator.surface import cards, maps, onset, winds
 from orchestrator.surface.answer import (
     ENTRAINED,
     HOURS,
@@ -43,8 +44,9 @@ from orchestrator.surface.answer import (
 )
 from orchestrator.surface.case import SurfaceFlowCase
 from orchestrator.surface.mesh import LEVELS
-from orchestrator.surface.parts import SurfaceScene
+from orchestrator.surface.parts import SurfaceErosion, SurfaceScene
 from orchestrator.surface.raster import geotiff
+from orchestrator.surface.rose import SolvedRose
 from orchestrator.surface.stress import SurfaceStress
 from orchestrator.surface.study import SurfaceStudy, rose_of
 from orchestrator.types import FloatArray
@@ -83,6 +85,7 @@ class OverSurfaces(Experiment):
         self.flows = {scene: flow_of(scene) for scene in study.scenes}
         self.members = alike(study.scenes)
         self.roses = roses_of(study, self.members)
+        self.understood = study.understood
         super().__init__(plan.of_cases(self.flows.values()), study)
 
     def results(self, runs: Runs) -> ExperimentResults | None:
@@ -120,7 +123,9 @@ class SurfaceMotion(OverSurfaces):
     def results_of(self, found: Sequence[SurfaceAnswer]) -> ExperimentResults:
         """List directions, shares and faces, and draw the maps."""
         return ExperimentResults(
-            tables(found), surface_sections(found, self.threshold_from), files(found)
+            tables(found),
+            surface_sections(found, self.threshold_from, self.understood),
+            files(found),
         )
 
 
@@ -184,8 +189,8 @@ def alike(
 
 def roses_of(
     study: SurfaceStudy, members: Mapping[SurfaceScene, Sequence[SurfaceScene]]
-) -> dict[SurfaceScene, pd.DataFrame]:
-    """List the wind rose of a study with the flows that answer it.
+) -> dict[SurfaceScene, SolvedRose]:
+    """Find the flows that answer the wind rose of a study.
 
     Parameters
     ----------
@@ -197,7 +202,7 @@ def roses_of(
     Returns
     -------
     dict
-        The table of the rose for the scenes of each key; empty without a rose.
+        The rose for the scenes of each key; empty without a rose.
 
     Raises
     ------
@@ -207,11 +212,13 @@ def roses_of(
     rose = rose_of(study)
     if not rose:
         return {}
+    assert isinstance(study.erosion, SurfaceErosion)
     where = f"{study.file}: erosion.wind"
+    height = study.erosion.wind_height or rose.height or onset.WIND_HEIGHT
     found = {}
     for bare, scenes in members.items():
         directions = [scene.flow.from_deg for scene in scenes]
-        found[bare] = rose.table(directions, where)
+        found[bare] = rose.solved(directions, where, bare.solve_roughness, height)
     return found
 
 
@@ -244,7 +251,7 @@ def _answer(
     flows: Mapping[SurfaceScene, SurfaceFlowCase],
     threshold: float | None,
     cases: Path,
-    rose: pd.DataFrame | None,
+    rose: SolvedRose | None,
 ) -> SurfaceAnswer:
     """The answer of scenes that are alike but for the direction of the wind."""
     first = scenes[0]
@@ -345,7 +352,11 @@ def _vtk(answer: SurfaceAnswer) -> bytes:
         return path.read_bytes()
 
 
-def surface_sections(found: Sequence[SurfaceAnswer], source: str) -> list[Section]:
+def surface_sections(
+    found: Sequence[SurfaceAnswer],
+    source: str,
+    understood: Mapping[str, str] = MappingProxyType({}),
+) -> list[Section]:
     """The page: the answer with the map of the least wind, then all else.
 
     Parameters
@@ -354,6 +365,8 @@ def surface_sections(found: Sequence[SurfaceAnswer], source: str) -> list[Sectio
         Answers of a study.
     source
         What the study was read from, in words.
+    understood
+        What was understood of each file of the study, by name.
 
     Returns
     -------
@@ -369,9 +382,14 @@ def surface_sections(found: Sequence[SurfaceAnswer], source: str) -> list[Sectio
         table = table.drop(columns="surface")  # the card names it
     card = cards.surface_card(found, source)
     first, *others = listed
-    figure, told = first.content
+    figure, told, *more = first.content
+    read = [Paragraphs(text) for text in cards.files_read(understood)]
     sure = Section("How sure it is", [Paragraphs(words["sure"], "lead")])
-    return [Section("", [card, figure, told, Table.of(table)]), *others, sure]
+    return [
+        Section("", [card, figure, told, *read, *more, Table.of(table)]),
+        *others,
+        sure,
+    ]
 
 
 def _texts(stream: Stream) -> dict[str, str]:
@@ -379,7 +397,7 @@ def _texts(stream: Stream) -> dict[str, str]:
     texts = page_texts(__file__, "surface")
     return {
         name: texts[name].format(flow=stream.word, at=stream.at)
-        for name in ("least", "stress", "winds", "shares", "hours", "sure")
+        for name in ("least", "stress", "winds", "shares", "hours", "rose", "sure")
     }
 
 
@@ -425,6 +443,9 @@ def _sections(answer: SurfaceAnswer, end: str, source: str) -> Iterator[Section]
         drawing = maps.figure(answer.grid, hours, "hours a year", colours="magma")
         text = words["hours"]
         figures.append(Figure(f"hours{end}", "Hours of motion", text, (), drawing))
+        drawing = winds.figure(answer)
+        text = f"{words['rose']} {answer.rose.said}"
+        figures.append(Figure(f"rose{end}", "Winds of the place", text, (), drawing))
     yield Section(answer.name, figures)
 
 

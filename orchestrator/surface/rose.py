@@ -2,21 +2,34 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
+from orchestrator.digits import SLACK
 from orchestrator.errors import InputError
+from orchestrator.physics.velocity import log_law_speed, log_law_ustar
 from orchestrator.runs.files import digest_text
 from orchestrator.study.wind import read_winds
+from orchestrator.surface.onset import WIND_HEIGHT
 from orchestrator.types import BoolArray, FloatArray
 
 COLUMNS = ("from_deg", "speed_m_s", "share")
+FLOWS = ("first_deg", "second_deg", "second_part")
+"""Columns of the flows beside a direction."""
+MOST_APART_DEG = 90.0
+"""Largest angle between two flows that are interpolated."""
+WIDEST_PART_DEG = 5.0
+"""Width of the parts of a sector, at most."""
+LOWEST = 10.0
+"""Least height of winds over the roughness length of the ground."""
 WINDIEST = 20.0
 """Mean speed above which it is likelier in another unit, m/s: Cape Denison, of the
 windiest places, has 19."""
 FURTHEST_DEG = 30.0
-"""Largest angle between a direction of a rose and the nearest flow."""
+"""Largest angle between a direction of a rose and the nearest flow, where none lie on
+both sides of it."""
 SECTORS = (4, 8, 12, 16, 24, 32, 36, 72, 360)
 """Numbers of sectors of a rose, the widest sectors first."""
 SURELY = 12
@@ -63,43 +76,137 @@ class Rose:
         what = f"the wind of {self.name} is {mean:.3g} m/s in the mean"
         return f"{what}: did you mean km/h, {mean / 3.6:.3g} m/s?"
 
-    def table(self, solved: Sequence[float], where: str) -> pd.DataFrame:
-        """List the rose with the directions of the flows that answer each row.
+    def solved(
+        self, flows: Sequence[float], where: str, roughness: float, height: float
+    ) -> "SolvedRose":
+        """Put its winds between the flows that answer them, at 10 m.
 
-        A direction stands for its sector of the rose, and a flow for all directions to
-        which it is the nearest. A row is shared by the flows in the parts of its sector
-        that are theirs.
+        A direction stands for its sector of the rose, which is divided into parts. In
+        each the flow is interpolated between the two beside it, where these are near
+        enough; beyond the last flow it is that one.
 
         Parameters
         ----------
-        solved
+        flows
             Directions of the flows, degrees, in any order.
         where
             The field that names the rose, for messages.
+        roughness
+            Roughness length of the ground, m: by its log law winds go to 10 m.
+        height
+            Height of the winds, m.
 
         Returns
         -------
-        DataFrame
-            The columns `COLUMNS` and `solved_deg`; a row of the rose that several flows
-            answer has a row for each, with a part of its share.
+        SolvedRose
+            The rose with the flows of each wind.
 
         Raises
         ------
         InputError
-            If no flow is near a direction in which the wind blows.
+            If no flow is near a direction in which the wind blows, or the winds were
+            measured among the elements of the ground.
         """
+        if height < LOWEST * roughness:
+            what = f"winds {height:g} m above ground of z0 = {roughness:g} m"
+            remedy = f"the log law needs {LOWEST:g} z0 at least"
+            raise InputError(what, where, remedy)
+        factor = 1.0
+        if height != WIND_HEIGHT:
+            ustar = log_law_ustar(1.0, height, roughness)
+            factor = float(log_law_speed(ustar, WIND_HEIGHT, roughness))
         table = pd.DataFrame(self.rows, columns=[*COLUMNS])
         directions = table["from_deg"].to_numpy(float)
-        flows = np.sort(np.asarray(solved, float))
+        around = np.sort(np.asarray(flows, float))
         blows = (table["share"] > 0) & (table["speed_m_s"] > 0)
-        _check_flows(np.where(blows, _off(directions, flows), 0.0), directions, where)
+        _check_flows(directions[blows], around, where)
         middles, width = _sectors(directions, table["speed_m_s"].to_numpy(float) > 0)
-        parts = _parts(middles, width, flows)
-        of_row, of_flow = np.nonzero(parts)
-        listed = table.iloc[of_row].reset_index(drop=True)
-        listed["share"] *= parts[of_row, of_flow]
-        listed["solved_deg"] = flows[of_flow]
-        return listed
+        table["middle"] = middles
+        parts = _parts(np.unique(middles), width, around)
+        listed = table.merge(parts, on="middle", sort=False)
+        listed["from_deg"] = listed["part_deg"]
+        listed["share"] *= listed["part"]
+        listed["speed_m_s"] *= factor
+        listed = listed[[*COLUMNS]]
+        between = _between(listed["from_deg"].to_numpy(float), around)
+        return SolvedRose(self, pd.concat([listed, between], axis=1), height, factor)
+
+
+class SolvedRose(NamedTuple):
+    """A rose with the flows that answer its winds.
+
+    Attributes
+    ----------
+    rose
+        The rose.
+    table
+        The columns `COLUMNS`, at 10 m, and `FLOWS`: the two flows beside each
+        direction, degrees, and the part of the second one.
+    height
+        Height of the speeds in its file, m.
+    factor
+        Speeds at 10 m over those in its file.
+    """
+
+    rose: Rose
+    table: pd.DataFrame
+    height: float
+    factor: float
+
+    @property
+    def by_flow(self) -> pd.DataFrame:
+        """Speeds and shares by the flow that answers a part of each, ``solved_deg``."""
+        first, second, part = (self.table[name] for name in FLOWS)
+        own = self.table[[*COLUMNS]]
+        one = own.assign(solved_deg=first, share=own["share"] * (1 - part))
+        other = own.assign(solved_deg=second, share=own["share"] * part)
+        both = pd.concat([one, other], ignore_index=True)
+        return both[both["share"] > 0].reset_index(drop=True)
+
+    @property
+    def said(self) -> str:
+        """How its winds come to 10 m, in words."""
+        if self.height == WIND_HEIGHT:
+            return f"Winds of {self.rose.name} are taken as those at 10 m."
+        return (
+            f"Winds of {self.rose.name} are {self.height:g} m above the ground: by the "
+            f"log law over the ground's z₀ they are {self.factor:.3g} times as strong "
+            "at 10 m."
+        )
+
+
+def _parts(middles: FloatArray, width: float, flows: FloatArray) -> pd.DataFrame:
+    """The parts of sectors about their middles: their directions, degrees, and sizes.
+
+    None reaches beyond a flow: over each what is interpolated is linear.
+    """
+    count = max(int(np.ceil(width / WIDEST_PART_DEG - SLACK)), 1)
+    even = np.linspace(-width / 2, width / 2, count + 1)
+    rows = []
+    for middle in middles:
+        off = _turned(flows - middle, 360)
+        edges = np.union1d(even, off[np.abs(off) < width / 2])
+        sizes = np.diff(edges)
+        of_part = zip(edges[:-1] + sizes / 2, sizes, strict=True)
+        rows += [
+            (middle, (middle + place) % 360, size / width) for place, size in of_part
+        ]
+    return pd.DataFrame(rows, columns=["middle", "part_deg", "part"])
+
+
+def _between(directions: FloatArray, flows: FloatArray) -> pd.DataFrame:
+    """The flows beside each direction, and the part of the second one: 0 to 1."""
+    place = np.searchsorted(flows, directions, side="right")
+    first = flows[place - 1]
+    second = flows[place % len(flows)]
+    gap = (second - first) % 360
+    off = (directions - first) % 360
+    part = np.divide(off, gap, out=np.zeros_like(off), where=gap > 0)
+    # too far apart, or one flow alone: the nearest
+    is_far = (gap > MOST_APART_DEG) | (gap == 0)
+    part = np.where(is_far, np.where(off > gap / 2, 1.0, 0.0), part)
+    part = np.where(gap == 0, 0.0, part)
+    return pd.DataFrame(dict(zip(FLOWS, (first, second, part), strict=True)))
 
 
 def _turned(angles: FloatArray, turn: float) -> FloatArray:
@@ -107,15 +214,15 @@ def _turned(angles: FloatArray, turn: float) -> FloatArray:
     return np.asarray((angles + turn / 2) % turn - turn / 2)
 
 
-def _off(directions: FloatArray, flows: FloatArray) -> FloatArray:
-    """Angle between each direction and the nearest flow, degrees."""
-    return np.asarray(np.abs(_turned(directions[:, None] - flows, 360)).min(axis=1))
-
-
-def _check_flows(off_deg: FloatArray, directions: FloatArray, where: str) -> None:
-    """Refuse a rose with a direction that is far off all flows."""
-    worst = int(off_deg.argmax())
-    if off_deg[worst] > FURTHEST_DEG:
+def _check_flows(directions: FloatArray, flows: FloatArray, where: str) -> None:
+    """Refuse a rose with a direction that is far off all flows, and between none."""
+    off = np.abs(_turned(directions[:, None] - flows, 360)).min(axis=1)
+    place = np.searchsorted(flows, directions, side="right")
+    gap = (flows[place % len(flows)] - flows[place - 1]) % 360
+    is_between = (gap > 0) & (gap <= MOST_APART_DEG)
+    off = np.where(is_between, 0.0, off)
+    worst = int(off.argmax())
+    if off[worst] > FURTHEST_DEG:
         what = f"no flow is within {FURTHEST_DEG:g} deg of {directions[worst]:g}"
         remedy = 'list more directions: "flow.from_deg" = [0, 45, 90, ...]'
         raise InputError(what, where, remedy)
@@ -141,17 +248,6 @@ def _sectors(directions: FloatArray, blows: BoolArray) -> tuple[FloatArray, floa
         if is_near.all() and (is_whole or count >= SURELY):
             break
     return np.asarray(middles), width
-
-
-def _parts(middles: FloatArray, width: float, flows: FloatArray) -> FloatArray:
-    """The part of each sector that is nearest to each flow, of shape (rows, flows)."""
-    turns = 360 * np.arange(-2, 3)
-    around = np.concatenate([flows[-1:] - 360, flows, flows[:1] + 360])
-    ends = (around[1:] + around[:-1]) / 2
-    last = np.minimum(middles[:, None, None] + width / 2, ends[1:, None] + turns)
-    first = np.maximum(middles[:, None, None] - width / 2, ends[:-1, None] + turns)
-    overlap = np.maximum(last - first, 0.0).sum(axis=2)
-    return np.asarray(overlap / overlap.sum(axis=1, keepdims=True))
 
 
 def read_rose(text: str, name: str, where: str) -> Rose:

@@ -83,11 +83,25 @@ def test_hours_of_a_rose_add_up_to_a_year() -> None:
     rows = []
     for direction in (0.0, 90.0):
         for speed, share in ((2.0, 0.3), (8.0, 0.15), (14.0, 0.05)):
-            rows.append((direction, speed, share))
-    rose = pd.DataFrame(rows, columns=["solved_deg", "speed_m_s", "share"])
+            rows.append((direction, direction, 0.0, speed, share))
+    columns = ["first_deg", "second_deg", "second_part", "speed_m_s", "share"]
+    rose = pd.DataFrame(rows, columns=columns)
     always = np.zeros(1)
-    whole = onset.hours(always, 0.0, rose) + onset.hours(always, 90.0, rose)
-    assert whole[0] == pytest.approx(8760.0)
+    assert onset.hours({0.0: always, 90.0: always}, rose)[0] == pytest.approx(8760.0)
     winds = np.array([2.0, 2.1, 8.0, 14.0, 14.1, np.inf, np.nan])
+    never = np.full(7, np.inf)
     parts = np.array([0.5, 0.2, 0.2, 0.05, 0.0, 0.0, np.nan])
-    assert onset.hours(winds, 0.0, rose) == pytest.approx(8760.0 * parts, nan_ok=True)
+    found = onset.hours({0.0: winds, 90.0: never}, rose)
+    assert found == pytest.approx(8760.0 * parts, nan_ok=True)
+    # a threshold twice as high is reached as one in winds half as strong
+    twice = onset.hours({0.0: winds / 2, 90.0: never}, rose, 2.0)
+    assert twice == pytest.approx(found, nan_ok=True)
+
+
+def test_between_two_flows_the_friction_velocity_is_linear() -> None:
+    """Half-way between 4 and 12 m/s the bed feels the mean of both, 6 m/s."""
+    row = {"first_deg": 0.0, "second_deg": 90.0, "second_part": 0.5, "share": 1.0}
+    winds = {0.0: np.array([4.0, 4.0]), 90.0: np.array([12.0, np.inf])}
+    for speed, hours in ((5.9, [0, 0]), (6.1, [8760, 0]), (8.1, [8760, 8760])):
+        rose = pd.DataFrame([{**row, "speed_m_s": speed}])
+        assert onset.hours(winds, rose).tolist() == hours

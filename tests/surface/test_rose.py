@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import InputError
-from orchestrator.surface.rose import read_rose
+from orchestrator.surface.rose import Rose, read_rose
 
 WHERE = "pile.toml: erosion.wind"
 HEAD = "from_deg,speed_m_s,share\n"
@@ -28,29 +28,65 @@ def test_another_direction_speed_or_share_is_another_rose(rows: str) -> None:
     assert other.digest != rose.digest
 
 
+def by_flow(rose: Rose, flows: list[float]) -> dict[float, float]:
+    """The share of time that each flow answers."""
+    table = rose.solved(flows, WHERE, 0.005, 10.0).by_flow
+    found: dict[float, float] = {}
+    for way, share in table[["solved_deg", "share"]].to_numpy(float).tolist():
+        found[way] = found.get(way, 0.0) + share
+    return found
+
+
 def test_directions_go_from_north_over_east() -> None:
     """The flow of another quarter would answer a rose that is read the other way round."""
     rose = read_rose(HEAD + "80,5,0.7\n190,5,0.3\n", "a.csv", WHERE)
-    table = rose.table([0.0, 90.0, 180.0, 270.0], WHERE)
-    of = table.groupby("solved_deg")["share"].sum()
-    assert of.to_dict() == pytest.approx({90.0: 0.7, 180.0: 0.3})
+    found = by_flow(rose, [0.0, 90.0, 180.0, 270.0])
+    assert found == pytest.approx(
+        {0.0: 0.7 * 10 / 90, 90.0: 0.7 * 80 / 90, 180.0: 0.3 * 80 / 90, 270.0: 0.3 / 9}
+    )
 
 
-def test_each_row_is_answered_by_the_nearest_flow() -> None:
-    rose = read_rose(HEAD + "350,5,0.5\n100,5,0.5\n", "a.csv", WHERE)
-    table = rose.table([0.0, 90.0, 180.0, 270.0], WHERE)
-    assert table["solved_deg"].tolist() == [0.0, 90.0]
-    assert table["share"].sum() == pytest.approx(1.0)
+def test_each_wind_lies_between_the_two_flows_beside_it() -> None:
+    rose = read_rose(HEAD + "350,5,0.25\n100,7,0.75\n", "a.csv", WHERE)
+    table = rose.solved([270.0, 0.0, 180.0, 90.0], WHERE, 0.005, 10.0).table
+    rows = table.groupby(["first_deg", "second_deg", "speed_m_s"])[
+        ["second_part"]
+    ].mean()
+    assert rows["second_part"].to_dict() == pytest.approx(
+        {(270.0, 0.0, 5.0): 80 / 90, (90.0, 180.0, 7.0): 10 / 90}
+    )
+
+
+def test_far_flows_are_not_interpolated() -> None:
+    rose = read_rose(HEAD + "20,5,0.5\n95,7,0.5\n", "a.csv", WHERE)
+    assert by_flow(rose, [0.0, 100.0]) == pytest.approx({0.0: 0.5, 100.0: 0.5})
+    one = read_rose(HEAD + "20,5,0.5\n10,7,0.5\n", "a.csv", WHERE)
+    assert by_flow(one, [0.0]) == pytest.approx({0.0: 1.0})
+
+
+@pytest.mark.parametrize(
+    ("height", "roughness"), [(2.0, 0.005), (80.0, 0.03), (10.0, 0.005)]
+)
+def test_winds_of_another_height_go_to_10_m_by_the_log_law(
+    height: float, roughness: float
+) -> None:
+    rose = read_rose(HEAD + "0,5,1\n", "a.csv", WHERE)
+    solved = rose.solved([0.0], WHERE, roughness, height)
+    factor = np.log(10 / roughness) / np.log(height / roughness)
+    assert solved.factor == pytest.approx(factor, rel=2e-3)
+    assert solved.table["speed_m_s"].to_numpy() == pytest.approx(5 * factor, rel=2e-3)
+    assert ("by the log law" in solved.said) == (height != 10.0)
+    with pytest.raises(InputError, match="the log law needs 10 z0 at least"):
+        rose.solved([0.0], WHERE, height / 5, height)
 
 
 def shares(directions: list[float], of: list[float], flows: list[float]) -> list[float]:
     """The share of time that each flow answers, of winds of 5 m/s."""
     lines = [f"{a!r},5,{b!r}" for a, b in zip(directions, of, strict=True)]
     rose = read_rose(HEAD + "\n".join(lines) + "\n", "a.csv", WHERE)
-    table = rose.table(flows, WHERE)
-    assert table["share"].sum() == pytest.approx(1.0, rel=1e-12)
-    answered = table.groupby("solved_deg")["share"].sum()
-    return [float(answered.get(flow, 0.0)) for flow in flows]
+    answered = by_flow(rose, flows)
+    assert sum(answered.values()) == pytest.approx(1.0, rel=1e-12)
+    return [answered.get(flow, 0.0) for flow in flows]
 
 
 @pytest.mark.parametrize("sectors", [4, 8, 12, 16, 32, 36, 72])
@@ -66,13 +102,15 @@ def test_a_uniform_wind_gives_each_flow_one_share(
     assert found == pytest.approx([1 / flows] * flows, rel=1e-9)
 
 
-def test_sectors_that_are_those_of_the_flows_stay_whole() -> None:
-    rows = "".join(
-        f"{way},{speed},0.125\n" for way in (270, 0, 90, 180) for speed in (3, 8)
+def test_a_sector_is_divided_among_its_directions() -> None:
+    """A sector of 90 degrees about a flow: a quarter of it is nearer to each neighbour."""
+    rows = "".join(f"{way},{5 if way else 9},0.25\n" for way in (270, 0, 90, 180))
+    rose = read_rose(HEAD + rows, "a.csv", WHERE)
+    table = rose.solved([0.0, 90, 180, 270], WHERE, 0.005, 10.0).by_flow
+    of_north = table[table["speed_m_s"] == 9].groupby("solved_deg")["share"].sum()
+    assert of_north.to_dict() == pytest.approx(
+        {0.0: 0.1875, 90.0: 0.03125, 270.0: 0.03125}
     )
-    table = read_rose(HEAD + rows, "a.csv", WHERE).table([0.0, 90, 180, 270], WHERE)
-    assert table["solved_deg"].tolist() == table["from_deg"].tolist()
-    assert table["share"].tolist() == [0.125] * 8
 
 
 def test_compass_points_in_whole_degrees_are_sectors() -> None:
@@ -99,10 +137,22 @@ def test_compass_points_in_whole_degrees_are_sectors() -> None:
     assert found == pytest.approx([1 / 8] * 8, rel=1e-9)
 
 
-def test_a_sector_is_shared_by_the_flows_that_it_overlaps() -> None:
-    # sectors of 10 degrees: a quarter of that about 20 lies beyond 22.5
+def test_a_narrow_sector_is_shared_by_the_flows_beside_it() -> None:
+    # sectors of 10 degrees; 20 lies at four ninths between 0 and 45
     found = shares([0.0, 20, 130], [0.2, 0.4, 0.4], [45.0 * k for k in range(8)])
-    assert found == pytest.approx([0.5, 0.1, 0, 0.4, 0, 0, 0, 0], abs=1e-9)
+    share = 0.4 * 20 / 45
+    edge = 0.2 * 2.5 / 45 / 2
+    expected = [
+        0.2 - 2 * edge + 0.4 - share,
+        edge + share,
+        0.4 * 5 / 45,
+        0.4 * 40 / 45,
+        0,
+        0,
+        0,
+        edge,
+    ]
+    assert found == pytest.approx(expected, abs=1e-9)
 
 
 @pytest.mark.parametrize(("wind", "flows"), [(30.0, [0.0, 60.0]), (15.0, [0.0, 30.0])])
@@ -135,9 +185,9 @@ def test_a_line_with_more_cells_than_the_head_is_refused() -> None:
 def test_wind_from_where_no_flow_is_is_refused() -> None:
     rose = read_rose(HEAD + "180,5,0.5\n0,5,0.5\n", "a.csv", WHERE)
     with pytest.raises(InputError, match="no flow is within 30 deg of 180"):
-        rose.table([0.0], WHERE)
+        rose.solved([0.0], WHERE, 0.005, 10.0)
     calm = read_rose(HEAD + "180,0,0.5\n0,5,0.5\n", "a.csv", WHERE)
-    assert calm.table([0.0], WHERE)["solved_deg"].tolist() == [0.0, 0.0]
+    assert by_flow(calm, [0.0]) == pytest.approx({0.0: 1.0})
 
 
 @pytest.mark.parametrize(
