@@ -1,7 +1,7 @@
 """What wind takes from heaps in three dimensions, beside AP-42, section 13.2.5."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -252,12 +252,12 @@ class HeapErosion(OverSurfaces):
     def results_of(self, found: Sequence[SurfaceAnswer]) -> ExperimentResults:
         """List the losses of the heaps of each surface."""
         heaps = [Heaps.of(each, self.winds) for each in found]
-        sections = erosion_sections(heaps, self.threshold_from)
         said = [each.rose.said for each in found[:1] if each.rose is not None]
         read = [*cards.files_read(self.understood), *said]
-        first = [*sections[0].content, *(Paragraphs(text) for text in read)]
-        sections[0] = replace(sections[0], content=first)
-        return ExperimentResults({"erosion": heaps_rows(heaps)}, sections)
+        return ExperimentResults(
+            {"erosion": heaps_rows(heaps)},
+            erosion_sections(heaps, self.threshold_from, read),
+        )
 
 
 def heaps_rows(found: Sequence[Heaps]) -> pd.DataFrame:
@@ -288,7 +288,9 @@ def heaps_rows(found: Sequence[Heaps]) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def erosion_sections(found: Sequence[Heaps], source: str) -> list[Section]:
+def erosion_sections(
+    found: Sequence[Heaps], source: str, read: Sequence[str] = ()
+) -> list[Section]:
     """The page: the answer with its figure, the parts, and the tables of AP-42.
 
     Parameters
@@ -297,6 +299,8 @@ def erosion_sections(found: Sequence[Heaps], source: str) -> list[Section]:
         The heaps of each surface.
     source
         Where the threshold is from, in words.
+    read
+        What was understood of the files of the study, a paragraph each.
 
     Returns
     -------
@@ -309,7 +313,7 @@ def erosion_sections(found: Sequence[Heaps], source: str) -> list[Section]:
     drawing = erosion.picture(piles[: erosion.DRAWN], found[0].speeds)
     figure = Figure("erosion", "Stress and loss", own["erosion"], (), drawing)
     said = [line for heaps in found for line in heaps_sentences(heaps, source)]
-    told = "\n\n".join([*said, own["erosion_sure"]])
+    told = "\n\n".join([*said, *read, own["erosion_sure"]])
     in_sentences = Paragraphs(told, fold=IN_SENTENCES)
     parts = Paragraphs(texts["rows"], "lead")
     limits = Limits(own["erosion_limits"].split("\n\n"))

@@ -376,17 +376,18 @@ def surface_sections(
     words = _texts(found[0].ground.stream)
     listed: list[Section] = []
     for number, answer in enumerate(found, 1):
-        listed += _sections(answer, f"-{number}" if len(found) > 1 else "", source)
+        read = cards.files_read(understood) if number == 1 else []
+        end = f"-{number}" if len(found) > 1 else ""
+        listed += _sections(answer, end, source, read)
     table = pd.concat(map(_directions, found))
     if len(found) == 1:
         table = table.drop(columns="surface")  # the card names it
     card = cards.surface_card(found, source)
     first, *others = listed
-    figure, told, *more = first.content
-    read = [Paragraphs(text) for text in cards.files_read(understood)]
+    figure, told = first.content
     sure = Section("How sure it is", [Paragraphs(words["sure"], "lead")])
     return [
-        Section("", [card, figure, told, *read, *more, Table.of(table)]),
+        Section("", [card, figure, told, Table.of(table)]),
         *others,
         sure,
     ]
@@ -413,11 +414,16 @@ def _directions(answer: SurfaceAnswer) -> pd.DataFrame:
     return pd.DataFrame(rows).rename(columns={"from_deg": from_deg, **HEADINGS})
 
 
-def _sections(answer: SurfaceAnswer, end: str, source: str) -> Iterator[Section]:
-    """The sections of one surface; the names of its figures have the ending."""
+def _sections(
+    answer: SurfaceAnswer, end: str, source: str, read: Sequence[str]
+) -> Iterator[Section]:
+    """The sections of one surface; the names of its figures have the ending.
+
+    What was read of the files of the study is told with it.
+    """
     stream = answer.ground.stream
     words = _texts(stream)
-    told = "\n\n".join(cards.surface_sentences(answer, source))
+    told = "\n\n".join([*cards.surface_sentences(answer, source), *read])
     first = answer.easiest.first
     mark = (float(first["x_m"]), float(first["y_m"]))
     several = len(answer.directions) > 1
