@@ -28,13 +28,20 @@ SHOWN = {
     "mixture": "hiding.svg",
     "shields": "shields.svg",
     "paper": "fractions-alpha15-eq10.svg",
+    "ladder": "share-within.svg",
 }
-"""The figure that is shown of each preset."""
+"""The figure that is shown of each preset, or of what another command makes of one."""
 COMMANDS = {
     "stockpile": "erosion stockpile",
+    "ladder": "ladder first-look",
 }
 """Commands of presets that `study PRESET` does not run."""
-NOTES = {"paper": "The claims one by one: [paper.md](paper.md)."}
+OF = {"ladder": "first-look"}
+"""The preset of a section with another name."""
+NOTES = {
+    "paper": "The claims one by one: [paper.md](paper.md).",
+    "ladder": "What a ladder is, and what its lines are for: [ladder.md](ladder.md).",
+}
 """What is added to the section of a preset."""
 WIDE = 900  # pixels
 COLOURS = 256
@@ -65,13 +72,14 @@ def section(directory: Path, preset: str) -> str:
     """The section of a preset; its picture is drawn."""
     figure = directory / preset / "figures" / SHOWN[preset]
     draw(figure, PICTURES / f"gallery-{preset}.png")
-    (file,) = ROOT.glob(f"orchestrator/*/presets/{preset}.toml")
+    of = OF.get(preset, preset)
+    (file,) = ROOT.glob(f"orchestrator/*/presets/{of}.toml")
     answer = (directory / f"{preset}.txt").read_text(encoding="utf-8")
     card = shortened(answer)
     question = card.splitlines()[0]
     command = COMMANDS.get(preset, f"study {preset}")
     lines = [
-        f"## {preset}",
+        f"## {preset}" if of == preset else f"## {preset} of {of}",
         "",
         f"`orchestrator {command}`, file [{file.name}](../{file.relative_to(ROOT)})",
         "",

@@ -144,7 +144,7 @@ class Ladder(Experiment):
         tables = {
             "shares": shares,
             "points": compared,
-            "scene_errors": scene_errors(compared),
+            "scene_errors": scene_errors(measured),
             "errors": known,
             "domain": measured_domain(done),
         }

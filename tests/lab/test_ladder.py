@@ -131,6 +131,21 @@ def _table(*more: dict[str, Any]) -> pd.DataFrame:
     return pd.DataFrame([*rows, *more])
 
 
+def test_a_ladder_has_all_of_its_tables(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bed = 'kind = "pile", height = 0.01, slope_deg = 20.0, roughness = "d/30"'
+    text = f"grain = {{ diameter = 1e-3 }}\nbed = {{ {bed} }}"
+    one = ladder.Ladder(study.parse(text, name="one", where="one"), tmp_path)
+    monkeypatch.setattr(ladder, "points", lambda *_: _table())
+    monkeypatch.setattr(ladder.choices, "shares", lambda *_: pd.DataFrame())
+    found = one.results(Runs(one.planned, tmp_path, {}))
+    assert found is not None
+    errors = found.tables["scene_errors"]
+    assert set(errors["part"]) == {"flow", "grains"}
+    pd.testing.assert_frame_equal(errors, ladder.scene_errors(_table()))
+
+
 def test_errors_are_relative_to_the_reference() -> None:
     table = ladder.rung_errors(_table(_point(("quick", FAST), **{"tau_0.5": math.nan})))
     rows = table.set_index(["flow_rung", "grain_rung"])
