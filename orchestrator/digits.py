@@ -188,3 +188,36 @@ def percent(part: float) -> str:
     '30 %'
     """
     return f"{part:.0%}".replace("%", " %")
+
+
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+"""Digits of an exponent."""
+
+
+def plain(value: float, digits: int = 3) -> str:
+    """Write a number for a reader.
+
+    Parameters
+    ----------
+    value
+        The number.
+    digits
+        Digits that matter.
+
+    Returns
+    -------
+    str
+        Below a thousandth and from a hundred thousand on with a power of ten.
+
+    Examples
+    --------
+    >>> plain(1e-5), plain(1.4607e-5), plain(-0.05), plain(2650.0, 4)
+    ('1.0 × 10⁻⁵', '1.46 × 10⁻⁵', '−0.05', '2650')
+    """
+    if value == 0 or not np.isfinite(value) or 1e-3 <= abs(value) < 1e5:
+        return f"{value:.{digits}g}".replace("-", "−")
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    whole, _, rest = mantissa.partition(".")
+    rest = rest.rstrip("0") or "0"
+    power = str(int(exponent)).translate(RAISED)
+    return f"{whole}.{rest} × 10{power}".replace("-", "−")

@@ -38,7 +38,14 @@ from orchestrator.physics.constants import (
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import DEFAULT, LAWS, law
 from orchestrator.physics.onset import Onset, of_grains
-from orchestrator.physics.reported import Interval, compared, every_unit, has_no_law
+from orchestrator.physics.reported import (
+    Interval,
+    compared,
+    compared_range,
+    every_unit,
+    has_no_law,
+    in_units,
+)
 from orchestrator.physics.threshold import (
     AUTO,
     LAWS_OF,
@@ -234,7 +241,21 @@ def _reported(table: Table) -> Table:
             by_law.append((own, holds & is_asked))
     with np.errstate(all="ignore"):
         interval = Interval.tested(table, ustar).or_of_laws(by_law)
-        return interval.columns(flow) | compared(flow, ustar)
+        made = interval.columns(flow) | compared(flow, ustar)
+        ends = compared_range(made, ustar, table["usable"])
+        for end, at in zip(("_low", "_high"), ends, strict=True):
+            made |= in_units(at, flow, end, "compared_")
+    return made | {"advised": _advised(table)}
+
+
+def _advised(table: Table) -> NDArray[Any]:
+    """Which number of each row is advised, by itself: points are asked one by one."""
+    names = [*verdict.COLUMNS, "rho_f_kg_m3", "nu_m2_s", "compared_level_ustar_m_s"]
+    columns = {name: table[name].tolist() for name in names}
+    columns["force_law"] = table["law"].tolist()
+    cells = zip(*columns.values(), strict=True)
+    rows = [dict(zip(columns, row, strict=True)) for row in cells]
+    return np.array([verdict.advised([row]) for row in rows], object)
 
 
 def _judge(table: Table, against: Sequence[Sequence[Reason]]) -> None:

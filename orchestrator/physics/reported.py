@@ -29,9 +29,10 @@ REPORTED = {
 """Quantities by which thresholds are reported, with the unit in names of columns."""
 OF_CHANNELS = ("depth", "discharge")
 """Those of `REPORTED` that a channel alone has, of the calculator."""
-MEASURED, NUMERICAL, SEEDS, OF_LAWS = (
+MEASURED, NUMERICAL, CHOICES, SEEDS, OF_LAWS = (
     "measured thresholds",
     "numerical",
+    "numerical and choices",
     "seeds",
     "force laws",
 )
@@ -303,3 +304,57 @@ def compared(
         word = "measured_" if end else "compared_"
         made |= in_units(there, table, end, word + which)
     return made
+
+
+def compared_range(
+    columns: Any, ustar: FloatArray, usable: BoolArray, which: str = ""
+) -> tuple[FloatArray, FloatArray]:
+    """Find the intervals of flows with other thresholds in place of computed ones.
+
+    Each contains the flow, the computed one, the ends of what was measured, and the
+    interval of the computed one: as it is where it is of measured thresholds or of
+    force laws, else in proportion, since such an error is relative. Of a computed flow
+    that is not usable nothing is left but what was measured.
+
+    Parameters
+    ----------
+    columns
+        The columns of `compared` and of the intervals of the computed flows.
+    ustar
+        The computed flows, m/s, shape (n,).
+    usable
+        Whether these are usable, shape (n,).
+    which
+        ``first_`` for the flows that move the first grains.
+
+    Returns
+    -------
+    low, high : ndarray
+        Friction velocities, m/s; NaN where an end is open, or there is no flow.
+    """
+    there, low, high, least, most = (
+        np.asarray(columns[name], float)
+        for name in (
+            f"compared_{which}ustar0_m_s",
+            f"{which}ustar0_low_m_s",
+            f"{which}ustar0_high_m_s",
+            f"measured_{which}ustar0_low_m_s",
+            f"measured_{which}ustar0_high_m_s",
+        )
+    )
+    of = np.asarray(columns["interval_of"], object).astype(str)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        scale = np.where(np.isin(of, [MEASURED, IN_GAS, OF_LAWS]), 1.0, there / ustar)
+    is_known = np.isfinite(low) | np.isfinite(high)
+    own = np.where(usable, ustar, np.nan)
+    found = []
+    for end, of_rows, outer, beyond in (
+        (low * scale, least, np.fmin, -np.inf),
+        (high * scale, most, np.fmax, np.inf),
+    ):
+        # an end that is open stays open
+        at = np.where(is_known & ~np.isfinite(end), beyond, end)
+        held = np.where(usable, outer(outer(at, own), there), np.nan)
+        held = outer(held, of_rows)
+        found.append(np.where(np.isfinite(held) & np.isfinite(there), held, np.nan))
+    return found[0], found[1]

@@ -17,7 +17,8 @@ from orchestrator.physics.beside import (
     SUSTAINED,
 )
 from orchestrator.physics.curves import GAMMA
-from orchestrator.physics.fluids import is_gas
+from orchestrator.physics.fluids import is_gas, is_like_paper
+from orchestrator.physics.threshold import LAWS_OF
 from orchestrator.physics.velocity import LAMINAR_BELOW, laminar
 
 Word = Literal[
@@ -36,6 +37,21 @@ SLOPE_TOLERANCE_DEG = 1e-6
 """By how much a slope may be beyond the steepest one, deg: round-off."""
 EXPOSED_FROM = 0.25
 """Part of a grain over the tops of its neighbours from which it is exposed."""
+Advised = Literal["model", "corrected", "both"]
+"""Which of the two numbers beside each other a reader should take."""
+MODEL: Advised = "model"
+WITH_MEASURED: Advised = "corrected"
+BOTH: Advised = "both"
+"""Of the article's gas and laws, with which models are compared."""
+ADVISED: Mapping[str, str] = {
+    "advised": (
+        "which number the page advises, one for all rows of a study: model, the "
+        "computed one; corrected, the one with a measured critical Shields number or "
+        "that of a formula (columns compared_...), where it corrects a usable row; "
+        "both, of the article's gas and laws, and where some rows have no such number"
+    ),
+}
+"""The column of `advised`."""
 NOT_REACHED = "not reached: the grain has not moved"
 """Why a grain has no threshold."""
 COLUMNS: Mapping[str, str] = {
@@ -292,3 +308,34 @@ def columns(
         remedies = dict.fromkeys(each.remedy for each in against if each.remedy)
         made["remedy"].append("; ".join(remedies))
     return made
+
+
+def advised(rows: Iterable[Mapping[Any, Any]]) -> Advised:
+    """Choose which number of each threshold of a study a reader should take.
+
+    Parameters
+    ----------
+    rows
+        All thresholds of the study, with their verdicts, the columns of their grains
+        and fluids, and the friction velocity of one grain on a level bed as measured.
+
+    Returns
+    -------
+    str
+        One for all of them, so that rows can be compared: the model's, unless it is
+        corrected at one of them; both of the article's gas and laws, and where a
+        usable row cannot be corrected.
+    """
+    usable = [row for row in rows if row["verdict"] != UNUSABLE]
+    has_other = [row["compared_level_ustar_m_s"] > 0 for row in usable]
+    if any(map(_is_of_article, usable)) and any(has_other):
+        return BOTH
+    if not any(row["verdict"] == CORRECTED for row in usable):
+        return MODEL
+    return WITH_MEASURED if all(has_other) else BOTH
+
+
+def _is_of_article(row: Mapping[Any, Any]) -> bool:
+    """Whether a threshold is of the article's gas, or by its laws."""
+    fluid = float(row["rho_f_kg_m3"]), float(row["nu_m2_s"])
+    return is_like_paper(*fluid) or row["force_law"] in LAWS_OF["transition"]

@@ -12,12 +12,11 @@ from orchestrator.digits import percent
 from orchestrator.fidelity import crest
 from orchestrator.grains.pile import Pile
 from orchestrator.physics.constants import GRAIN_COLUMNS
-from orchestrator.physics.fluids import is_gas
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import MEASURED_SOURCE, wilcock_crowe_hiding
-from orchestrator.physics.verdict import USABLE
+from orchestrator.physics.verdict import UNUSABLE, USABLE, WITH_MEASURED
 from orchestrator.report import counted, labels, sheets, single, theory
-from orchestrator.report.card import Card, Mark, Number, Worth
+from orchestrator.report.card import MOST_NUMBERS, Card, Mark, Number, Worth
 from orchestrator.report.results import (
     Results,
     measured_hills,
@@ -35,6 +34,7 @@ from orchestrator.report.subjects import (
     place_of_file,
     solid,
 )
+from orchestrator.study import fields
 from orchestrator.study.profile import WITH_X
 from orchestrator.study.shapes import SHAPES
 from orchestrator.tables.facts import packs_grains
@@ -48,8 +48,16 @@ NONE = Card(
     Worth("bad", "no answer yet", "No case has given a result."),
 )
 """The card of a study without results."""
-NUMBERS = "load steps, count and the numerical error of the method"
-"""What the numerical interval of a share of a bed is of."""
+NUMBERS = "the numerical error of the method, load steps and count"
+"""What the numerical interval of a fraction of a bed is of."""
+FIRST = "the numerical error of the method and the load step"
+"""What that of the first motion is of."""
+SHELTER = ("obstacles", "spacing", "forms")
+"""Columns of what shelters a bed."""
+MIXTURE = ("sizes",)
+"""Columns of what a bed is made of, whose beds are never put into one range."""
+FLUIDS = ("rho_f_kg_m3", "nu_m2_s")
+"""The same of the fluid."""
 
 
 @lru_cache(maxsize=1)
@@ -129,14 +137,14 @@ def is_one_grain(grains: pd.DataFrame) -> bool:
 
 
 def _of_bed(row: pd.Series, results: Results) -> Card:
-    """The card of one bed: where motion starts, the first grains, a share of them."""
+    """The card of one bed: the flow of a fraction, of the first motion, its place."""
     pile = results.plan.piles[str(row["scene_id"])]
     told = single.quantity_of_row(row)
     return Card(
         _question(row, pile, told),
         _scene(row, pile, results),
         tuple(_numbers_of_bed(row, pile, results, told)),
-        single.source(row, told, "first_"),
+        single.source(row),
         _worth(row),
     )
 
@@ -147,7 +155,7 @@ def _worth(row: pd.Series, few: bool = False) -> Worth:
     if worth.mark == "bad" or row["seeds"] == row["of_seeds"]:
         return worth
     word = f"usable, with gaps: {row['seeds']} of {row['of_seeds']} beds"
-    advice = "They are replicates; the table says what is against the others."
+    advice = "The beds are replicates; the table has the reason against the others."
     return Worth("care", word, advice)
 
 
@@ -156,12 +164,16 @@ def _question(row: pd.Series, pile: Pile, told: ReportedQuantity) -> str:
     bed = pile.bed
     name = kind_of_grain(float(row["d_m"]))
     if bed.profile:
-        return f"When does the {name} of {bed.profile.name} start to move, and where?"
-    grains = f"{name} of {length(float(row['d_m']))}"
-    shape = bed.form.word
+        return (
+            f"At what {told.flow} does the {name} of {bed.profile.name} start to move, "
+            "and where?"
+        )
+    grains = f"{length(float(row['d_m']))} {name}"
+    where = "" if single.is_level(row) else ", and where"
+    shape = f"this {bed.form.word}"
     if bed.forms > 1:
-        shape = f"train of {bed.forms} {bed.form.words}"
-    return f"At which {told.flow} does a {shape} of {grains} start to move?"
+        shape = f"this train of {bed.forms} {bed.form.words}"
+    return f"At what {told.flow} does {shape} of {grains} start to move{where}?"
 
 
 def _scene(row: pd.Series, pile: Pile, results: Results) -> str:
@@ -170,16 +182,16 @@ def _scene(row: pd.Series, pile: Pile, results: Results) -> str:
     line = pile.model.line
     first = float(line.x[1])
     last = float(line.x[-2])
-    grains = f"{solid(float(row['rho_sol_kg_m3']))} of {length(float(row['d_m']))}"
+    grains = _grains(row)
     size = f"{length(last - first)} long"
     if single.is_level(row):
         shape = f"level bed, {size}"
     elif bed.profile:
         shape = f"{bed.profile.name}, {size}, {length(float(line.h))} high"
     else:
-        slope = f"{bed.slope_deg:g}° windward"
-        shape = f"{length(bed.height)} high, {slope}"
-    count = f"{row['count']:.0f} counted grains"
+        slope = f"windward face {bed.slope_deg:g}°"
+        shape = f"{bed.form.word} {length(bed.height)} high, {slope}"
+    count = f"{row['count']:.0f} exposed grains"
     if not packs_grains(row):
         asked = results.plan.decisions[str(row["scene_id"])].asked
         count = "no grains are packed, as the study asks"
@@ -202,61 +214,75 @@ def _scene(row: pd.Series, pile: Pile, results: Results) -> str:
     return f"{shape}; {grains}; {count}; in {within}."
 
 
+def _grains(row: pd.Series) -> str:
+    """What the grains of a bed are, in words."""
+    what = solid(float(row["rho_sol_kg_m3"]))
+    size = length(float(row["d_m"]))
+    return f"{what} grains of {size}" if what.isalpha() else f"grains of {size}, {what}"
+
+
 def _numbers_of_bed(
     row: pd.Series, pile: Pile, results: Results, told: ReportedQuantity
 ) -> Iterator[Number]:
-    """Where motion starts, the flow of the first grains, and that of a share."""
+    """The flow of a fraction, that of the first motion, and its place."""
+    if row["verdict"] == UNUSABLE:
+        taken = single.take_this(row, told)
+        if taken is not None:
+            yield taken
+    yield share(row, told)
     first = single.known_number(row["first_ustar0_m_s"])
     has_place = first > 0 and not single.is_level(row)
-    if has_place:
-        yield _place(row, pile, results)
     if first > 0:
         yield _first_motion(row, pile, told)
-    yield share(row, told)
-    if not has_place:
-        yield ustar_number(row)
+    if has_place:
+        yield _place(row, pile, results)
 
 
 def _first_motion(row: pd.Series, pile: Pile, told: ReportedQuantity) -> Number:
     """The flow that moves the first grains, with its interval."""
-    of_what = single.interval_of(row, "load step and the numerical error of the method")
-    meaning = f"{told.name} that moves the first grains"
-    place = single.place_of_quantity(told, row)
+    meaning = f"{single.threshold_name(told)}, first motion"
+    note = ""
     if crest.has_sharp_crest(pile.scene):
-        place += f"; a finer first cell moves u*₀ by {crest.told(crest.FIRST_GRAIN)}"
-    return single.reported_number(row, told, meaning, place, of_what, "first_")
+        change = crest.told(crest.FIRST_GRAIN)
+        note = f"a finer mesh at the crest changes u*₀ by {change}"
+    return single.reported_number(row, told, meaning, note, FIRST, "first_")
 
 
 def _place(row: pd.Series, pile: Pile, results: Results) -> Number:
     """Where motion starts, and where else it may within the numerical error."""
     line = pile.model.line
-    crest = float(line.crest[0])
+    top = float(line.crest[0])
     x = float(row["first_x_m"])
     low, high = _places(row, results)
     of_what = "places whose threshold is within the numerical error of the lowest"
+    meaning = "point of first motion"
+    if abs(x - top) <= float(row["d_m"]):
+        meaning += ": the crest"
+    is_grey = row["verdict"] == UNUSABLE
     profile = pile.bed.profile
     if profile:
-        top = place_of_file(float(profile.place(crest)), profile)
+        at = place_of_file(float(profile.place(top)), profile)
         return Number(
             x,
             "m",
-            "x where motion starts",
-            f"the crest of {profile.name} is at x = {top} m",
+            f"x at the {meaning}",
+            f"the crest of {profile.name} is at x = {at} m",
             low=low,
             high=high,
             interval_of=of_what,
             decimals=digits_of_place(profile),
+            is_grey=is_grey,
         )
     unit, scale = ("m", 1.0) if abs(line.x[-2]) >= 1 else ("mm", 1e3)
-    top = f"the crest is at {scale * crest:.3g} {unit}"
     return Number(
         scale * x,
         unit,
-        "along the bed: here motion starts",
-        f"from the toe; {top}",
+        meaning,
+        f"from the toe; the crest is at {scale * top:.3g} {unit}",
         low=scale * low,
         high=scale * high,
         interval_of=of_what,
+        is_grey=is_grey,
     )
 
 
@@ -274,8 +300,8 @@ def _places(row: pd.Series, results: Results) -> tuple[float, float]:
     return (float(near.min()), float(near.max())) if len(near) else (math.nan, math.nan)
 
 
-def share(row: pd.Series, told: ReportedQuantity) -> Number:
-    """Make the number of the flow at which a share of a bed has moved.
+def share(row: pd.Series, told: ReportedQuantity, of_what: str = "") -> Number:
+    """Make the number of the flow at which a fraction of a bed is entrained.
 
     Parameters
     ----------
@@ -283,6 +309,8 @@ def share(row: pd.Series, told: ReportedQuantity) -> Number:
         A threshold with the columns of its scene, seeds as one.
     told
         What its flow is told by.
+    of_what
+        Which bed it is of; empty of the only one.
 
     Returns
     -------
@@ -290,12 +318,12 @@ def share(row: pd.Series, told: ReportedQuantity) -> Number:
         With its interval.
     """
     part = percent(row["fraction"])
-    what = "of the grains" if packs_grains(row) else "of the bed"
-    of_what = single.interval_of(row, NUMBERS)
-    meaning = f"{told.name} that moves {part} {what}"
-    return single.reported_number(
-        row, told, meaning, single.place_of_quantity(told, row), of_what
-    )
+    moved = "entrained" if packs_grains(row) else "of the bed in motion"
+    meaning = f"{single.threshold_name(told)}, {part} {moved}"
+    if of_what:
+        meaning += f": {of_what}"
+    place = single.place_of_quantity(told, row)
+    return single.reported_number(row, told, meaning, place, NUMBERS)
 
 
 def ustar_number(row: pd.Series) -> Number:
@@ -311,34 +339,100 @@ def ustar_number(row: pd.Series) -> Number:
     Number
         With its interval.
     """
-    note = "√(τ_b/ρ), the bed shear stress as a speed"
-    return single.reported_number(row, USTAR, USTAR.name, note)
+    return single.reported_number(row, USTAR, USTAR.name, "√(τ_b/ρ)", NUMBERS)
 
 
 def _of_several(rows: pd.DataFrame, results: Results) -> Card:
-    """The card of several beds: the least and the largest flow, and what is usable."""
+    """The card of several beds, by what varies among them."""
     told = sheets.quantity_of_rows(rows)
+    telling = labels.varying(results.at_fraction, "fraction")
+    every = results.joined("pile_threshold")
+    worth = _worth_of_many(every, rows)
+    if _are_unlike(results.at_fraction, telling):
+        return _of_unlike(rows, results, told, telling, worth)
     usable = rows[valid(rows)]
     shown = usable if len(usable) else rows
-    shown = shown.sort_values(told.column(), kind="stable")
-    telling = labels.varying(results.at_fraction, "fraction")
+    by = single.advised_column(shown.iloc[0], told)
+    shown = shown.sort_values(by, kind="stable")
     numbers = _range(shown, told, telling)
-    every = results.joined("pile_threshold")
-    scenes = every["scene_id"].nunique()
-    count = int(every["usable"].sum())
-    third = _first_of_several(shown, results, told, telling)
-    if third is None or count < len(every):
-        third = _usable_number(count, len(every))
-    worth = _worth_of_many(shown, count, len(every))
+    first = _first_of_several(shown, results, told, telling)
+    if first is not None:
+        numbers.append(first)
     advice = f"{worth.advice} {_no_difference(shown, told)}".strip()
     return Card(
-        f"At which {told.flow} do {scenes} {_common_shape(results.at_fraction)} start "
-        "to move?",
+        f"At what {told.flow} does {_common_shape(results.at_fraction)} start to move, "
+        f"by {_axes(telling)}?",
         _span_of(results.at_fraction),
-        (*numbers, third),
-        single.source(shown.iloc[0], told),
+        tuple(numbers),
+        single.source(shown.iloc[0]),
         replace(worth, advice=advice),
     )
+
+
+def _are_unlike(rows: pd.DataFrame, telling: Sequence[str]) -> bool:
+    """Whether beds differ in fluid, method or mixture: they have no common range."""
+    if any(rows[name].nunique() > 1 for name in FLUIDS):
+        return True
+    return any(
+        name in MIXTURE or name == "asked" or name in fields.OF_METHOD
+        for name in telling
+    )
+
+
+def _of_unlike(
+    rows: pd.DataFrame,
+    results: Results,
+    told: ReportedQuantity,
+    telling: Sequence[str],
+    worth: Worth,
+) -> Card:
+    """The card of beds of several fluids, methods or mixtures: a number for each."""
+    rows = rows.loc[sorted(rows.index)]
+    numbers = []
+    if not rows["usable"].any():
+        rows_of_level = (row for _, row in rows.iterrows())
+        taken = (single.take_this(row, told) for row in rows_of_level)
+        numbers += [next((each for each in taken if each is not None), None)]
+    # of each fluid and mixture by the first method of the study
+    keys = [*FLUIDS, *MIXTURE, "bed_shape", "alpha_deg"]
+    keys = [name for name in keys if name in rows]
+    firsts = rows.drop_duplicates(keys)
+    order = pd.concat([firsts, rows]).drop_duplicates(["scene_id"])
+    for _, row in order.iterrows():
+        numbers.append(share(row, told, _name_of(row, telling)))
+    shown = [each for each in numbers if each is not None]
+    left = len(shown) - MOST_NUMBERS
+    source = single.source(rows.iloc[0])
+    if left > 0:
+        source += f" The table has {left} more: fluids, methods and mixtures each."
+    what = "these beds"
+    if any(name in telling for name in MIXTURE):
+        what = "these mixtures"
+    return Card(
+        f"What {single.threshold_name(told).removeprefix('threshold ')} mobilises "
+        f"{what}, by {_axes(telling)}?",
+        _span_of(results.at_fraction),
+        tuple(shown[:MOST_NUMBERS]),
+        source,
+        worth,
+    )
+
+
+def _name_of(row: pd.Series, telling: Sequence[str]) -> str:
+    """What a bed among others is called: its group, and its method."""
+    group = str(row["group"])
+    if not group or "; " in group:
+        return ", ".join(labels.told(row, list(telling)[:3]))
+    methods = [name for name in telling if name in ("method", "asked")]
+    return ", ".join([f"“{group}”", *labels.told(row, methods)])
+
+
+def _axes(telling: Sequence[str]) -> str:
+    """What several beds or grains differ in, in words."""
+    names = [labels.info_of(name).label for name in telling[:3]]
+    if len(names) == 1:
+        return names[0]
+    return f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _first_of_several(
@@ -355,12 +449,13 @@ def _first_of_several(
     if starts.empty:
         return None
     row = starts.loc[starts["first_ustar0_m_s"].idxmin()]
-    bed = results.plan.piles[str(row["scene_id"])].bed
-    number = _first_motion(row, results.plan.piles[str(row["scene_id"])], told)
+    pile = results.plan.piles[str(row["scene_id"])]
+    number = _first_motion(row, pile, told)
     what = ", ".join(labels.told(row, list(telling)[:3]))
-    where = counted.spot(float(row["first_x_m"]), bed)
-    meaning = f"least {told.name} that moves the first grains, {where}: {what}"
-    return replace(number, meaning=meaning)
+    where = counted.spot(float(row["first_x_m"]), pile.bed)
+    meaning = f"lowest {single.threshold_name(told)}, first motion: {what}"
+    note = "; ".join(filter(None, [f"it starts {where}", number.note]))
+    return replace(number, meaning=meaning, note=note)
 
 
 def _no_difference(shown: pd.DataFrame, told: ReportedQuantity) -> str:
@@ -375,18 +470,18 @@ def _no_difference(shown: pd.DataFrame, told: ReportedQuantity) -> str:
     if len(shown) < 2 or not apart < error:
         return ""
     return (
-        f"The beds show no difference: the least and the most {told.name} are "
+        f"The beds show no difference: the lowest and the highest {told.name} are "
         f"{percent(apart)} apart in stress, less than their numerical errors together, "
         f"{percent(error)}."
     )
 
 
 def _common_shape(rows: pd.DataFrame) -> str:
-    """What several beds are, in the plural."""
+    """What several beds are, in the singular."""
     shapes = set(rows["bed_shape"])
     if rows["profile"].notna().any() or len(shapes) > 1:
-        return "beds"
-    return SHAPES[str(shapes.pop())].words
+        return "a bed"
+    return f"a {SHAPES[str(shapes.pop())].word}"
 
 
 def _span_of(rows: pd.DataFrame) -> str:
@@ -424,8 +519,8 @@ def _range(
     if len(rows) == 1:
         return [_end_of_range(rows.iloc[0], told, telling, "")]
     return [
-        _end_of_range(rows.iloc[0], told, telling, "least "),
-        _end_of_range(rows.iloc[-1], told, telling, "most "),
+        _end_of_range(rows.iloc[0], told, telling, "lowest "),
+        _end_of_range(rows.iloc[-1], told, telling, "highest "),
     ]
 
 
@@ -434,28 +529,13 @@ def _end_of_range(
 ) -> Number:
     """The least or the largest flow of several beds or grains."""
     what = ", ".join(labels.told(row, list(telling)[:3]))
-    moves = "moves a grain"
     if "fraction" in row:
-        moves = f"moves {percent(row['fraction'])}"
-    is_bed = "fraction" in row
-    of_what = single.interval_of(row, NUMBERS if is_bed else single.LOAD_STEP)
-    meaning = f"{which}{told.name} that {moves}: {what}"
-    return single.reported_number(
-        row, told, meaning, single.place_of_quantity(told, row), of_what
-    )
-
-
-def _usable_number(count: int, of: int) -> Number:
-    """How many thresholds are usable."""
-    note = "" if count == of else "the tables give the reason for each other one"
-    return Number.counted(count, of, "thresholds are usable", note, _mark_of(count, of))
-
-
-def _mark_of(count: int, of: int) -> Mark:
-    """What a count of usable thresholds is worth."""
-    if count == of:
-        return "good"
-    return "care" if count else "bad"
+        number = share(row, told, what)
+    else:
+        meaning = f"{single.threshold_name(told)}: {what}"
+        place = single.place_of_quantity(told, row)
+        number = single.reported_number(row, told, meaning, place, single.LOAD_STEP)
+    return replace(number, meaning=f"{which}{number.meaning}")
 
 
 # mixtures
@@ -474,25 +554,31 @@ def _of_mixture(row: pd.Series, results: Results) -> Card:
     spread = Number(
         float(stress[0]),
         "Pa",
-        f"stress that moves {percent(row['fraction'])} of the finest size, and of the "
-        "coarsest",
-        f"{sizes[0]:.3g} mm and {sizes[-1]:.3g} mm; beside it: the function that "
-        "Wilcock and Crowe (2003) fitted to transport, at the "
-        f"{'formula' if single.is_by_formula(row) else 'measured stress'} of d50",
+        f"bed shear stress, {percent(row['fraction'])} of the finest size entrained, "
+        "and of the coarsest",
+        f"{sizes[0]:.3g} mm and {sizes[-1]:.3g} mm; Wilcock and Crowe (2003) fitted a "
+        "function to transport, which is taken here with the stress of d₅₀ "
+        f"{single.with_threshold(row)}",
         last=float(stress[-1]),
-        compared=beside[0],
-        compared_last=beside[-1],
-        beside_is="formula",
+        other=beside[0],
+        other_last=beside[-1],
+        other_is="by Wilcock and Crowe",
+        is_grey=row["verdict"] == UNUSABLE,
     )
     told = single.quantity_of_row(row)
     flow = ustar_number(row) if told is STRESS else share(row, told)
     pile = results.plan.piles[str(row["scene_id"])]
     name = kind_of_grain(float(row["d_m"]))
+    taken = None
+    if row["verdict"] == UNUSABLE:
+        taken = single.take_this(row, STRESS)
+    numbers = (taken, all_sizes, spread, flow)
     return Card(
-        f"Which flow starts to move this {name}, and which sizes go first?",
+        f"What bed shear stress mobilises this {name} mixture, and which sizes go "
+        "first?",
         _scene(row, pile, results),
-        (all_sizes, spread, flow),
-        single.source(row, told),
+        tuple(filter(None, numbers))[:MOST_NUMBERS],
+        single.source(row),
         _worth(row, few=bool(here["few"].any())),
     )
 
@@ -526,17 +612,23 @@ def _of_grains(grains: pd.DataFrame) -> Card:
     told = sheets.quantity_of_rows(grains)
     usable = grains[valid(grains)]
     shown = usable if len(usable) else grains
-    shown = shown.sort_values("ustar0_m_s", kind="stable")
+    by = single.advised_column(shown.iloc[0], told)
+    shown = shown.sort_values(by, kind="stable")
     telling = labels.varying(grains, "bed")
+    fluids = [name for name in FLUIDS if grains[name].nunique() > 1]
+    numbers = _range(shown, told, telling)
+    if fluids:
+        # fluids are never put into one range
+        of_fluids = grains.drop_duplicates(fluids)[:MOST_NUMBERS]
+        numbers = [
+            _end_of_range(row, told, telling, "") for _, row in of_fluids.iterrows()
+        ]
     return Card(
-        f"At which {told.flow} does one grain start to move, by its size and bed?",
+        f"At what {told.flow} does a grain start to move, by {_axes(telling)}?",
         _span_of(grains),
-        (
-            *_range(shown, told, telling),
-            _usable_number(len(usable), len(grains)),
-        ),
-        single.source(shown.iloc[0], told),
-        _worth_of_many(shown, len(usable), len(grains)),
+        tuple(numbers),
+        single.source(shown.iloc[0]),
+        _worth_of_many(grains, grains),
     )
 
 
@@ -614,7 +706,7 @@ def _of_laws(results: Results, best: Sequence[theory.Line]) -> Card:
     return Card(
         "Which force law comes nearest to measured thresholds?",
         f"Nearest of {len(best)} laws: {law}. {_span_of(results.scenes)}",
-        (*numbers, _usable_number(count, of)),
+        tuple(numbers),
         f"{MEASURED_SOURCE[:1].upper()}{MEASURED_SOURCE[1:]}. {said}".strip(),
         Worth(mark, word, f"In water take {law}; in air see the caveats."),
     )
@@ -628,31 +720,49 @@ def _of_hills(hills: Sequence[tuple[float, pd.DataFrame]]) -> Card:
     if not all(rows["measured_verified"].all() for _, rows in hills):
         source_ += " Not every number was read in its source."
     return Card(
-        "Does the computed flow turn back behind a hill as it did in the wind tunnel?",
-        f"{len(hills)} hills of the wind-tunnel experiment RUSHIL; no grains move.",
+        "Does the model reproduce the separation bubble behind a hill?",
+        f"{len(hills)} hills of the wind-tunnel experiment RUSHIL, "
+        f"{len(first)} turbulence models; no grains.",
         tuple(_behind(aspect, rows) for aspect, rows in hills[:3]),
         source_,
         Worth(
-            "care", "usable, for flows", "Compare the models; no threshold is meant."
+            "care",
+            "usable, for flows",
+            "Compare the turbulence models; no threshold is meant.",
         ),
+        ("What was measured", "Can it be used?"),
     )
 
 
 def _behind(aspect: float, rows: pd.DataFrame) -> Number:
-    """How far the flow runs back behind a hill, by the first model and by all."""
+    """Where reversed flow ends behind a hill, by the first model and by all."""
     row = rows.iloc[0]
     model = labels.value("turbulence_model", row["turbulence_model"])
-    ends = rows["reattachment_over_h"].fillna(0.0)
     measured = single.known_number(row["measured_reattachment_over_h"])
+    own = single.known_number(row["reattachment_over_h"])
+    separated = rows[rows["reattachment_over_h"] > 0]
+    ends = separated["reattachment_over_h"]
+    hill = f"hill of half-length {aspect:g} h, by {model}"
+    others = [
+        labels.value("turbulence_model", name) for name in separated["turbulence_model"]
+    ]
+    tunnel = "the tunnel had no separation" if math.isnan(measured) else ""
+    if not own > 0:
+        note = f"by all {len(rows)} models"
+        if others:
+            note = f"{' and '.join(others)}: reattachment at {ends.min():.1f}"
+            note += f" … {ends.max():.1f} h" if len(ends) > 1 else " h"
+        note = "; ".join(filter(None, [note, tunnel]))
+        return Number(math.nan, "", f"separation, {hill}", note, word="none")
     return Number(
-        single.known_number(row["reattachment_over_h"]) if ends.iloc[0] else 0.0,
-        "heights",
-        f"behind the crest the flow runs back, of a hill of half length {aspect:g} h",
-        f"by {model}; 0: it runs back nowhere",
+        own,
+        "h",
+        f"reattachment behind the crest, {hill}",
+        tunnel,
         low=float(ends.min()),
         high=float(ends.max()),
-        interval_of=f"the {len(rows)} turbulence models",
-        compared=0.0 if math.isnan(measured) else measured,
+        interval_of=f"{len(ends)} of {len(rows)} turbulence models, which separate",
+        other=measured,
         decimals=1,
     )
 
@@ -674,25 +784,46 @@ def is_of_hills(results: Results) -> bool:
     return bool([*measured_hills(results)]) and not thresholds["usable"].any()
 
 
-def _worth_of_many(shown: pd.DataFrame, count: int, of: int) -> Worth:
-    """What the answers of several beds or grains are worth together."""
+def _worth_of_many(every: pd.DataFrame, shown: pd.DataFrame) -> Worth:
+    """What the answers of several beds or grains are worth together.
+
+    Parameters
+    ----------
+    every
+        All their thresholds.
+    shown
+        Those that the card is made of.
+    """
+    of = len(every)
+    count = int(every["usable"].sum())
     if not count:
         return single.worth(shown.iloc[0])
+    usable = shown[valid(shown)]
+    first = usable.iloc[0] if len(usable) else shown.iloc[0]
+    advised = first.get("advised")
+    # a correction is one of all rows
+    is_corrected = advised == WITH_MEASURED
+    with_what = single.with_threshold(*(row for _, row in usable.iterrows()))
     if count < of:
         word = f"usable, with gaps: {count} of {of} thresholds"
-        return Worth("care", word, "The others are marked, each with its reason.")
-    is_near = (shown["verdict"] == USABLE).tolist()
-    if all(is_near):
-        within = "All are within what was measured."
+        advice = "The others are grey; the reasons stand below the table."
+        if is_corrected:
+            advice = f"Numbers are those {with_what}. {advice}"
+        return Worth("care", word, advice)
+    outside = int((every["verdict"] != USABLE).sum())
+    if not outside:
+        within = "within what was measured"
         if any(single.is_by_formula(row) for _, row in shown.iterrows()):
-            within = "The interval of each contains what was measured or a formula."
-        return Worth("good", "usable", within)
-    outside = len(is_near) - sum(is_near)
-    first = shown.iloc[0]
-    what = "wind" if is_gas(float(first["rho_f_kg_m3"])) else "flow"
-    value = "value of the formula" if single.is_by_formula(first) else "measured value"
+            within = "such that their interval contains what was measured or a formula"
+        return Worth("good", "usable", f"All {of} thresholds are {within}.")
     advice = (
-        f"{outside} of {len(is_near)} are outside what was measured on level beds: for "
-        f"a {what} take the {value}, to compare beds the computed ones."
+        f"Take all {of} thresholds as shown, {with_what}. At {outside} of them the "
+        "model alone lies outside what was measured on level beds."
     )
+    if not is_corrected:
+        advice = (
+            f"At {outside} of {of} thresholds the model lies outside what was measured "
+            f"on level beds: for a flow in nature take the number {with_what}, to "
+            "compare models that of the model."
+        )
     return Worth("care", "usable, with a correction", advice)

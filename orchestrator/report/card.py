@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from orchestrator.report.lines import BETWEEN, table
+from orchestrator.report.lines import BETWEEN, head_width, table
 
 Mark = Literal["good", "care", "bad"]
 """What an answer is worth: usable, usable with something, not usable."""
@@ -20,6 +20,8 @@ WIDTH = 79
 """Letters of a line in a terminal."""
 INDENT = "  "
 """What stands before the figures in a terminal."""
+MOST_LETTERS = 22
+"""Letters of a column of figures in a terminal; longer cells have several lines."""
 MOST_DIGITS = 9
 """Largest number of digits that tell two ends of an interval apart."""
 MOST_NUMBERS = 3
@@ -28,7 +30,7 @@ MOST_NUMBERS = 3
 
 @dataclass(frozen=True)
 class Number:
-    """A large figure of a card.
+    """A large figure of a card: the number that a reader should take.
 
     Attributes
     ----------
@@ -41,21 +43,31 @@ class Number:
     note
         A term of its meaning in plain words, or where it counts from.
     low, high
-        Ends of its tested interval in that unit; NaN where one is not known.
+        Ends of its one interval in that unit; NaN where one is not known.
     interval_of
-        What the interval is, such as ``the six force laws that hold``.
-    compared
-        The value to compare with, in that unit; NaN without one.
-    last
+        What the interval contains, such as ``the six force laws that hold``.
+    other
+        Another value in that unit to stand beside it; NaN without one.
+    other_is
+        What that value is called, such as ``model alone``.
+    other_low, other_high, other_interval_of
+        Its interval, where it stands with equal right.
+    value_is
+        What the number itself is called, where it stands with equal right.
+    last, other_last
         The other end of a range of numbers, NaN of one number.
-    compared_last
-        The value beside that end.
-    beside_is
-        What the value beside it is called: ``measured``, or ``formula``.
+    is_of_model
+        Whether the other value is the model's; else it is measured or of a formula.
+    is_grey
+        Whether the number is not usable.
+    is_measured
+        Whether it is what was measured, to be taken in place of the model's.
     decimals
         Digits behind the point; None for as many as the number needs.
     mark
         Of a number that is a verdict, which.
+    word
+        An answer in place of a number, such as ``none``.
     """
 
     value: float
@@ -65,12 +77,20 @@ class Number:
     low: float = math.nan
     high: float = math.nan
     interval_of: str = ""
-    compared: float = math.nan
+    other: float = math.nan
+    other_is: str = "measured"
+    other_low: float = math.nan
+    other_high: float = math.nan
+    other_interval_of: str = ""
+    value_is: str = ""
     last: float = math.nan
-    compared_last: float = math.nan
-    beside_is: str = "measured"
+    other_last: float = math.nan
+    is_of_model: bool = False
+    is_grey: bool = False
+    is_measured: bool = False
     decimals: int | None = None
     mark: Mark | None = None
+    word: str = ""
 
     @classmethod
     def counted(
@@ -96,8 +116,8 @@ class Number:
 
     @property
     def figure(self) -> str:
-        """The number as it is written."""
-        return self._written(self.value, self.last, "–")
+        """The number as it is written, or its word."""
+        return self.word or self._written(self.value, self.last, "–")
 
     @property
     def interval(self) -> str:
@@ -105,20 +125,34 @@ class Number:
 
         Its ends have more digits than the number where they would be written alike.
         """
-        has_low = math.isfinite(self.low)
-        has_high = math.isfinite(self.high)
-        if has_low and has_high:
-            return apart(self.low, self.high, self._digits, "f")
-        if has_low:
-            return f"above {self._one(self.low)}"
-        return f"below {self._one(self.high)}" if has_high else ""
+        return self._between(self.low, self.high)
+
+    @property
+    def other_interval(self) -> str:
+        """The interval of the other value as it is written."""
+        return self._between(self.other_low, self.other_high)
 
     @property
     def beside(self) -> str:
-        """The value beside it as it is written, without its unit; empty without one."""
-        if math.isnan(self.compared):
+        """The other value as it is written, without its unit; empty without one."""
+        if math.isnan(self.other):
             return ""
-        return self._written(self.compared, self.compared_last, "–")
+        return self._written(self.other, self.other_last, "–")
+
+    @property
+    def is_pair(self) -> bool:
+        """Whether both values stand with equal right."""
+        return bool(self.value_is and self.beside)
+
+    def _between(self, low: float, high: float) -> str:
+        """An interval with the digits of this figure."""
+        has_low = math.isfinite(low)
+        has_high = math.isfinite(high)
+        if has_low and has_high:
+            return apart(low, high, self._digits, "f")
+        if has_low:
+            return f"above {self._one(low)}, open"
+        return f"below {self._one(high)}, open" if has_high else ""
 
     def _written(self, first: float, last: float, between: str) -> str:
         """One number, or two where they differ."""
@@ -239,7 +273,7 @@ class Card:
     numbers: tuple[Number, ...]
     source: str
     worth: Worth
-    heads: tuple[str, str] = ("What it is compared with", "Can it be used?")
+    heads: tuple[str, str] = ("Where the numbers come from", "Can it be used?")
 
     def __post_init__(self) -> None:
         if len(self.numbers) > MOST_NUMBERS:
@@ -266,14 +300,16 @@ def lines(card: Card) -> Iterator[str]:
     yield from _numbers(card.numbers)
     yield ""
     word = card.worth.word
-    said = f"{DISCS[card.worth.mark]} {word[:1].upper()}{word[1:]}"
-    said += ":" if card.worth.advice else "."
-    advice = card.worth.advice
-    text = f"{said} {advice[:1].lower()}{advice[1:]}" if advice else said
-    yield from _wrapped(text, "  ", "    ")
-    if card.source:
+    said = f"{DISCS[card.worth.mark]} {word[:1].upper()}{word[1:]}."
+    yield from _wrapped(f"{said} {card.worth.advice}".strip(), "  ", "    ")
+    intervals = [*_intervals(card.numbers)]
+    if card.source or intervals:
         yield ""
-        yield from _wrapped(f"compared with: {card.source}", "  ", "    ")
+    for text in intervals:
+        yield from _wrapped(text, "  ", "    ")
+    if card.source:
+        head, _ = card.heads
+        yield from _wrapped(f"{head}: {card.source}", "  ", "    ")
 
 
 def _numbers(numbers: Sequence[Number]) -> Iterator[str]:
@@ -281,28 +317,46 @@ def _numbers(numbers: Sequence[Number]) -> Iterator[str]:
     if not numbers:
         return
     has_interval = any(number.interval for number in numbers)
-    beside_is = [number.beside_is for number in numbers if number.beside]
-    has_beside = bool(beside_is)
-    heads = ["answer"]
+    others = [*dict.fromkeys(each.other_is for each in numbers if each.beside)]
+    pairs = [*dict.fromkeys(each.value_is for each in numbers if each.is_pair)]
+    heads = [pairs[0] if len(pairs) == 1 else "answer"]
     heads += ["interval"] if has_interval else []
-    heads += beside_is[:1]
+    heads += ["other value" if len(others) > 1 else others[0]] if others else []
     rows = []
     for number in numbers:
         cells = [f"{number.figure} {number.unit}".strip()]
         cells += [number.interval or "-"] if has_interval else []
-        cells += [number.beside or "-"] if has_beside else []
-        told = [number.meaning]
-        if number.note:
-            told.append(number.note)
-        if number.interval and number.interval_of:
-            told.append(f"interval: {number.interval_of}")
+        beside = number.beside or "-"
+        if len(others) > 1 and number.beside:
+            beside = f"{beside} ({number.other_is})"
+        cells += [beside] if others else []
+        told = filter(None, [number.meaning, number.note])
         rows.append([*cells, "; ".join(told)])
     shown = [[*heads, ""], *rows] if len(heads) > 1 else rows
     *columns, _ = zip(*shown, strict=True)
-    widths = [max(map(len, column)) for column in columns]
+    widths = [
+        max(min(max(map(len, column[-len(rows) :])), MOST_LETTERS), head_width(head))
+        for head, column in zip(heads, columns, strict=True)
+    ]
     left = WIDTH - len(INDENT) - sum(width + BETWEEN for width in widths)
     for line in table(shown, widths=[*widths, left]):
         yield f"{INDENT}{line}".rstrip()
+
+
+def _intervals(numbers: Sequence[Number]) -> Iterator[str]:
+    """What the intervals of some figures contain, once each."""
+    of_what = [each.interval_of for each in numbers if each.interval]
+    told = [*dict.fromkeys(filter(None, of_what))]
+    for each in numbers:
+        if each.interval and each.interval_of in told:
+            told.remove(each.interval_of)
+            is_only = len({*of_what}) == 1
+            of = f"{each.figure} {each.unit}".strip()
+            head = "Interval" if is_only else f"Interval of {of}"
+            yield f"{head}: {each.interval_of}."
+        if each.is_pair and each.other_interval:
+            of = f"{each.beside} {each.unit}"
+            yield f"Interval of {of}, {each.other_is}: {each.other_interval}."
 
 
 def _wrapped(text: str, first: str = "", later: str = "") -> list[str]:
@@ -349,6 +403,6 @@ def remark_lines(remarks: Iterable[Remark]) -> Iterator[str]:
     """
     listed = list(remarks)
     if listed:
-        yield "Before you use it"
+        yield "Caveats"
     for remark in listed:
         yield from _wrapped(f"{remark.head} {remark.text}".strip(), "  - ", "    ")

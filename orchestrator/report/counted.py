@@ -83,11 +83,11 @@ def spot(x: float, bed: PileBed) -> str:
     Returns
     -------
     str
-        On a profile its x in the file, else its distance from the toe.
+        On a profile its x in the file, else its distance from the toe of the form.
     """
     if bed.profile:
         return f"at x = {place(x, bed)} m"
-    return f"{length(x)} from the toe"
+    return f"at {length(x)}"
 
 
 def way_up(profile: Profile) -> tuple[str, str] | None:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from orchestrator.digits import plain
 from orchestrator.report.card import apart
 from orchestrator.study import fields
 from orchestrator.study.declare import Info
@@ -19,7 +20,7 @@ WIDTH = 52
 DIGEST = re.compile(r" \([0-9a-f]{12}\)$")
 """What stands behind the file of a profile in tables."""
 OTHERS = {
-    "fraction": Info("part that has moved", "n/N", "%"),
+    "fraction": Info("fraction entrained", "n/N", "%"),
     "by": Info("by"),
     "asked": Info("method asked for"),
 }
@@ -197,12 +198,13 @@ def amount(value: float, unit: str) -> str:
     if unit in ("d", "h"):
         return ratio_in_words(value, unit)
     if unit == "m":
-        return f"{value:.4g} m" if abs(value) >= 1 else f"{1e3 * value:.4g} mm"
+        is_long = abs(value) >= 1
+        return f"{plain(value, 4)} m" if is_long else f"{plain(1e3 * value, 4)} mm"
     if unit == "%":
-        return f"{100.0 * value:.4g} %"
+        return f"{plain(100.0 * value, 4)} %"
     if unit == "°":
-        return f"{value:.4g}°"
-    return f"{value:g} {unit}".rstrip()
+        return f"{plain(value, 4)}°"
+    return f"{plain(value, 6)} {unit}".rstrip()
 
 
 def interval(low: float, high: float, digits: int = 3, form: str = "#g") -> str:

@@ -1,5 +1,6 @@
 """Tables of texts for a terminal and for the documents."""
 
+import textwrap
 from collections.abc import Sequence
 from io import StringIO
 
@@ -55,3 +56,29 @@ def table(
     console = Console(file=out, width=WIDEST, color_system=None, force_jupyter=False)
     console.print(drawn)
     return [line.rstrip() for line in out.getvalue().splitlines()]
+
+
+def head_width(head: str, most: int = 2) -> int:
+    """Find how wide a column must be for its head to have few lines.
+
+    Parameters
+    ----------
+    head
+        The head.
+    most
+        Lines that it may have.
+
+    Returns
+    -------
+    int
+        Letters.
+
+    Examples
+    --------
+    >>> head_width("wind at 10 m, m/s"), head_width("u*")
+    (10, 2)
+    """
+    width = max(map(len, head.split()), default=1)
+    while len(textwrap.wrap(head, width, break_on_hyphens=False)) > most:
+        width += 1
+    return width

@@ -1,6 +1,6 @@
 """The tables of a page: thresholds, force laws, parameters and fidelities."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,6 +12,14 @@ from orchestrator.fidelity.fidelities import FIDELITIES, LOCAL, OWN_NUMBERS, PAI
 from orchestrator.grains.threshold import STEP
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import LAWS
+from orchestrator.physics.verdict import (
+    BOTH,
+    COMPARED,
+    CORRECTED,
+    MODEL,
+    UNUSABLE,
+    USABLE,
+)
 from orchestrator.report import counted, labels, single
 from orchestrator.report.results import Results, measured_hills, split_by
 from orchestrator.report.subjects import (
@@ -25,19 +33,30 @@ from orchestrator.report.subjects import (
 from orchestrator.study import fields
 from orchestrator.tables.facts import needs_run
 
-HEADS = {WIND: "wind at 10 m", MEAN: "mean velocity", STRESS: "stress on the bed"}
+HEADS = {WIND: "wind at 10 m", MEAN: "mean velocity", STRESS: "bed shear stress"}
 """Quantities of flows in the heads of columns."""
 TITLES = {
-    WIND: "How strong a wind moves {}",
-    MEAN: "How fast a flow moves {}",
-    STRESS: "How much stress moves {}",
+    WIND: "Threshold wind",
+    MEAN: "Threshold mean velocity",
+    STRESS: "Threshold bed shear stress",
 }
 """Titles of tables of thresholds."""
-PART = "part that has moved"
+PART = "fraction entrained"
+FIRST_MOTION = "first motion"
+VERDICT = "verdict"
+WORDS: Mapping[str, str] = {
+    USABLE: "usable",
+    CORRECTED: "with a correction",
+    COMPARED: "to compare",
+    UNUSABLE: "not usable",
+}
+"""Verdicts in the cells of a table."""
 MIXED = 2.0
 """Least ratio of sizes that are told apart."""
+MOST_ROWS = 40
+"""Thresholds that are listed each; of more the ranges are told."""
 MOST_LISTED = 12
-"""Piles, or values of a parameter, that are listed each; of more the range is told."""
+"""Values of a parameter that are listed each; of more the range is told."""
 EACH = ("alpha_deg", "d_m", "force_law")
 """Columns that each row of a table of single piles tells."""
 SERIES = ("profile", "d_m", "force_law")
@@ -64,6 +83,10 @@ class Sheet:
         Terms of the heads in plain words.
     file
         The file that has these rows with more columns.
+    notes
+        What the numbers in brackets of its last column say, from 1 on.
+    main
+        The head of the column that a reader should take; empty without one.
     """
 
     title: str
@@ -71,6 +94,8 @@ class Sheet:
     shared: tuple[str, ...] = ()
     terms: tuple[str, ...] = ()
     file: str = ""
+    notes: tuple[str, ...] = ()
+    main: str = ""
 
 
 def quantity_of_rows(rows: pd.DataFrame) -> ReportedQuantity:
@@ -133,10 +158,7 @@ def _of_piles(results: Results, every: pd.DataFrame) -> Sheet:
     sheet = _sheet(every, [*keys, "fraction"], "pile_threshold")
     if PART not in sheet.frame:
         return sheet
-    if every["scene_id"].nunique() > 1:
-        return replace(sheet, frame=_first_grains(results, every, keys, sheet.frame))
-    first = _first_grain(every.iloc[0], sheet.frame, {PART: "first grain"})
-    return replace(sheet, frame=first)
+    return replace(sheet, frame=_first_grains(results, every, keys, sheet.frame))
 
 
 def _of_series(results: Results, rows: pd.DataFrame, keys: Sequence[str]) -> Sheet:
@@ -152,19 +174,20 @@ def _of_series(results: Results, rows: pd.DataFrame, keys: Sequence[str]) -> She
         spot = counted.spot(float(row["first_x_m"]), bed)
         first.append(f"{value:#.3g} {told.unit}, {spot}" if value > 0 else "—")
     frame = sheet.frame.copy()
-    frame.insert(len(_heads_of(keys, frame)), "first grain", first)
+    frame.insert(len(_heads_of(keys, frame)), FIRST_MOTION, first)
     return replace(sheet, frame=frame)
 
 
 def _first_grains(
     results: Results, every: pd.DataFrame, keys: Sequence[str], frame: pd.DataFrame
 ) -> pd.DataFrame:
-    """The table of several beds, with a row for the first grain above those of each.
+    """The table of beds, with a row for the first motion above those of each.
 
-    The row says where it lies. Replicates have none.
+    The row says where it is. Replicates have none.
     """
     # as the rows of the table are
     every = _in_order(every)
+    fraction = results.at_fraction["fraction"].iloc[0]
     beds = every.groupby(list(keys), dropna=False, sort=False)
     parts = []
     start = 0
@@ -172,15 +195,15 @@ def _first_grains(
         end = start + rows["fraction"].nunique()
         part = frame.iloc[start:end].reset_index(drop=True)
         start = end
-        row = rows.iloc[0]
+        # the row that the card is made of: each has the first motion by its own
+        row = rows[rows["fraction"] == fraction].iloc[0]
         if rows["scene_id"].nunique() == 1:
             named = {head: str(part[head].iloc[0]) for head in _heads_of(keys, part)}
-            named[PART] = "first grain"
-            if not single.is_level(row):
+            named[PART] = FIRST_MOTION
+            if not single.is_level(row) and len(results.plan.piles) > 1:
                 bed = results.plan.piles[str(row["scene_id"])].bed
-                named[PART] = (
-                    f"first grain, {counted.spot(float(row['first_x_m']), bed)}"
-                )
+                spot = counted.spot(float(row["first_x_m"]), bed)
+                named[PART] = f"{FIRST_MOTION} {spot}"
             part = _first_grain(row, part, named)
         parts.append(part)
     return pd.concat(parts, ignore_index=True)
@@ -203,32 +226,36 @@ def _heads_of(keys: Sequence[str], frame: pd.DataFrame) -> list[str]:
 def _first_grain(
     row: pd.Series, frame: pd.DataFrame, named: Mapping[str, str]
 ) -> pd.DataFrame:
-    """The table of one bed, with a row for its first grain above the others.
+    """The table of one bed, with a row for its first motion above the others.
 
     The row has some cells that name it, by their heads.
     """
     if not row["first_ustar0_m_s"] > 0:
         return frame
-    told = single.quantity_of_row(row)
     values = {**dict.fromkeys(frame.columns, "—"), **named}
-    heads = _heads(told)
-    beside = next((each for each in heads[2:] if each in values), "")
-    values[heads[0]] = f"{row[f'first_{told.column()}']:#.3g}"
-    if heads[1] in values:
-        ends = (row[f"first_{told.column(end)}"] for end in ("_low", "_high"))
-        values[heads[1]] = labels.interval(*ends)
-    if beside:
-        values[beside] = f"{row[f'compared_first_{told.column()}']:#.3g}"
-    if USTAR_HEAD in values:
-        values[USTAR_HEAD] = f"{row['first_ustar0_m_s']:#.3g}"
-    if "usable" in values:
-        values["usable"] = ""
+    for head, names in _columns(pd.DataFrame([row]), False, False).items():
+        own = [_of_first(name) for name in names]
+        if head not in values or not all(name in row for name in own):
+            continue
+        numbers = [single.known_number(row[name]) for name in own]
+        values[head] = _ranges(numbers, numbers)[0]
+        if len(numbers) > 1:
+            values[head] = labels.interval(numbers[0], numbers[1])
+    if VERDICT in values:
+        values[VERDICT] = str(frame[VERDICT].iloc[0])
     return pd.concat([pd.DataFrame([values]), frame], ignore_index=True)
+
+
+def _of_first(column: str) -> str:
+    """The column of the first motion beside one of a fraction."""
+    if column.startswith(OTHER):
+        return f"{OTHER}first_{column.removeprefix(OTHER)}"
+    return f"first_{column}"
 
 
 def _fits(rows: pd.DataFrame, keys: Sequence[str]) -> bool:
     """Whether a table with a row for each combination of some columns fits a screen."""
-    return len(rows[list(keys)].drop_duplicates()) <= MOST_LISTED
+    return len(rows[list(keys)].drop_duplicates()) <= MOST_ROWS
 
 
 def piles_sheet(results: Results) -> pd.DataFrame | None:
@@ -288,43 +315,59 @@ def _sheet(rows: pd.DataFrame, keys: Sequence[str], name: str) -> Sheet:
     is_single = len(frame) == 1
     for column in keys:
         head = labels.info_of(column).label
-        if column in ("fraction", "by") and not is_single:
+        if column == "fraction" and not is_single:
             continue
         if head in frame and frame[head].nunique() == 1:
             frame = frame.drop(columns=head)
             if column != "fraction":  # it is told in words below
                 shared += labels.told(rows.iloc[0], [column])
-    is_uniform = "usable" in frame and frame["usable"].nunique() == 1
-    if is_uniform and len(frame) > 1 and " of " not in frame["usable"].iloc[0]:
-        shared.append(f"usable: {frame['usable'].iloc[0]}")
-        frame = frame.drop(columns="usable")
+    frame, notes = _noted(frame)
+    is_uniform = VERDICT in frame and frame[VERDICT].nunique() == 1
+    if is_uniform and len(frame) > 1 and " of " not in frame[VERDICT].iloc[0]:
+        shared.append(frame[VERDICT].iloc[0])
+        frame = frame.drop(columns=VERDICT)
     terms = (TERMS["u*"], TERMS["shields"])
     if "fraction" in rows and PART not in frame:
         shared.append(f"{PART}: {percent(rows['fraction'].iloc[0])}")
-    title = TITLES[told_by].format("the bed" if "fraction" in rows else "a grain")
-    return Sheet(title, frame, tuple(shared), terms, f"tables/{name}.csv")
-
-
-def _heads(told: ReportedQuantity) -> tuple[str, ...]:
-    """The heads of a quantity, of its interval and of each kind of value beside it."""
-    name = HEADS[told]
-    return (
-        f"{name}, {told.unit}",
-        f"interval, {told.unit}",
-        *(f"{words}, {told.unit}" for words in single.WITH),
+    main = next(iter(_columns(rows, "d_m" not in keys, False)))
+    return Sheet(
+        TITLES[told_by],
+        frame,
+        tuple(shared),
+        terms,
+        f"tables/{name}.csv",
+        notes,
+        main,
     )
 
 
+def _noted(frame: pd.DataFrame) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    """A table whose reasons against thresholds are numbered, and the reasons."""
+    if VERDICT not in frame:
+        return frame, ()
+    notes: dict[str, int] = {}
+    cells = []
+    for cell in frame[VERDICT]:
+        word, _, why = cell.partition(": ")
+        if why:
+            number = notes.setdefault(why, len(notes) + 1)
+            word = f"{word} ({number})"
+        cells.append(word)
+    return frame.assign(**{VERDICT: cells}), tuple(notes)
+
+
 USTAR_HEAD = "friction velocity u*₀, m/s"
-TAU_HEAD = "critical Shields number θ_c"
+TAU_HEAD = "θ_c"
 TAU_INTERVAL = "interval of θ_c"
+OTHER = "compared_"
+"""What the names of columns of numbers with another critical number begin with."""
 SPANS_OF_SIZES = {
-    "stress on the bed, Pa": ["pa"],
+    "bed shear stress, Pa": ["pa"],
     "interval, Pa": ["pa_low", "pa_high"],
     "stress over that of d50": ["hiding"],
     "fitted (Wilcock & Crowe 2003)": ["hiding_wilcock_crowe"],
     USTAR_HEAD: ["ustar0_m_s"],
-    "Shields number of its own size": ["shields_own"],
+    "θ_c of its own size": ["shields_own"],
 }
 """Columns of a table of sizes, by their heads."""
 
@@ -343,9 +386,6 @@ def _thresholds(
         rows = rows.sort_values([*keys], kind="stable")
     else:
         rows = _in_order(rows)
-    told = quantity_of_rows(rows)
-    rows = _open_ended(rows, "shields_low", "shields_high")
-    rows = _open_ended(rows, told.column("_low"), told.column("_high"))
     number = rows.groupby(list(keys), dropna=False, sort=False).ngroup()
     usable = rows["usable"].groupby(number)
     is_told = rows["usable"] | ~usable.transform("any")
@@ -353,18 +393,26 @@ def _thresholds(
     first = shown.first()
     table: dict[str, Any] = {column: first[column] for column in more}
     table |= labels.cells(first, keys)
+    for name in _columns(rows, is_range, bool(more)).values():
+        if len(name) > 1:
+            rows = _open_ended(rows, *name)
+    shown = rows[is_told].groupby(number)
     low = shown.min(numeric_only=True).astype(float)
     high = shown.max(numeric_only=True).astype(float)
     if is_range:
         low[~usable.any()] = np.nan
         d_mm = 1e3 * rows["d_m"].groupby(number).agg(["min", "max"])
         table["diameter, mm"] = _ranges(d_mm["min"], d_mm["max"], "g")
-    known = set(rows.columns[rows.notna().any()])
-    beside = single.with_threshold(*(row for _, row in first.iterrows()))
-    table |= _spans(low, high, _columns(told, known, beside, is_range, bool(more)))
-    table["usable"] = [
-        _usable(*reason, is_range)
-        for reason in zip(usable.sum(), usable.size(), first["why_not"], strict=True)
+    table |= _spans(low, high, _columns(rows, is_range, bool(more)))
+    table[VERDICT] = [
+        _verdict(*told, is_range)
+        for told in zip(
+            usable.sum(),
+            usable.size(),
+            first["verdict"],
+            first["why_not"],
+            strict=True,
+        )
     ]
     return pd.DataFrame(table)
 
@@ -375,35 +423,70 @@ def _different(rows: pd.DataFrame, *columns: str) -> list[str]:
 
 
 def _columns(
-    told: ReportedQuantity,
-    known: Collection[str],
-    beside: str,
-    is_range: bool,
-    with_models: bool,
+    rows: pd.DataFrame, is_range: bool, with_models: bool
 ) -> dict[str, list[str]]:
-    """The columns of a table of thresholds that have values, by their heads."""
-    value, interval, *_ = _heads(told)
-    columns = {value: [told.column()]}
-    if not is_range:
-        columns[interval] = [told.column("_low"), told.column("_high")]
-    if f"compared_{told.column()}" in known:
-        columns[f"{beside}, {told.unit}"] = [f"compared_{told.column()}"]
-    columns[USTAR_HEAD] = ["ustar0_m_s"]
-    columns[TAU_HEAD] = ["shields"]
-    columns[TAU_INTERVAL] = ["shields_low", "shields_high"]
+    """The columns of a table of thresholds that have values, by their heads.
+
+    The first is that of the numbers which the thresholds advise.
+    """
+    told = quantity_of_rows(rows)
+    known = set(rows.columns[rows.notna().any()])
+    with_what = single.with_threshold(*(row for _, row in rows.iterrows()))
+    advised = MODEL
+    if f"{OTHER}{told.column()}" in known:
+        advised = rows["advised"].iloc[0]
+    columns = _flows(told, advised, with_what)
+    of_model = "" if advised == MODEL else " by the model"
+    columns[f"{TAU_HEAD}{of_model}"] = ["shields"]
+    columns[f"{TAU_INTERVAL}{of_model}"] = ["shields_low", "shields_high"]
     if with_models and "shields_model_low" in known:
         ends = ["shields_model_low", "shields_model_high"]
         columns["interval of other models"] = ends
-    return columns
+    kept = {}
+    for head, names in columns.items():
+        is_known = bool(known & set(names)) or head == next(iter(columns))
+        if is_known and not (is_range and len(names) > 1 and "θ_c" not in head):
+            kept[head] = names
+    return kept
 
 
-def _usable(count: int, of: int, why_not: str, is_range: bool) -> str:
-    """How many of the thresholds of a row are usable, or why one is not."""
+def _flows(
+    told: ReportedQuantity, advised: str, with_what: str
+) -> dict[str, list[str]]:
+    """The columns of the flows of thresholds: the advised ones, and the others."""
+    name, unit = HEADS[told], told.unit
+    own = [told.column()]
+    band = [told.column(end) for end in ("_low", "_high")]
+    other = [f"{OTHER}{told.column()}"]
+    other_band = [f"{OTHER}{each}" for each in band]
+    if advised == MODEL:
+        return {
+            f"{name}, {unit}": own,
+            f"interval, {unit}": band,
+            f"{with_what}, {unit}": other,
+            USTAR_HEAD: ["ustar0_m_s"],
+        }
+    model = single.MODEL_ALONE
+    of_both = {}
+    if advised == BOTH:
+        model = single.MODEL
+        of_both = {f"interval {model}, {unit}": band}
+    return {
+        f"{name} {with_what}, {unit}": other,
+        f"interval, {unit}": other_band,
+        f"{model}, {unit}": own,
+        **of_both,
+        f"{USTAR_HEAD.partition(',')[0]} {with_what}, m/s": [f"{OTHER}ustar0_m_s"],
+    }
+
+
+def _verdict(count: int, of: int, word: str, why_not: str, is_range: bool) -> str:
+    """How many of the thresholds of a row are usable, or what one is worth."""
     if is_range:
-        return f"{count} of {of}"
+        return f"{count} of {of} usable"
     if of > 1:
-        return f"{count} of {of} seeds"
-    return "yes" if count else f"no: {why_not}"
+        return f"{count} of {of} seeds usable"
+    return WORDS[word] if count else f"{WORDS[UNUSABLE]}: {why_not}"
 
 
 def hills(results: Results) -> Sheet:
@@ -426,23 +509,23 @@ def hills(results: Results) -> Sheet:
             ends = row["reattachment_over_h"]
             measured = row["measured_reattachment_over_h"]
             cells = {
-                "half length, h": f"{aspect:g}",
+                "half-length, h": f"{aspect:g}",
                 "turbulence model": labels.value(
                     "turbulence_model", row["turbulence_model"]
                 ),
-                "the flow runs back from, h": _or_nowhere(starts),
-                "to, h": _or_nowhere(ends),
-                "measured to, h": _or_nowhere(measured),
+                "separation, h": _or_nowhere(starts),
+                "reattachment, h": _or_nowhere(ends),
+                "measured reattachment, h": _or_nowhere(measured),
             }
             table.append(cells)
     shared = ("distances from the crest, in heights of the hill",)
-    title = "Where the flow runs back behind each hill"
+    title = "Separation and reattachment behind each hill"
     return Sheet(title, pd.DataFrame(table), shared, (), "tables/flow.csv")
 
 
 def _or_nowhere(distance: float) -> str:
     """A distance, or that there is none."""
-    return f"{distance:.1f}" if distance > 0 else "nowhere"
+    return f"{distance:.1f}" if distance > 0 else "none"
 
 
 def sizes_sheet(results: Results) -> Sheet | None:
@@ -484,7 +567,7 @@ def sizes_sheet(results: Results) -> Sheet | None:
             **told.mask(is_repeated, ""),
             "size, mm": [f"{size:.3g}" for size in groups["size"].mean()],
             **_spans(low, high, SPANS_OF_SIZES),
-            "part that had moved, %": _intervals(
+            "fraction entrained, %": _intervals(
                 100 * low["class_moved_low"], 100 * high["class_moved_high"], 0, "f"
             ),
             "exposed grains of a bed": grains,
@@ -493,7 +576,7 @@ def sizes_sheet(results: Results) -> Sheet | None:
     return Sheet(
         title="By size",
         frame=frame,
-        shared=(f"part of each size that has moved: {percent(fraction)}",),
+        shared=(f"fraction of each size entrained: {percent(fraction)}",),
         terms=(TERMS["u*"], TERMS["shields"]),
         file="tables/size_class.csv",
     )

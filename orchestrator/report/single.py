@@ -5,6 +5,7 @@ which the command `threshold` does without.
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from orchestrator.digits import percent
@@ -20,8 +21,15 @@ from orchestrator.physics.beside import (
 )
 from orchestrator.physics.constants import CHANNEL
 from orchestrator.physics.fluids import is_gas
-from orchestrator.physics.reported import COUNT, IN_GAS, MEASURED, OF_LAWS, SEEDS
-from orchestrator.report.card import Card, Number, Worth, decimals
+from orchestrator.physics.reported import (
+    CHOICES,
+    COUNT,
+    IN_GAS,
+    MEASURED,
+    OF_LAWS,
+    SEEDS,
+)
+from orchestrator.report.card import Card, Number, Worth
 from orchestrator.report.subjects import (
     DEPTH,
     MEAN,
@@ -40,13 +48,14 @@ Row = Any
 """A row of a table with the columns of its scene, or a mapping with them."""
 
 
-WITH = (
-    "with the measured threshold",
-    "with the threshold of the formula",
-    "with the measured threshold or that of the formula",
-)
-"""What the values beside those of beds are made with: a median of flumes, a formula,
-or one of these."""
+MODEL_ALONE = "model alone"
+"""What the computed number is called beside one with another critical number."""
+MODEL = "by the model"
+"""What it is called where both stand with equal right."""
+WITH_MEASURED = "with the measured θ_c"
+WITH_REFERENCE = "with θ_c of the measurements or the formula"
+"""What numbers are called that are made with the median of flumes, or with that or a
+formula."""
 LOAD_STEP = "the load step"
 """What the numerical interval of a single grain is of."""
 
@@ -74,10 +83,10 @@ def single_card(row: Row) -> Card:
     if is_sustained and is_decided:
         ending = " and keep moving"
     return Card(
-        f"At which {told.flow} does a grain of {size} start to move{ending}?",
+        f"At what {told.flow} does a grain of {size} start to move{ending}?",
         _scene_of_grain(row),
         numbers_of_grain(row, told),
-        source(row, told),
+        source(row),
         worth(row),
     )
 
@@ -198,25 +207,21 @@ def numbers_of_grain(row: Row, told: ReportedQuantity) -> tuple[Number, ...]:
     over = place_of_quantity(MEAN, row) if told is MEAN else ""
     if over and channel > 0:
         over = f"{over}; z₀ of the channel {length(channel)}"
+    of_model = "" if row.get("advised", verdict.MODEL) == verdict.MODEL else "model: "
     notes = {
         WIND: f"10 m above {ground}",
         MEAN: over,
         DEPTH: "of the uniform flow whose weight along the slope is that stress",
-        USTAR: "√(τ_b/ρ), the bed shear stress as a speed",
-        STRESS: f"τ_b, of the undisturbed flow; critical Shields number "
-        f"θ_c = τ_b/((ρ_s − ρ) g d): {theta:.3g}",
+        USTAR: "u* = √(τ_b/ρ)",
+        STRESS: f"τ_b of the undisturbed flow; {of_model}θ_c = {theta:.3g}",
     }
     second = DEPTH if known_number(row.get("bed_slope")) > 0 else USTAR
     shown = [each for each in (told, second, STRESS) if each is not STRESS]
-    of_what = interval_of(row, LOAD_STEP)
+    names = {WIND: "threshold wind", STRESS: "bed shear stress"}
     numbers = []
     for each in (*dict.fromkeys(shown), STRESS):
-        name = each.name if each is not STRESS else "bed shear stress"
-        is_first = each is (*shown, STRESS)[0]
-        number = reported_number(
-            row, each, name, notes[each], of_what if is_first else ""
-        )
-        numbers.append(number)
+        name = names.get(each, each.name)
+        numbers.append(reported_number(row, each, name, notes[each], LOAD_STEP))
     return tuple(numbers)
 
 
@@ -225,10 +230,10 @@ def reported_number(
     told: ReportedQuantity,
     meaning: str,
     note: str = "",
-    of_what: str = "",
+    numerical: str = "",
     which: str = "",
 ) -> Number:
-    """Make the number of a threshold as its row has it in the unit of a quantity.
+    """Make the number of a threshold that its row advises, in the unit of a quantity.
 
     Parameters
     ----------
@@ -238,27 +243,141 @@ def reported_number(
         The quantity.
     meaning, note
         What the number is.
-    of_what
-        What its interval is of.
+    numerical
+        What its numerical interval is of.
     which
         ``first_`` for the flow that moves the first grains.
 
     Returns
     -------
     Number
-        With its interval and the value to compare with.
+        With its interval, and the other number beside it: the model's, or that with a
+        measured critical Shields number.
     """
+    ends = ("", "_low", "_high")
+    own = [known_number(row.get(f"{which}{told.column(end)}")) for end in ends]
+    other = [
+        known_number(row.get(f"compared_{which}{told.column(end)}")) for end in ends
+    ]
+    has_other = math.isfinite(other[0])
+    advised = row.get("advised", verdict.MODEL) if has_other else verdict.MODEL
+    if row["verdict"] == verdict.UNUSABLE:
+        return Number(
+            own[0],
+            told.unit,
+            meaning,
+            note,
+            low=own[1],
+            high=own[2],
+            interval_of=interval_of(row, numerical),
+            is_grey=True,
+        )
+    if advised == verdict.MODEL:
+        return Number(
+            own[0],
+            told.unit,
+            meaning,
+            note,
+            low=own[1],
+            high=own[2],
+            interval_of=interval_of(row, numerical),
+            other=other[0],
+            other_is=with_threshold(row),
+        )
+    is_pair = advised == verdict.BOTH
+    of_what = corrected_interval_of(row, numerical, bool(which), own)
     return Number(
-        known_number(row.get(f"{which}{told.column()}")),
+        other[0],
         told.unit,
         meaning,
         note,
-        low=known_number(row.get(f"{which}{told.column('_low')}")),
-        high=known_number(row.get(f"{which}{told.column('_high')}")),
+        low=other[1],
+        high=other[2],
         interval_of=of_what,
-        compared=known_number(row.get(f"compared_{which}{told.column()}")),
-        beside_is=beside_is(row),
+        other=own[0],
+        other_is=MODEL if is_pair else MODEL_ALONE,
+        other_low=own[1],
+        other_high=own[2],
+        value_is=with_threshold(row) if is_pair else "",
+        is_of_model=True,
     )
+
+
+def take_this(row: Row, told: ReportedQuantity) -> Number | None:
+    """Make the number to take in place of one that is not usable, where there is one.
+
+    Parameters
+    ----------
+    row
+        A threshold that is not usable.
+    told
+        What its flow is told by.
+
+    Returns
+    -------
+    Number or None
+        What was measured, or a formula gives, on a level bed of its grains; None of
+        other beds, where it takes the flow that was computed.
+    """
+    is_lone = row["bed"] == "grain" and not row["alpha_deg"] > LEVEL_DEG
+    if not (is_lone or is_level(row)):
+        return None
+    names = [f"compared_{told.column()}"]
+    names += [f"measured_{told.column(end)}" for end in ("_low", "_high")]
+    value, low, high = (known_number(row.get(name)) for name in names)
+    if math.isnan(value):
+        return None
+    rows = known_number(row["measured_rows"])
+    of_what = f"80 % of {rows:.0f} flume experiments (visual criterion)"
+    if is_gas(float(row["rho_f_kg_m3"])):
+        of_what = f"{rows:.0f} field sites"
+    where = f"grains of {length(float(row['d_m']))}, level bed"
+    by = f"by {formula_of(row)}" if is_by_formula(row) else "flumes"
+    return Number(
+        value,
+        told.unit,
+        f"take this: {by}, {where}",
+        low=low,
+        high=high,
+        interval_of=of_what,
+        is_measured=True,
+    )
+
+
+def advised_column(row: Row, told: ReportedQuantity) -> str:
+    """Name the column of the number that a threshold advises.
+
+    Parameters
+    ----------
+    row
+        A threshold.
+    told
+        What its flow is told by.
+
+    Returns
+    -------
+    str
+        The column; the model's where both numbers stand with equal right.
+    """
+    is_corrected = row.get("advised") == verdict.WITH_MEASURED
+    return f"compared_{told.column()}" if is_corrected else told.column()
+
+
+def threshold_name(told: ReportedQuantity) -> str:
+    """Name a quantity at the threshold of motion.
+
+    Parameters
+    ----------
+    told
+        The quantity.
+
+    Returns
+    -------
+    str
+        Such as ``threshold wind``.
+    """
+    name = "bed shear stress" if told is STRESS else told.name
+    return f"threshold {name}"
 
 
 def is_by_formula(row: Row) -> bool:
@@ -275,22 +394,6 @@ def is_by_formula(row: Row) -> bool:
         Whether it is; else it is measured, or there is none.
     """
     return bool(row.get(COMPARED_WITH) == FORMULA)
-
-
-def beside_is(row: Row) -> str:
-    """Name the value beside a threshold in one word.
-
-    Parameters
-    ----------
-    row
-        A threshold.
-
-    Returns
-    -------
-    str
-        ``formula`` or ``measured``.
-    """
-    return "formula" if is_by_formula(row) else "measured"
 
 
 def what_beside(row: Row) -> str:
@@ -310,7 +413,7 @@ def what_beside(row: Row) -> str:
 
 
 def with_threshold(*rows: Row) -> str:
-    """Say with which threshold of one grain the values beside those of beds are made.
+    """Name the numbers with another critical Shields number than the model's.
 
     Parameters
     ----------
@@ -320,13 +423,19 @@ def with_threshold(*rows: Row) -> str:
     Returns
     -------
     str
-        One of the `WITH`.
+        With the measured one, or with that of a formula, by its authors.
     """
-    measured, formula, either = WITH
-    words = {row.get(COMPARED_WITH) for row in rows}
-    if FORMULA not in words:
-        return measured
-    return either if FLUMES in words else formula
+    names = []
+    for row in rows:
+        word = row.get(COMPARED_WITH)
+        if word == FLUMES:
+            names.append(WITH_MEASURED)
+        elif word == FORMULA:
+            names.append(f"with θ_c of {formula_of(row).rpartition(' ')[0]}")
+    named = [*dict.fromkeys(names)]
+    if len(named) > 1:
+        return WITH_REFERENCE
+    return named[0] if named else WITH_MEASURED
 
 
 def formula_of(row: Row) -> str:
@@ -348,7 +457,7 @@ def formula_of(row: Row) -> str:
 
 
 def interval_of(row: Row, numerical: str) -> str:
-    """Say what the interval of a threshold is of, of seeds together.
+    """Say what the interval of a computed threshold contains, of seeds together.
 
     Parameters
     ----------
@@ -371,9 +480,48 @@ def interval_of(row: Row, numerical: str) -> str:
     if row.get("of_seeds", 1) > 1:
         beds = f"{row['of_seeds']} replicates"
     if of_what == SEEDS:
-        return f"the range of {beds}; no error of the method is known"
-    said = tested_on(row) if of_what in (MEASURED, IN_GAS) else numerical
-    return f"{said}; it holds {beds}" if beds else said
+        return f"the range of {beds}; the numerical error is not known"
+    said = numerical
+    if of_what in (MEASURED, IN_GAS):
+        said = tested_on(row)
+    elif of_what == CHOICES:
+        said = f"other packings, forces and angles; it contains {numerical}"
+    return f"{said}; it contains {beds}" if beds else said
+
+
+def corrected_interval_of(
+    row: Row, numerical: str, is_first: bool, own: Sequence[float]
+) -> str:
+    """Say what the interval of a number with another critical number contains.
+
+    Parameters
+    ----------
+    row
+        A threshold with the columns of its scene.
+    numerical
+        What the numerical interval of the computed number is of.
+    is_first
+        Whether it is of the first motion.
+    own
+        The computed number and the ends of its interval; NaN where one is not known.
+
+    Returns
+    -------
+    str
+        The words.
+    """
+    rows = ""
+    if row["measured_rows"] > 0:
+        rows = ", and the ends of what was measured"
+    if all(map(math.isnan, own[1:])):
+        first = " of the first grain" if is_first else ""
+        return f"both numbers{rows}; the numerical error{first} is not known"
+    said = interval_of(row, numerical)
+    if row["interval_of"] in (MEASURED, IN_GAS):
+        return f"{said}, and widened to contain this number{rows}"
+    if row["interval_of"] == OF_LAWS:
+        return f"{said}, and this number{rows}"
+    return f"{said}, in proportion{rows}"
 
 
 def tested_on(row: Row) -> str:
@@ -392,70 +540,73 @@ def tested_on(row: Row) -> str:
     """
     part = percent(row["tested_held"])
     count = int(row["tested_rows"])
-    them = f"{count} measured thresholds"
+    them = f"{count} measured level-bed thresholds"
     if row["interval_of"] == IN_GAS:
         sites = len(FIELD)
-        them = f"thresholds at {sites} field sites and {count - sites} of a formula"
-    held = f"this band contained {part} of {them}, each set predicted from the others"
-    if row["alpha_deg"] > LEVEL_DEG:
-        return f"on level beds {held}; it is widened for the slope"
-    return held
+        them = f"{count} level-bed thresholds ({sites} field sites, {count - sites} "
+        them += "of a formula)"
+    held = f"contained {part} of {them}, each set predicted from the others"
+    return f"{held}; widened for slope" if row["alpha_deg"] > LEVEL_DEG else held
 
 
-def source(row: Row, told: ReportedQuantity, which: str = "") -> str:
-    """Say where the values beside the numbers of a card are from.
+def source(row: Row) -> str:
+    """Say where the numbers of a card come from, the computed ones and the others.
 
     Parameters
     ----------
     row
         A threshold with the columns of its scene.
-    told
-        What its flow is told by.
-    which
-        ``first_`` if field measurements are told of the flow of the first grains.
 
     Returns
     -------
     str
         The sentences.
     """
-    if math.isnan(known_number(row["compared_level_ustar_m_s"])):
-        return "No measurement is near."
+    level = known_number(row["compared_level_ustar_m_s"])
+    if math.isnan(level):
+        return "Computed. No level bed of such grains was measured in such a fluid."
     size = length(float(row["d_m"]))
-    alike = "this bed with "
-    if is_level(row) or row["bed"] == "grain":
-        alike = ""
-    if is_gas(float(row["rho_f_kg_m3"])):
+    is_bed = row["bed"] != "grain" and not is_level(row)
+    same = "The same bed and flow" if is_bed else "A level bed"
+    same = f"{same[0].lower()}{same[1:]}" if is_bed else same.lower()
+    theta = _reference_theta(row)
+    if not is_by_formula(row):
+        rows = f"{row['measured_rows']:.0f} flume experiments"
+        ends = f"{row['measured_low']:.3f} … {row['measured_high']:.3f}"
+        said = (
+            f"“{WITH_MEASURED}”: {same} with θ_c = {theta}, the median of {rows} at "
+            "this grain Reynolds number (level beds, visual criterion; Buffington and "
+            f"Montgomery 1997); 80 % of them have {ends}."
+        )
+    elif is_gas(float(row["rho_f_kg_m3"])):
         least, most = (1e3 * end for end in OF_TUNNELS)
         said = (
-            f"Squares: {alike}the formula of {formula_of(row)} for a level bed of "
-            f"grains of {size}, fitted to wind tunnels in air with dry grains of "
-            f"{least:g} to {most:.2g} mm."
+            f"“{with_threshold(row)}”: {same} with θ_c = {theta}, by the formula of "
+            f"{formula_of(row)} for grains of {size}, which was fitted to wind tunnels "
+            f"(level beds, dry grains of {least:g} to {most:.2g} mm in air). "
+            f"{_field(row)}"
         )
-        return f"{said} {_field(row, told, which)}"
-    if row["measured_rows"] > 0:
-        rows = f"{row['measured_rows']:.0f} rows of flumes"
-        ends = f"{row['measured_low']:.3f} … {row['measured_high']:.3f}"
-        return (
-            f"Squares: {alike}the median of {rows} at this Re*, level beds, by eye "
-            f"(Buffington and Montgomery 1997); 80 % of them have Shields numbers of "
-            f"{ends}."
+    else:
+        said = (
+            f"“{with_threshold(row)}”: {same} with θ_c = {theta}, by the formula of "
+            f"{formula_of(row)}, which was fitted to flumes; no flume experiment of "
+            f"the compilation is at grain Reynolds number {row['reynolds']:.3g}."
         )
-    return (
-        f"Squares: {alike}the formula of {formula_of(row)}, fitted to flumes; no flume "
-        f"of the compilation has rows at Re* {row['reynolds']:.3g}."
-    )
+    return said
 
 
-def _field(row: Row, told: ReportedQuantity, which: str) -> str:
-    """What the field sites would give, or why none is near."""
+def _reference_theta(row: Row) -> str:
+    """The critical Shields number on a level bed that is not the model's."""
+    name = "formula_shields" if is_by_formula(row) else "measured_median"
+    return f"{known_number(row[name]):.3g}"
+
+
+def _field(row: Row) -> str:
+    """What the field sites have, or why none is near."""
     if not row["measured_rows"] > 0:
         return "No field site is near: those have sand of 0.40 to 0.53 mm in air."
-    ends = [row[f"measured_{which}{told.column(end)}"] for end in ("_low", "_high")]
-    places = decimals(float(ends[0]))
-    low, high = (f"{end:.{places}f}" for end in ends)
-    sites = f"{len(FIELD)} field sites (Martin and Kok 2018)"
-    return f"The thresholds measured at {sites} give {low} … {high} {told.unit}."
+    ends = f"{min(FIELD):.4f} … {max(FIELD):.4f}"
+    return f"{len(FIELD)} field sites (Martin and Kok 2018) have θ_c = {ends}."
 
 
 def worth(row: Row, few: bool = False) -> Worth:
@@ -482,16 +633,31 @@ def worth(row: Row, few: bool = False) -> Worth:
         )
         return Worth("care", "usable, with doubt where grains are few", advice)
     if row["verdict"] == verdict.USABLE:
+        if row.get("advised") == verdict.BOTH:
+            return Worth("good", "usable", f"{_within(row)} {_of_both(row)}")
         return Worth("good", "usable", _within(row))
-    advice = "No measurement is near; compare beds with each other alone."
-    if row["verdict"] == verdict.CORRECTED:
-        what = "wind" if is_gas(float(row["rho_f_kg_m3"])) else "flow"
-        value = "value of the formula" if is_by_formula(row) else "measured value"
-        advice = f"For the {what} take the {value}."
-        advice += " To compare beds take the computed one."
+    if row["verdict"] == verdict.COMPARED:
+        advice = "No measurement is near: compare such beds with each other only."
+        return Worth("care", row["verdict"], advice)
+    advice = f"The {_flow_of(row)} {with_threshold(row)} is the one to take."
+    if row.get("advised") == verdict.BOTH:
+        advice = _of_both(row)
     if not is_level(row) and row["bed"] != "grain":
-        advice = f"Take the place as computed. {advice}"
+        advice += " The point of first motion is as computed."
     return Worth("care", row["verdict"], advice)
+
+
+def _of_both(row: Row) -> str:
+    """Which of two numbers with equal right is for what."""
+    return (
+        f"To compare models, take the number of the model; for a {_flow_of(row)} in "
+        f"nature, the one {with_threshold(row)}."
+    )
+
+
+def _flow_of(row: Row) -> str:
+    """A wind or a flow."""
+    return "wind" if is_gas(float(row["rho_f_kg_m3"])) else "flow"
 
 
 def _within(row: Row) -> str:
@@ -499,8 +665,8 @@ def _within(row: Row) -> str:
     if not is_by_formula(row):
         return "It is within what was measured on level beds."
     if row["measured_rows"] > 0:
-        return "Its interval contains the formula; field sites were measured near."
-    return "Its interval contains the formula; no threshold was measured near."
+        return "Its interval contains the formula's; field sites were measured near."
+    return "Its interval contains the formula's; no threshold was measured near."
 
 
 def _sentence(text: object) -> str:

@@ -3,6 +3,7 @@
 import math
 from typing import NamedTuple
 
+from orchestrator.digits import plain
 from orchestrator.physics.fluids import is_gas, is_like_paper
 from orchestrator.study.profile import Profile
 
@@ -123,11 +124,11 @@ def fluid(density: float, viscosity: float) -> str:
     Examples
     --------
     >>> fluid(1.225, 1.46e-5), fluid(1000.0, 1e-6), fluid(1.0, 1e-5)
-    ('air', 'water', "a gas like the paper's (1 kg/m³, 1e-05 m²/s), close to air")
+    ('air', 'water', 'the article’s gas (1 kg/m³, 1.0 × 10⁻⁵ m²/s), close to air')
     """
-    numbers = f"{density:g} kg/m³, {viscosity:.3g} m²/s"
+    numbers = f"{plain(density, 4)} kg/m³, {plain(viscosity)} m²/s"
     if is_like_paper(density, viscosity):
-        return f"a gas like the paper's ({numbers}), close to air"
+        return f"the article’s gas ({numbers}), close to air"
     for name, (densities, viscosities) in (("air", AIR), ("water", WATER)):
         is_dense = densities[0] <= density <= densities[1]
         is_viscous = viscosities[0] <= viscosity <= viscosities[1]

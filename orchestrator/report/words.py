@@ -1,20 +1,24 @@
 """What a page and a terminal say: the card, its table, remarks, and all other words."""
 
+import textwrap
 from collections.abc import Iterator, Sequence
 
 import pandas as pd
 
 from orchestrator.errors import OrchestratorError
 from orchestrator.report import answers, lines, remarks, sheets, theory
-from orchestrator.report.card import Card, remark_lines
+from orchestrator.report.card import WIDTH, Card, remark_lines
 from orchestrator.report.card import lines as card_lines
+from orchestrator.report.lines import BETWEEN, head_width
 from orchestrator.report.page import Guest
 from orchestrator.report.results import Results
 from orchestrator.report.sheets import Sheet
 from orchestrator.tables import missing
 
-MOST_LETTERS = 46
+MOST_LETTERS = 30
 """Letters of a column in a terminal; longer cells stand on several lines."""
+FEWER_LETTERS = (20, 14, 11)
+"""The same where a line would be too long."""
 
 
 def answer_text(results: Results, guests: Sequence[Guest] = ()) -> str:
@@ -105,7 +109,7 @@ def sheet(results: Results, guests: Sequence[Guest] = ()) -> Sheet | None:
 
 
 def sheet_lines(table: Sheet) -> Iterator[str]:
-    """Write a table for a terminal.
+    """Write a table for a terminal, of at most `card.WIDTH` letters a line.
 
     Parameters
     ----------
@@ -115,23 +119,72 @@ def sheet_lines(table: Sheet) -> Iterator[str]:
     Yields
     ------
     str
-        What its rows share, the rows, and its terms.
+        What its rows share, the rows, the reasons against some, and its terms.
     """
     if table.shared:
-        yield f"all rows: {', '.join(table.shared)}"
-    yield from _as_lines(table.frame)
-    if table.terms:
+        yield from _wrapped(f"all rows: {', '.join(table.shared)}")
+    frame, most = _narrow(table)
+    yield from _as_lines(frame, most)
+    left_out = [str(name) for name in table.frame if name not in frame]
+    if left_out:
         yield ""
+        yield from _wrapped(f"Not shown: {'; '.join(left_out)}. File: {table.file}.")
+    if table.notes or table.terms:
+        yield ""
+    for number, note in enumerate(table.notes, 1):
+        yield from _wrapped(f"({number}) Not usable: {note}.")
     for term in table.terms:
-        yield term[:1].upper() + term[1:] + "."
+        yield from _wrapped(f"{term[:1].upper()}{term[1:]}.")
 
 
-def _as_lines(frame: pd.DataFrame) -> list[str]:
+def _wrapped(text: str) -> list[str]:
+    """A text in lines of a terminal."""
+    return textwrap.wrap(text, WIDTH, break_long_words=False, break_on_hyphens=False)
+
+
+def _narrow(table: Sheet) -> tuple[pd.DataFrame, int]:
+    """The columns of a table that fit a terminal, and how wide cells may be.
+
+    The last ones are left out, but the verdict; what names a row is broken into lines
+    before the number that a reader should take is left out.
+    """
+    for most in (MOST_LETTERS, *FEWER_LETTERS):
+        shown = table.frame
+        least = _needed(table, shown)
+        while _width(shown, most) > WIDTH and len(shown.columns) > least:
+            place = -2 if shown.columns[-1] == sheets.VERDICT else -1
+            shown = shown.drop(columns=shown.columns[place])
+        if _width(shown, most) <= WIDTH:
+            return shown, most
+    while _width(shown, most) > WIDTH and len(shown.columns) > 1:
+        shown = shown.drop(columns=shown.columns[-1])
+    return shown, most
+
+
+def _needed(table: Sheet, frame: pd.DataFrame) -> int:
+    """How many columns a terminal needs: up to the interval, and the verdict."""
+    heads = [*frame]
+    if table.main not in heads:
+        return 2
+    return heads.index(table.main) + 2 + (sheets.VERDICT in heads)
+
+
+def _width(frame: pd.DataFrame, most: int) -> int:
+    """Letters of a line of a table, whose cells have a most."""
+    widths = _widths(frame, most)
+    return sum(widths) + BETWEEN * (len(widths) - 1)
+
+
+def _widths(frame: pd.DataFrame, most: int) -> list[int]:
+    """Letters of each column: as few as leave heads two lines, and cells theirs."""
+    found = []
+    for head, column in frame.items():
+        cells = max(map(len, column.astype(str)), default=1)
+        found.append(max(min(cells, most), head_width(str(head))))
+    return found
+
+
+def _as_lines(frame: pd.DataFrame, most: int) -> list[str]:
     """The lines of a table of texts; long heads and cells stand on several lines."""
     heads = [str(name) for name in frame]
-    rows = frame.to_numpy(str).tolist()
-    widths = []
-    for head, column in zip(heads, zip(*rows, strict=True), strict=True):
-        longest = max(map(len, (*column, *head.split())))
-        widths.append(min(longest, MOST_LETTERS))
-    return lines.table(rows, heads, widths)
+    return lines.table(frame.to_numpy(str).tolist(), heads, _widths(frame, most))

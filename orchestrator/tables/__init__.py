@@ -62,6 +62,7 @@ TABLES: Mapping[str, Listed] = {
             beside.TESTED,
             quoted.QUOTED,
             quoted.LAWS_OF_INTERVAL,
+            quoted.ENDS_OF_COMPARED,
         ),
     ),
     "pile_threshold": Listed(
@@ -80,6 +81,8 @@ TABLES: Mapping[str, Listed] = {
             beside.TESTED,
             quoted.QUOTED,
             quoted.FIRST,
+            quoted.ENDS_OF_COMPARED,
+            quoted.ENDS_OF_COMPARED_FIRST,
         ),
     ),
     "reason": Listed("a reason against a threshold", (usable.REASON,)),
@@ -206,7 +209,7 @@ def missing(tables: Mapping[str, pd.DataFrame]) -> list[str]:
     list of str
         The columns; there are some where another version wrote the tables.
     """
-    reported = {*verdict.COLUMNS, "interval_of"}
+    reported = {*verdict.COLUMNS, "interval_of", "advised"}
     for stem, unit in REPORTED.items():
         if stem not in OF_CHANNELS:
             ends = (stem, f"{stem}_low", f"{stem}_high", f"compared_{stem}")

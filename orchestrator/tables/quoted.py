@@ -22,15 +22,18 @@ from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.onset import of_grains
 from orchestrator.physics.reported import (
+    CHOICES,
     MEASURED,
     NUMERICAL,
     SEEDS,
     Interval,
     compared,
+    compared_range,
     has_no_law,
     in_units,
     tested_word,
 )
+from orchestrator.physics.verdict import ADVISED, advised
 from orchestrator.study.shapes import SHAPES
 from orchestrator.tables.columns import several
 from orchestrator.tables.facts import needs_run
@@ -41,6 +44,8 @@ ENDS = ("_low", "_high")
 OF_PILE = ("shields_numerical_low", "shields_numerical_high")
 OF_GRAIN = ("shields_dem_low", "shields_dem_high")
 """Columns of the ends of the numerical interval of a Shields number."""
+OF_CHOICES = ("shields_model_low", "shields_model_high")
+"""Columns of its ends by the choices that all methods share."""
 OF_FIRST = ("first_ustar0_numerical_low_m_s", "first_ustar0_numerical_high_m_s")
 """The same of the friction velocity at which motion starts."""
 
@@ -69,7 +74,9 @@ QUOTED: Mapping[str, str] = {
         "what the interval of the threshold in all its units is of: measured "
         "thresholds, in a gas field sites and a formula (tested_low, tested_high), "
         "else numerical (shields_numerical_low, "
-        "shields_numerical_high; of a single grain its load step), else seeds: the "
+        "shields_numerical_high; of a single grain its load step), numerical and "
+        "choices where it also holds the choices that all methods share "
+        "(shields_model_low, shields_model_high), else seeds: the "
         "range of replicates, where no error is known; of a usable single grain "
         "without these force laws: the range of those that hold"
     ),
@@ -128,7 +135,8 @@ def quoted(rows: pd.DataFrame, twins: "pd.Series[int] | None" = None) -> dict[st
     """Compute the columns that reports quote.
 
     The interval of a threshold is the tested one, where thresholds of such beds were
-    measured, else the numerical one; of replicates it holds the
+    measured, else the numerical one with the range of the choices that all methods
+    share, where it is known; of replicates it holds the
     intervals and the thresholds of all, and is open above if one does not reach the
     fraction. The ends of an interval of the Shields number are those of a stress: u*_0
     goes with its root. Values to compare are u*_0 times the ratio of the other
@@ -228,6 +236,96 @@ def with_laws(
             holds[asked] = found["holds"]
             by_law.append((ustar, holds))
     return {**columns, **own.or_of_laws(by_law).columns(rows)}
+
+
+ENDS_OF_COMPARED: Mapping[str, str] = {
+    **ADVISED,
+    "compared_ustar0_low_m_s": (
+        "lower end of the interval of compared_ustar0_m_s: it holds that of "
+        "ustar0_m_s, a numerical one in proportion, both numbers, and the ends of what "
+        "was measured (measured_low, measured_high); of a threshold that is not usable "
+        "these alone"
+    ),
+    "compared_stress_low_pa": "stress of the flow of compared_ustar0_low_m_s",
+    "compared_wind_10m_low_m_s": "wind of the flow of compared_ustar0_low_m_s",
+    "compared_mean_velocity_low_m_s": (
+        "mean velocity of the flow of compared_ustar0_low_m_s"
+    ),
+    "compared_ustar0_high_m_s": "upper end of this interval; empty where it is open",
+    "compared_stress_high_pa": "stress of the flow of compared_ustar0_high_m_s",
+    "compared_wind_10m_high_m_s": "wind of the flow of compared_ustar0_high_m_s",
+    "compared_mean_velocity_high_m_s": (
+        "mean velocity of the flow of compared_ustar0_high_m_s"
+    ),
+}
+"""Columns of `with_advice`, of all thresholds."""
+ENDS_OF_COMPARED_FIRST: Mapping[str, str] = {
+    "compared_first_ustar0_low_m_s": (
+        "lower end of the interval of compared_first_ustar0_m_s, made as that of "
+        "compared_ustar0_m_s"
+    ),
+    "compared_first_ustar0_high_m_s": (
+        "upper end of this interval; empty where it is open"
+    ),
+    "compared_first_stress_low_pa": (
+        "stress of the flow of compared_first_ustar0_low_m_s"
+    ),
+    "compared_first_stress_high_pa": (
+        "stress of the flow of compared_first_ustar0_high_m_s"
+    ),
+    "compared_first_wind_10m_low_m_s": (
+        "wind 10 m above the bed of the flow of compared_first_ustar0_low_m_s"
+    ),
+    "compared_first_wind_10m_high_m_s": (
+        "wind 10 m above the bed of the flow of compared_first_ustar0_high_m_s"
+    ),
+    "compared_first_mean_velocity_low_m_s": (
+        "mean velocity of the flow of compared_first_ustar0_low_m_s"
+    ),
+    "compared_first_mean_velocity_high_m_s": (
+        "mean velocity of the flow of compared_first_ustar0_high_m_s"
+    ),
+}
+"""Columns of `with_advice`, of beds."""
+
+
+def with_advice(
+    rows: pd.DataFrame,
+    columns: Mapping[str, Any],
+    verdicts: Mapping[str, Any],
+    twins: "pd.Series[int] | None" = None,
+) -> dict[str, Any]:
+    """Add which number is advised, and the intervals of those to compare with.
+
+    Parameters
+    ----------
+    rows
+        All thresholds of a study, with the columns of their scenes and of `beside`.
+    columns
+        Those of `quoted`.
+    verdicts
+        Those of `verdict.columns`.
+    twins
+        As `quoted` takes it.
+
+    Returns
+    -------
+    dict of str to ndarray
+        The columns with those of `ENDS_OF_COMPARED`, and of beds with
+        `ENDS_OF_COMPARED_FIRST`.
+    """
+    judged = rows.assign(**columns, **verdicts)
+    usable = np.asarray(verdicts["usable"], bool)
+    made: dict[str, Any] = {"advised": advised(judged.to_dict("records"))}
+    flows = {"": _ustar(rows)}
+    if "first_ustar0_m_s" in rows:
+        flows["first_"] = rows["first_ustar0_m_s"].to_numpy(float)
+    for which, ustar in flows.items():
+        ends = _Ends(*compared_range(columns, ustar, usable, which))
+        there = np.asarray(columns[f"compared_{which}ustar0_m_s"], float)
+        for end, at in zip(ENDS, _held(ends, there, twins), strict=True):
+            made |= in_units(at, rows, end, f"compared_{which}")
+    return {**columns, **made}
 
 
 def reported(rows: pd.DataFrame) -> pd.DataFrame:
@@ -348,10 +446,12 @@ def _first(rows: pd.DataFrame, twins: "pd.Series[int] | None") -> dict[str, Floa
     first = rows["first_ustar0_m_s"].to_numpy(float)
     theta = rows["shields"].to_numpy(float)
     is_tested = _is_tested(rows)
+    squares = _Ends(*(rows[name].to_numpy(float) ** 2 for name in OF_FIRST))
+    wide = _with_choices(rows, squares, first**2)
     ends = []
-    for name, tested in zip(OF_FIRST, ("tested_low", "tested_high"), strict=True):
+    for own, tested in zip(wide, ("tested_low", "tested_high"), strict=True):
         by_measured = _rooted(first, rows[tested].to_numpy(float), theta)
-        ends.append(np.where(is_tested, by_measured, rows[name].to_numpy(float)))
+        ends.append(np.where(is_tested, by_measured, np.sqrt(own)))
     held = _held(_Ends(*ends), first, twins)
     columns: dict[str, FloatArray] = {}
     for end, at in {"": first, **dict(zip(ENDS, held, strict=True))}.items():
@@ -376,11 +476,35 @@ def _interval(rows: pd.DataFrame) -> _Ends:
     """The ends of the Shields number of each row by itself."""
     names = OF_PILE if OF_PILE[0] in rows else OF_GRAIN
     is_tested = _is_tested(rows)
+    of_method = _Ends(*(rows[name].to_numpy(float) for name in names))
+    wide = _with_choices(rows, of_method, rows["shields"].to_numpy(float))
     ends = []
-    for name, tested in zip(names, ("tested_low", "tested_high"), strict=True):
-        of_method = rows[name].to_numpy(float)
-        ends.append(np.where(is_tested, rows[tested].to_numpy(float), of_method))
+    for own, tested in zip(wide, ("tested_low", "tested_high"), strict=True):
+        ends.append(np.where(is_tested, rows[tested].to_numpy(float), own))
     return _Ends(*ends)
+
+
+def _has_choices(rows: pd.DataFrame) -> BoolArray:
+    """Which thresholds have a range of the choices that all methods share."""
+    if OF_CHOICES[0] not in rows:
+        return np.zeros(len(rows), bool)
+    return rows[OF_CHOICES[0]].notna().to_numpy(bool)
+
+
+def _with_choices(rows: pd.DataFrame, ends: _Ends, value: FloatArray) -> _Ends:
+    """Numerical intervals of values that go with θ_c, which hold the choices as well.
+
+    An end that is not known stays so.
+    """
+    has_choices = _has_choices(rows)
+    if not has_choices.any():
+        return ends
+    theta = rows["shields"].to_numpy(float)
+    low, high = (rows[name].to_numpy(float) / theta * value for name in OF_CHOICES)
+    return _Ends(
+        np.where(has_choices, np.minimum(ends.low, low), ends.low),
+        np.where(has_choices, np.maximum(ends.high, high), ends.high),
+    )
 
 
 def _rooted(ustar: FloatArray, end: FloatArray, theta: FloatArray) -> FloatArray:
@@ -430,8 +554,8 @@ def _named(
             for each in (is_tested, is_numerical)
         )
     is_known = np.isfinite(held.low) | np.isfinite(held.high)
-    choices = [~is_known, is_tested, is_numerical]
-    names = np.array([None, MEASURED, NUMERICAL, SEEDS], object)
+    choices = [~is_known, is_tested, is_numerical & _has_choices(rows), is_numerical]
+    names = np.array([None, MEASURED, CHOICES, NUMERICAL, SEEDS], object)
     first = np.argmax([*choices, np.ones(len(rows), bool)], axis=0)
     return np.asarray(np.where(first == 1, tested_word(rows), names[first]))
 

@@ -21,7 +21,13 @@ from orchestrator.tables.check import Contradictions
 from orchestrator.tables.columns import several
 from orchestrator.tables.facts import needs_run, packs_grains
 from orchestrator.tables.kinds import INTERLOCKED, tested_as
-from orchestrator.tables.quoted import OF_PILE, of_rows, quoted, with_laws
+from orchestrator.tables.quoted import (
+    OF_PILE,
+    of_rows,
+    quoted,
+    with_advice,
+    with_laws,
+)
 from orchestrator.types import Row
 
 CARRIED_OFF = 0.1
@@ -182,6 +188,7 @@ def with_usable(
     of_verdict = verdict.columns(records, reasons)
     if not is_pile:
         units = with_laws(rows, units, np.array(of_verdict["usable"], bool))
+    units = with_advice(rows, units, of_verdict, twins)
     made = {**of_verdict, **measured, **units}
     judged = pd.concat([table, pd.DataFrame(made, index=table.index)], axis=1)
     return Judged(judged, pd.DataFrame(_listed(records, reasons)))
