@@ -221,3 +221,28 @@ def plain(value: float, digits: int = 3) -> str:
     rest = rest.rstrip("0") or "0"
     power = str(int(exponent)).translate(RAISED)
     return f"{whole}.{rest} × 10{power}".replace("-", "−")
+
+
+def metres(value: float, digits: int = 3) -> str:
+    """Write a length for a reader: in metres from 1 m on, else in millimetres.
+
+    Parameters
+    ----------
+    value
+        The length, m.
+    digits
+        Digits that matter.
+
+    Returns
+    -------
+    str
+        The text.
+
+    Examples
+    --------
+    >>> metres(40.0), metres(3e-4), metres(-0.05)
+    ('40 m', '0.3 mm', '−50 mm')
+    """
+    if abs(value) >= 1:
+        return f"{plain(value, digits)} m"
+    return f"{plain(1e3 * value, digits)} mm"

@@ -82,7 +82,7 @@ def test_a_study_of_single_grains_and_the_same_again(
     first = orchestrator("study", grains, "--out", "out")
     assert first.returncode == 0, first.stderr
     last = first.stdout.split("\n")[-2]
-    assert first.stdout.startswith("At which wind does one grain start to move")
+    assert first.stdout.startswith("At what wind does a grain start to move")
     (shared,) = [line for line in first.stdout.splitlines() if "all rows" in line]
     assert "usable: yes" in shared
     assert "Shields number" in first.stdout

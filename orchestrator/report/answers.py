@@ -38,6 +38,7 @@ from orchestrator.study import fields
 from orchestrator.study.profile import WITH_X
 from orchestrator.study.shapes import SHAPES
 from orchestrator.tables.facts import packs_grains
+from orchestrator.tables.paired import SHELTER
 from orchestrator.tables.quoted import is_flat, of_rows
 
 NONE = Card(
@@ -52,8 +53,6 @@ NUMBERS = "the numerical error of the method, load steps and count"
 """What the numerical interval of a fraction of a bed is of."""
 FIRST = "the numerical error of the method and the load step"
 """What that of the first motion is of."""
-SHELTER = ("obstacles", "spacing", "forms")
-"""Columns of what shelters a bed."""
 MIXTURE = ("sizes",)
 """Columns of what a bed is made of, whose beds are never put into one range."""
 FLUIDS = ("rho_f_kg_m3", "nu_m2_s")
@@ -350,6 +349,8 @@ def _of_several(rows: pd.DataFrame, results: Results) -> Card:
     worth = _worth_of_many(every, rows)
     if _are_unlike(results.at_fraction, telling):
         return _of_unlike(rows, results, told, telling, worth)
+    if set(telling) <= {*SHELTER} and "paired" in results.tables:
+        return _of_shelter(results, told, telling)
     usable = rows[valid(rows)]
     shown = usable if len(usable) else rows
     by = single.advised_column(shown.iloc[0], told)
@@ -366,6 +367,89 @@ def _of_several(rows: pd.DataFrame, results: Results) -> Card:
         tuple(numbers),
         single.source(shown.iloc[0]),
         replace(worth, advice=advice),
+    )
+
+
+def _of_shelter(
+    results: Results, told: ReportedQuantity, telling: Sequence[str]
+) -> Card:
+    """The card of beds that differ in their shelter: ratios to the bed without it."""
+    rows = results.ratios(results.at_fraction)
+    pairs = rows[rows[f"{told.stem}_ratio"].notna()].drop_duplicates([*telling])
+    without = rows[rows["scene_id"].isin(results.tables["paired"]["without_id"])]
+    bare = without.iloc[0]
+    name = single.threshold_name(told)
+    numbers = []
+    for which, shown in (("", pairs[: MOST_NUMBERS - 1]), ("first_", pairs[:1])):
+        for _, row in shown.iterrows():
+            of = "first motion" if which else f"{percent(row['fraction'])} entrained"
+            what = ", ".join(labels.told(row, telling))
+            numbers.append(_ratio(row, bare, told, which, f"{name}, {of}: {what}"))
+    pile = results.plan.piles[str(bare["scene_id"])]
+    shelter, against = _shelter(results, bare, telling)
+    shape = f"this {pile.bed.form.word}"
+    if pile.bed.forms > 1:
+        shape = f"these {pile.bed.form.words}"
+    return Card(
+        f"How much does {shelter} raise the {told.flow} that moves {shape}?",
+        _span_of(results.at_fraction),
+        tuple(numbers),
+        f"Ratios of thresholds to those {against}. Both beds have the same grains, "
+        "forces, method and meshes: an error that both share in proportion cancels. "
+        "Whether the numerical error is such a one was not tested.",
+        _worth_of_ratios(results.ratios(results.joined("pile_threshold")), told),
+    )
+
+
+def _shelter(
+    results: Results, bare: pd.Series, telling: Sequence[str]
+) -> tuple[str, str]:
+    """What shelters some beds, and what the bed without it is called."""
+    if "obstacles" not in telling:
+        return (
+            "a closer spacing",
+            f"at a spacing of {labels.value('spacing', bare['spacing'])}",
+        )
+    scenes = [pile.scene for pile in results.plan.piles.values()]
+    kinds = {each.kind for scene in scenes for each in scene.obstacles}
+    if len(kinds) == 1:
+        (kind,) = kinds
+        return f"a {kind}", f"without a {kind}"
+    return "an obstacle", "without one"
+
+
+def _worth_of_ratios(every: pd.DataFrame, told: ReportedQuantity) -> Worth:
+    """What the ratios of sheltered beds are worth."""
+    pairs = every[every[f"{told.stem}_ratio"].notna()]
+    count = int(pairs["ratio_usable"].sum())
+    alone = int(every["usable"].sum())
+    advice = (
+        f"Take the ratios. Of the thresholds themselves {alone} of {len(every)} are "
+        "usable; the reasons against the others stand below the table."
+    )
+    if count == len(pairs):
+        return Worth("good", "usable, as ratios", advice)
+    word = f"usable, with gaps: {count} of {len(pairs)} ratios"
+    return Worth("care", word, advice)
+
+
+def _ratio(
+    row: pd.Series, without: pd.Series, told: ReportedQuantity, which: str, meaning: str
+) -> Number:
+    """The ratio of a threshold with shelter to that without, and both."""
+    name = f"{which}{told.stem}_ratio"
+    ends = [float(each[f"{which}{told.column()}"]) for each in (without, row)]
+    both = " → ".join(f"{end:.3g}" for end in ends)
+    return Number(
+        float(row[name]),
+        "",
+        meaning,
+        f"by the model {both} {told.unit}",
+        low=float(row[f"{name}_low"]),
+        high=float(row[f"{name}_high"]),
+        interval_of="paired: one grain and one load step more or less in each bed",
+        decimals=2,
+        is_ratio=True,
     )
 
 
@@ -388,6 +472,7 @@ def _of_unlike(
 ) -> Card:
     """The card of beds of several fluids, methods or mixtures: a number for each."""
     rows = rows.loc[sorted(rows.index)]
+    rows = rows.sort_values("usable", ascending=False, kind="stable")
     numbers = []
     if not rows["usable"].any():
         rows_of_level = (row for _, row in rows.iterrows())
@@ -399,7 +484,7 @@ def _of_unlike(
     firsts = rows.drop_duplicates(keys)
     order = pd.concat([firsts, rows]).drop_duplicates(["scene_id"])
     for _, row in order.iterrows():
-        numbers.append(share(row, told, _name_of(row, telling)))
+        numbers.append(share(row, told, _name_of(row, rows, telling)))
     shown = [each for each in numbers if each is not None]
     left = len(shown) - MOST_NUMBERS
     source = single.source(rows.iloc[0])
@@ -418,13 +503,13 @@ def _of_unlike(
     )
 
 
-def _name_of(row: pd.Series, telling: Sequence[str]) -> str:
-    """What a bed among others is called: its group, and its method."""
+def _name_of(row: pd.Series, rows: pd.DataFrame, telling: Sequence[str]) -> str:
+    """What a bed among others is called: its group, and what differs within that."""
     group = str(row["group"])
     if not group or "; " in group:
         return ", ".join(labels.told(row, list(telling)[:3]))
-    methods = [name for name in telling if name in ("method", "asked")]
-    return ", ".join([f"“{group}”", *labels.told(row, methods)])
+    within = labels.varying(rows[rows["group"] == row["group"]], "fraction")
+    return ", ".join([f"“{group}”", *labels.told(row, within[:2])])
 
 
 def _axes(telling: Sequence[str]) -> str:

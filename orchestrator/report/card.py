@@ -62,6 +62,8 @@ class Number:
         Whether the number is not usable.
     is_measured
         Whether it is what was measured, to be taken in place of the model's.
+    is_ratio
+        Whether the number is a factor, which stands behind ``×``.
     decimals
         Digits behind the point; None for as many as the number needs.
     mark
@@ -88,6 +90,7 @@ class Number:
     is_of_model: bool = False
     is_grey: bool = False
     is_measured: bool = False
+    is_ratio: bool = False
     decimals: int | None = None
     mark: Mark | None = None
     word: str = ""
@@ -117,7 +120,8 @@ class Number:
     @property
     def figure(self) -> str:
         """The number as it is written, or its word."""
-        return self.word or self._written(self.value, self.last, "–")
+        times = "× " if self.is_ratio else ""
+        return self.word or f"{times}{self._written(self.value, self.last, '–')}"
 
     @property
     def interval(self) -> str:

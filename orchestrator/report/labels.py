@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from orchestrator.digits import plain
+from orchestrator.digits import metres, plain
 from orchestrator.report.card import apart
 from orchestrator.study import fields
 from orchestrator.study.declare import Info
@@ -25,6 +25,8 @@ OTHERS = {
     "asked": Info("method asked for"),
 }
 """Words of columns of tables that are no fields."""
+NAMED = ("obstacles",)
+"""Columns whose texts say themselves what they are."""
 OF_METHODS = {"DEM", "DEM of piles", "DEM and peeling", "DEM and peeling of piles"}
 """Scopes of fields that have no effect by other methods."""
 
@@ -69,7 +71,10 @@ def value_text(column: str, value: Any) -> str:
     """
     info = info_of(column)
     if isinstance(value, str):
-        return info.choices.get(value, f"{info.label} {_named(column, value)}")
+        named = _named(column, value)
+        if column not in NAMED:
+            named = f"{info.label} {named}"
+        return info.choices.get(value, named)
     if pd.isna(value):
         return f"no {info.label}"
     symbol = info.symbol.replace("_0", "₀") or info.label
@@ -198,8 +203,7 @@ def amount(value: float, unit: str) -> str:
     if unit in ("d", "h"):
         return ratio_in_words(value, unit)
     if unit == "m":
-        is_long = abs(value) >= 1
-        return f"{plain(value, 4)} m" if is_long else f"{plain(1e3 * value, 4)} mm"
+        return metres(value, 4)
     if unit == "%":
         return f"{plain(100.0 * value, 4)} %"
     if unit == "°":

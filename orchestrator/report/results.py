@@ -234,6 +234,31 @@ class Results:
         )
         return rows[rows["fraction"] == nearest]
 
+    def ratios(self, rows: pd.DataFrame) -> pd.DataFrame:
+        """Add to thresholds of piles their ratios to those without shelter.
+
+        Parameters
+        ----------
+        rows
+            Thresholds of piles.
+
+        Returns
+        -------
+        DataFrame
+            The rows with the ratio columns of the table ``paired``, and with those of
+            the first motion behind ``first_``; as they are without the table.
+        """
+        paired = self.tables.get("paired", pd.DataFrame())
+        if paired.empty:
+            return rows
+        names = [name for name in paired if "_ratio" in name or name == "ratio_usable"]
+        of_first = paired[paired["fraction"].isna()].set_index("scene_id")[names]
+        keys = ["scene_id", "fraction"]
+        of_rows = paired.dropna(subset="fraction").set_index(keys)[names]
+        return rows.join(of_rows, on=keys).join(
+            of_first.add_prefix("first_"), on="scene_id"
+        )
+
     @property
     def exemplars(self) -> pd.DataFrame:
         """The thresholds at that fraction, seeds as one, rising by slope.

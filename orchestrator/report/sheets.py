@@ -134,7 +134,7 @@ def short(results: Results) -> Sheet | None:
         Of piles thresholds at every fraction if these are few, else at one; of single
         grains those of the grains. None without thresholds.
     """
-    every = results.joined("pile_threshold")
+    every = results.ratios(results.joined("pile_threshold"))
     if len(every):
         return _of_piles(results, every)
     grains = single_grains_sheet(results)
@@ -359,6 +359,8 @@ def _noted(frame: pd.DataFrame) -> tuple[pd.DataFrame, tuple[str, ...]]:
 USTAR_HEAD = "friction velocity u*₀, m/s"
 TAU_HEAD = "θ_c"
 TAU_INTERVAL = "interval of θ_c"
+RATIO = "ratio to no shelter"
+PAIRED = "paired interval"
 OTHER = "compared_"
 """What the names of columns of numbers with another critical number begin with."""
 SPANS_OF_SIZES = {
@@ -436,6 +438,9 @@ def _columns(
     if f"{OTHER}{told.column()}" in known:
         advised = rows["advised"].iloc[0]
     columns = _flows(told, advised, with_what)
+    if f"{told.stem}_ratio" in known:
+        ends = [f"{told.stem}_ratio_low", f"{told.stem}_ratio_high"]
+        columns = {RATIO: [f"{told.stem}_ratio"], PAIRED: ends, **columns}
     of_model = "" if advised == MODEL else " by the model"
     columns[f"{TAU_HEAD}{of_model}"] = ["shields"]
     columns[f"{TAU_INTERVAL}{of_model}"] = ["shields_low", "shields_high"]

@@ -295,7 +295,7 @@ def reported_number(
         high=other[2],
         interval_of=of_what,
         other=own[0],
-        other_is=MODEL if is_pair else MODEL_ALONE,
+        other_is=model_name(row),
         other_low=own[1],
         other_high=own[2],
         value_is=with_threshold(row) if is_pair else "",
@@ -357,10 +357,29 @@ def advised_column(row: Row, told: ReportedQuantity) -> str:
     Returns
     -------
     str
-        The column; the model's where both numbers stand with equal right.
+        The column of the number that stands first.
     """
-    is_corrected = row.get("advised") == verdict.WITH_MEASURED
+    advised = row.get("advised", verdict.MODEL)
+    has_other = known_number(row.get(f"compared_{told.column()}")) > 0
+    is_usable = row["verdict"] != verdict.UNUSABLE
+    is_corrected = advised != verdict.MODEL and has_other and is_usable
     return f"compared_{told.column()}" if is_corrected else told.column()
+
+
+def model_name(row: Row) -> str:
+    """Name the computed number beside one with another critical Shields number.
+
+    Parameters
+    ----------
+    row
+        A threshold.
+
+    Returns
+    -------
+    str
+        `MODEL` where both stand with equal right, else `MODEL_ALONE`.
+    """
+    return MODEL if row.get("advised") == verdict.BOTH else MODEL_ALONE
 
 
 def threshold_name(told: ReportedQuantity) -> str:

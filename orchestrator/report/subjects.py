@@ -3,6 +3,7 @@
 import math
 from typing import NamedTuple
 
+from orchestrator import digits
 from orchestrator.digits import plain
 from orchestrator.physics.fluids import is_gas, is_like_paper
 from orchestrator.study.profile import Profile
@@ -155,9 +156,7 @@ def length(metres: float) -> str:
     >>> length(40.0), length(3e-4)
     ('40 m', '0.3 mm')
     """
-    if abs(metres) >= 1:
-        return f"{metres:.3g} m"
-    return f"{1e3 * metres:.3g} mm"
+    return digits.metres(metres)
 
 
 def digits_of_place(profile: Profile) -> int:

@@ -14,7 +14,7 @@ import pydantic
 from numpy.typing import ArrayLike
 from pydantic import Field, InstanceOf, PlainSerializer, model_validator
 
-from orchestrator.digits import rounded
+from orchestrator.digits import metres, rounded
 from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
 from orchestrator.physics.fluids import PAPER
 from orchestrator.physics.laws import DEFAULT, LAWS
@@ -305,8 +305,8 @@ class Obstacle(Part):
         return reach
 
     def __str__(self) -> str:
-        length = f", {self.length:g} m long" if self.length else ""
-        return f"{self.kind} of {self.height:g} m at {self.x:g} m{length}"
+        length = f", {metres(self.length)} long" if self.length else ""
+        return f"{self.kind} {metres(self.height)} high at x = {metres(self.x)}{length}"
 
 
 class Bed(Part):

@@ -27,7 +27,7 @@ from orchestrator.plan import Plan
 from orchestrator.runs.files import Folder, digest_text
 from orchestrator.study import fields
 from orchestrator.study.study import Study
-from orchestrator.tables import check, quoted, rows, usable
+from orchestrator.tables import check, paired, quoted, rows, usable
 from orchestrator.tables.check import contradictions, with_agreement
 from orchestrator.tables.columns import Listed, several
 from orchestrator.tables.quoted import of_classes
@@ -104,6 +104,10 @@ TABLES: Mapping[str, Listed] = {
     "form": Listed("a form of a train and a fraction: its threshold", (rows.FORM,)),
     "flow": Listed("a solved flow", (rows.FLOW,)),
     "wall_stress": Listed("a place on the bed of a solved flow", (rows.WALL_STRESS,)),
+    "paired": Listed(
+        "a bed with shelter and a fraction: its threshold over that without shelter",
+        (paired.PAIRED,),
+    ),
     "check": Listed(
         "a threshold that DEM answered too, as a check of a fast method",
         (rows.CHECK, check.AGREEMENT),
@@ -167,8 +171,7 @@ def make_tables(study: Study, plan: Plan, cases: Path, done: Container[str]) -> 
     scenes = pd.DataFrame(rows.scenes(study, plan))
     methods = pd.DataFrame(rows.methods(plan))
     asked = with_methods(scenes, methods)
-    cells = [cell for cell in plan.cells if cell.name in done]
-    grains = pd.DataFrame(rows.single_grain_rows(plan, cells, cases))
+    grains = _single_grains(plan, cases, done)
     thresholds = with_scatter(_listed(rows.pile_threshold, answers), asked)
     checks = with_agreement(
         pd.DataFrame(rows.check_rows(plan, cases, done)), thresholds
@@ -176,6 +179,7 @@ def make_tables(study: Study, plan: Plan, cases: Path, done: Container[str]) -> 
     against = contradictions(checks)
     beds = with_usable(thresholds, asked, study.tolerance, against)
     lone = with_usable(grains, asked, study.tolerance)
+    curves = _stacked(map(rows.pile_curve, answers))
     made = {
         "scenes": scenes,
         "methods": methods,
@@ -185,15 +189,22 @@ def make_tables(study: Study, plan: Plan, cases: Path, done: Container[str]) -> 
         ),
         "flow": pd.DataFrame([rows.flow(pile, cases) for pile in flows.values()]),
         "pile_grain": _stacked(map(rows.pile_grain, answers)),
-        "pile_curve": _stacked(map(rows.pile_curve, answers)),
+        "pile_curve": curves,
         "pile_threshold": beds.table,
         "reason": pd.concat([beds.reasons, lone.reasons], ignore_index=True),
         "size_class": of_classes(_listed(rows.size_class, answers), beds.table),
         "bed_change": _stacked(rows.bed_changes(answers)),
         "form": _listed(rows.forms, answers),
+        "paired": paired.paired(beds.table, curves, asked),
         "check": checks,
     }
     return {name: table for name, table in made.items() if not table.empty}
+
+
+def _single_grains(plan: Plan, cases: Path, done: Container[str]) -> pd.DataFrame:
+    """The rows of the single grains whose cells are done."""
+    cells = [cell for cell in plan.cells if cell.name in done]
+    return pd.DataFrame(rows.single_grain_rows(plan, cells, cases))
 
 
 def missing(tables: Mapping[str, pd.DataFrame]) -> list[str]:

@@ -111,7 +111,7 @@ def test_the_answer_comes_first_and_the_other_laws_beside_it(
     code, out, err = run(*SAND_IN_AIR, "--law", law)
     assert (code, err) == (0, "")
     record = _json(run(*SAND_IN_AIR, "--law", law, "--json"))
-    assert out.startswith("At which wind does a grain of ")
+    assert out.startswith("At what wind does a grain of ")
     (told,) = [line for line in out.splitlines() if "friction velocity;" in line]
     assert float(told.split()[0]) == pytest.approx(
         record[law]["friction_velocity"], rel=0.05
@@ -184,7 +184,7 @@ def test_a_number_that_is_usual_in_another_unit_is_asked_about_and_answered(
     assert question in err
     assert err.count("\n") == 1
     is_table = out.startswith("Force law bridged")
-    assert is_table or out.startswith("At which ")
+    assert is_table or out.startswith("At what ")
 
 
 @pytest.mark.parametrize(
@@ -285,7 +285,7 @@ def test_gravel_is_answered_by_a_law_that_holds(run: Run) -> None:
     gravel = ["--diameter", "0.03", "--density", "2650", "--fluid", "water"]
     code, out, _ = run(*gravel, "--criterion", "entrained")
     assert code == 0
-    assert out.startswith("At which flow does a grain of 30 mm start to move?")
+    assert out.startswith("At what flow does a grain of 30 mm start to move?")
     assert "19.2 Pa" in out
     (answer,) = [line for line in out.splitlines() if "<- the answer" in line]
     assert answer.startswith("bridged-gravel")

@@ -140,7 +140,7 @@ def test_a_finished_study_is_answered_without_any_library(
     ended = orchestrator("study", "small.toml", "--out", "out")
     assert ended.returncode == 0, ended.stderr
     assert ended.stdout.endswith(f"{finished.out}/report.html\n")
-    assert "At which wind does one grain start to move" in ended.stdout
+    assert "At what wind does a grain start to move" in ended.stdout
     changed = orchestrator("study", "small.toml", "--out", "out", "--tolerance", "0.1")
     assert changed.returncode == 1
     finished.source.write_text(f"title = 'another'\n{finished.source.read_text()}")
@@ -279,7 +279,7 @@ def test_a_figure_that_failed_is_drawn_the_next_time(
         printed = capsys.readouterr()
         assert "shields: MemoryError: for this test" in printed.err
         assert "the same command draws it again" in printed.err
-        assert "At which wind does a grain of 1 mm start to move?" in printed.out
+        assert "At what wind does a grain of 1 mm start to move?" in printed.out
         assert "MemoryError: for this test" in (out / "report.html").read_text()
         assert not (out / "figures" / "shields.svg").exists()
         assert not _is_finished(file, out)

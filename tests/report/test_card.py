@@ -20,14 +20,14 @@ from orchestrator.report.figures import shields as overview
 from orchestrator.report.results import Results
 from tests.report.conftest import axes_of, changed, copies, legend_of, only
 
-WIND = Number(13.44, "m/s", "wind", low=9.947, high=13.44, compared=9.683)
+WIND = Number(13.44, "m/s", "wind", low=9.947, high=13.44, other=9.683)
 WORTH = Worth("care", "usable, with a correction", "Take the measured value.")
 
 
 def test_ends_have_the_digits_of_their_number() -> None:
     assert (WIND.figure, WIND.interval, WIND.beside) == ("13.4", "9.9 … 13.4", "9.7")
     stress = Number(19.2, "Pa", "", last=38.0, low=math.nan, high=40.0)
-    assert (stress.figure, stress.interval) == ("19.2–38.0", "below 40.0")
+    assert (stress.figure, stress.interval) == ("19.2–38.0", "below 40.0, open")
     alike = Number(0.1719, "Pa", "", low=0.1717, high=0.1721)
     assert (alike.figure, alike.interval) == ("0.17", "0.1717 … 0.1721")
     count = Number(7, "of 17", "claims", decimals=0)
@@ -44,9 +44,9 @@ def test_a_terminal_has_all_that_a_card_has() -> None:
     said = [*lines(card)]
     assert all(len(line) < 80 for line in said)
     text = " ".join(" ".join(said).split())
-    for part in ("At which wind?", "13.4 m/s", "9.9 … 13.4", "9.7 wind"):
+    for part in ("At which wind?", "13.4 m/s", "9.9 … 13.4", "9.7"):
         assert part in text
-    assert "◐ Usable, with a correction: take the measured value." in text
+    assert "◐ Usable, with a correction. Take the measured value." in text
 
 
 def test_measured_is_the_same_flow_with_the_measured_threshold(
@@ -123,7 +123,7 @@ def test_the_growth_of_motion_fits_a_narrow_page(results: Results) -> None:
     assert growth.canvas
     assert growth.canvas.get_figwidth() == style.NARROW
     # in a gas no threshold was measured at this Re*: a formula stands beside it
-    assert "with the threshold of the formula" in legend_of(growth)
+    assert "with θ_c of Shao and Lu" in legend_of(growth)
 
 
 def test_one_bed_has_its_picture_and_its_growth_at_the_head(results: Results) -> None:
@@ -134,7 +134,7 @@ def test_one_bed_has_its_picture_and_its_growth_at_the_head(results: Results) ->
     assert places["bed-alpha15"] == "lead"
     assert places["share"] == "under"
     assert not {"where", "sweep", "sizes", "grain", "laws"} & places.keys()
-    place = answers.card(heap).numbers[0]
+    *_, place = answers.card(heap).numbers
     row = heap.joined("pile_threshold").iloc[0]
     assert place.value == pytest.approx(1e3 * row["first_x_m"])
 
@@ -143,7 +143,10 @@ def test_the_growth_of_motion_passes_through_the_answer(results: Results) -> Non
     heap = only(results, "pile")
     (figure, *_) = fractions.FIGURE.draw(heap)
     (ax,) = axes_of(figure)
-    computed, measured, card = ax.lines
+    of_both = [line for line in ax.lines if not line.get_gid()]
+    measured, computed = of_both
+    (card,) = [line for line in ax.lines if line.get_gid() == "card"]
+    (model,) = [line for line in ax.lines if line.get_gid() == "model"]
     row = heap.exemplars.iloc[0]
     curve = heap.tables["pile_curve"]
     told = single.quantity_of_row(row)
@@ -156,8 +159,12 @@ def test_the_growth_of_motion_passes_through_the_answer(results: Results) -> Non
         units.told_by(row, ratio * curve["ustar0_m_s"], told)
     )
     ((flow, part),) = np.asarray(card.get_xydata(), float)
-    assert flow == pytest.approx(answers.card(heap).numbers[2].value)
+    number = answers.card(heap).numbers[0]
+    assert flow == pytest.approx(number.value)
     assert part == row["fraction"]
+    # in the article's gas both numbers have equal right
+    assert number.is_pair
+    assert np.asarray(model.get_xdata())[0] == pytest.approx(number.other)
 
 
 def test_motion_starts_within_the_interval_of_its_place(results: Results) -> None:
@@ -165,12 +172,12 @@ def test_motion_starts_within_the_interval_of_its_place(results: Results) -> Non
     table = heap.tables["pile_threshold"]
     # no error was measured at the first of so many grains
     assert table["first_numerical_error"].isna().all()
-    assert math.isnan(answers.card(heap).numbers[0].low)
+    assert math.isnan(answers.card(heap).numbers[-1].low)
     wide = changed(heap, pile_threshold=table.assign(first_numerical_error=0.5))
     narrow = changed(heap, pile_threshold=table.assign(first_numerical_error=0.0))
     ends = []
     for each in (narrow, wide):
-        place = answers.card(each).numbers[0]
+        place = answers.card(each).numbers[-1]
         assert place.low <= place.value <= place.high
         ends.append((place.low, place.high))
     assert ends[1][0] < ends[0][0]
@@ -183,24 +190,24 @@ def test_the_first_motion_has_an_interval_in_its_unit(results: Results) -> None:
     first = row["first_wind_10m_m_s"]
     assert math.isnan(row["first_wind_10m_low_m_s"])
     assert math.isnan(row["first_wind_10m_high_m_s"])
-    assert math.isnan(answers.card(heap).numbers[1].low)
+    assert math.isnan(answers.card(heap).numbers[1].other_low)
     ends = {
         "first_wind_10m_low_m_s": 0.9 * first,
         "first_wind_10m_high_m_s": 1.1 * first,
     }
     known = heap.tables["pile_threshold"].assign(**ends)
     number = answers.card(changed(heap, pile_threshold=known)).numbers[1]
-    assert number.low < number.value < number.high
+    assert number.other_low < number.other < number.other_high
     beside: dict[str, float | str] = {"tested_rows": 20.0, "tested_held": 0.8}
     beside |= {"interval_of": "measured thresholds"}
     beside |= {"first_wind_10m_low_m_s": first / 2}
     beside |= {"first_wind_10m_high_m_s": 2 * first}
-    table = heap.tables["pile_threshold"].assign(**beside)
+    table = heap.tables["pile_threshold"].assign(**beside, advised="model")
     tested = answers.card(changed(heap, pile_threshold=table)).numbers[1]
     assert "80 % of 20 measured" in tested.interval_of
     # a stress goes with the square of the friction velocity, and of the wind
-    assert tested.low == pytest.approx(number.value / 2, rel=0.1)
-    assert tested.high == pytest.approx(2 * number.value, rel=0.1)
+    assert tested.low == pytest.approx(tested.value / 2, rel=0.1)
+    assert tested.high == pytest.approx(2 * tested.value, rel=0.1)
 
 
 def test_the_answer_of_a_picture_is_that_of_the_card() -> None:

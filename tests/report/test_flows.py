@@ -30,7 +30,7 @@ def test_a_table_of_one_fraction_has_a_row_for_it_alone(tmp_path: Path) -> None:
     assert sheet is not None
     assert len(sheet.frame) == 1
     assert sheets.PART not in sheet.frame
-    assert "part that has moved: 30 %" in sheet.shared
+    assert "fraction entrained: 30 %" in sheet.shared
 
 
 def test_a_page_of_no_cases_tells_of_none(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
 from orchestrator.digits import percent
+from orchestrator.physics.verdict import BOTH, MODEL
 from orchestrator.report import (
     answers,
     labels,
@@ -30,7 +31,16 @@ from orchestrator.report.results import (
     seeds_of,
     split_by,
 )
-from orchestrator.report.style import ANSWER, INK, MEASURED, Figure, Look
+from orchestrator.report.style import (
+    ANSWER,
+    FLOW,
+    INK,
+    MEASURED,
+    PALE,
+    Figure,
+    Look,
+)
+from orchestrator.report.subjects import ReportedQuantity
 
 Along = Literal["shields", "reynolds"]
 SHOWN_UP_TO = 0.9
@@ -43,12 +53,13 @@ ENDINGS: Mapping[Along, tuple[str, str, str]] = {
     "reynolds": ("-reynolds", " against Re*", "Fig. 14, left"),
 }
 """Endings of names and titles, and the figure of the paper."""
-COMPUTED: Look = {"label": "computed", "color": ANSWER, "lw": 1.5}
+ADVISED: Look = {"color": ANSWER, "lw": 1.8}
 REPLICATE: Look = {
     "label": "replicates (random seeds)",
     "color": ANSWER,
     "lw": 0.6,
 }
+OF_MODEL: Look = {"color": FLOW, "lw": 1.2, "ls": ":"}
 BESIDE: Look = {
     "color": INK,
     "lw": 1.0,
@@ -57,9 +68,10 @@ BESIDE: Look = {
 SLOPE_OF_PAPER = 15.0
 """Slope of the pile of Fig. 14, degrees."""
 OF_THE_CARD = """\
-How the part that has moved grows with the {{ told }}. {% if seeds %}Thin: replicates
-(random seeds); disc: their mean.{% endif %} {% if beside %}Dashed: {{
-beside }} of one grain.{% endif %}"""
+Fraction of the exposed grains that is entrained, against the {{ told }}. Thick: the
+numbers of the card; disc: its answer; pale bar: its interval. {% if seeds %}Thin:
+replicates (random seeds).{% endif %} {% if beside %}The other line: the same bed and
+flow {{ beside }}.{% endif %}"""
 CAPTION = """\
 {% from "captions.j2" import laws, protocol, is_open, low_regime %} After Fig. 14 of the
 paper. Each marker is a flow: the fraction of the N(d) exposed grains that had moved,
@@ -100,8 +112,8 @@ def _of_the_card(results: Results) -> Iterator[Figure]:
     row = rows.iloc[0]
     told = single.quantity_of_row(row).name
     others = seeds_of(row, results.at_fraction)
-    beside = "" if single.is_level(row) else single.with_threshold(row)
-    title = f"The part of the grains that has moved, against the {told}"
+    beside = "" if single.is_level(row) else _other_name(row)
+    title = f"Fraction entrained, against the {told}"
     text = filled(OF_THE_CARD, told=told, seeds=others, beside=beside)
     cases = tuple(run.name for run in results.plan.piles[str(row["scene_id"])].runs)
     drawing = _draw_card(row, others, results.tables["pile_curve"])
@@ -120,26 +132,60 @@ def _draw_card(row: pd.Series, others: Sequence[str], table: pd.DataFrame) -> Ca
         _draw_curve(ax, flow, points["fraction_moved"], REPLICATE)
     points = table[table["scene_id"] == row["scene_id"]]
     moved = points["fraction_moved"]
-    factors = [(1.0, COMPUTED)]
-    if not single.is_level(row):
-        beside: Look = {**BESIDE, "label": single.with_threshold(row)}
-        factors.append((units.compared_over_computed(row), beside))
-    at = float(row[told.column()])
-    reach = [at]
-    for factor, look in factors:
+    reach = []
+    for factor, look in _curves_of_card(row):
         flow = units.told_by(row, factor * points["ustar0_m_s"], told)
         _draw_curve(ax, flow, moved, look)
         reach += _reach(flow, moved)
-    fraction = float(row["fraction"])
-    ax.plot([at], [fraction], "o", color=ANSWER, ms=6, mec="white", gid="card")
-    bold: Look = {"textcoords": "offset points", "color": ANSWER, "weight": "bold"}
-    text = f"{percent(fraction)} at {at:.3g} {told.unit}"
-    ax.annotate(text, (at, fraction), xytext=(7, -8), **bold)
+    _draw_answer(ax, row, told)
+    reach.append(float(row[single.advised_column(row, told)]))
     ax.set(xlim=(0.9 * min(reach), 1.02 * max(reach)), ylim=(0, 1), ylabel="n/N")
     ax.set_xlabel(f"{told.name}, {told.unit}")
     handles = style.samples([ax])
     canvas.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     return canvas
+
+
+def _curves_of_card(row: pd.Series) -> list[tuple[float, Look]]:
+    """The factors of the flows of a bed and how they are drawn; the advised one first.
+
+    A level bed has one: its measured threshold is that of each of its grains.
+    """
+    if single.is_level(row) or np.isnan(row["compared_ustar0_m_s"]):
+        return [(1.0, {**ADVISED, "label": single.MODEL})]
+    factor = units.compared_over_computed(row)
+    if row["advised"] == MODEL:
+        model: Look = {**ADVISED, "label": single.MODEL}
+        return [(1.0, model), (factor, {**BESIDE, "label": single.with_threshold(row)})]
+    other: Look = {**ADVISED, "label": single.with_threshold(row)}
+    return [(factor, other), (1.0, {**OF_MODEL, "label": single.model_name(row)})]
+
+
+def _other_name(row: pd.Series) -> str:
+    """What the second line of the card's figure is called."""
+    if row["advised"] == MODEL:
+        return single.with_threshold(row)
+    return single.model_name(row)
+
+
+def _draw_answer(ax: Axes, row: pd.Series, told: ReportedQuantity) -> None:
+    """The number of the card with its interval; both where they have equal right."""
+    fraction = float(row["fraction"])
+    column = single.advised_column(row, told)
+    at = float(row[column])
+    stem = "compared_" if column.startswith("compared_") else ""
+    ends = [float(row[f"{stem}{told.column(end)}"]) for end in ("_low", "_high")]
+    if np.isfinite(ends).all():
+        ax.plot(ends, [fraction] * 2, color=PALE, lw=6, gid="interval", zorder=1)
+    ax.plot([at], [fraction], "o", color=ANSWER, ms=6, mec="white", gid="card")
+    bold: Look = {"textcoords": "offset points", "color": ANSWER, "weight": "bold"}
+    text = f"{percent(fraction)} at {at:.3g} {told.unit}"
+    ax.annotate(text, (at, fraction), xytext=(7, -8), **bold)
+    if row["advised"] == BOTH:
+        model = float(row[told.column()])
+        ax.plot([model], [fraction], "o", color=FLOW, ms=6, mec="white", gid="model")
+        own: Look = {**bold, "color": FLOW}
+        ax.annotate(f"{model:.3g} {told.unit}", (model, fraction), (7, -8), **own)
 
 
 def _reach(flow: Any, moved: pd.Series) -> list[float]:
