@@ -84,7 +84,7 @@ def test_a_study_of_single_grains_and_the_same_again(
     last = first.stdout.split("\n")[-2]
     assert first.stdout.startswith("At what wind does a grain start to move")
     (shared,) = [line for line in first.stdout.splitlines() if "all rows" in line]
-    assert "usable: yes" in shared
+    assert "with a correction" in shared
     assert "Shields number" in first.stdout
     assert re.search(r"\[1/1\] done .* of the work, about \d+ s left", first.stderr)
     assert Path(last) == tmp_path / "out" / "report.html"

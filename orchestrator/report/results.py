@@ -251,7 +251,11 @@ class Results:
         paired = self.tables.get("paired", pd.DataFrame())
         if paired.empty:
             return rows
-        names = [name for name in paired if "_ratio" in name or name == "ratio_usable"]
+        names = [
+            str(name)
+            for name in paired
+            if "_ratio" in str(name) or name == "ratio_usable"
+        ]
         of_first = paired[paired["fraction"].isna()].set_index("scene_id")[names]
         keys = ["scene_id", "fraction"]
         of_rows = paired.dropna(subset="fraction").set_index(keys)[names]

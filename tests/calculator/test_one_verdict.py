@@ -12,6 +12,7 @@ import orchestrator
 from orchestrator import plan, tables
 from orchestrator.calculator import answer
 from orchestrator.calculator.table import thresholds
+from orchestrator.physics import verdict
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.reported import OF_CHANNELS, OF_LAWS, REPORTED
 from orchestrator.report import answers, sheets
@@ -172,7 +173,9 @@ roughness = "{grain["roughness"]}"
     rows = []
     for number in range(len(asked)):
         (place,) = np.flatnonzero(found["scene_id"] == order[str(number)])
-        row = found.iloc[place]
+        row = found.iloc[place].copy()
+        # a study has one basis for all its grains; the command asks for one
+        row["advised"] = verdict.advised([row.to_dict()])
         cells = {str(name): value for name, value in row.items()}
         rows.append({**cells, "card": answers.card_of_grain(row)})
     return rows
@@ -216,7 +219,7 @@ def test_threshold_and_study_say_the_same_of_one_grain(
         assert one.worth.word == other.worth.word, (told, one.worth, other.worth)
         for number, same in zip(one.numbers, other.numbers, strict=True):
             assert number.interval_of == same.interval_of, told
-            for name in ("value", "low", "high", "compared"):
+            for name in ("value", "low", "high", "other"):
                 ends = getattr(number, name), getattr(same, name)
                 assert alike(*ends), (told, name, ends)
         for name in (*OTHERS, *REPORTED_AS):
