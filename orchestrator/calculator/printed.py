@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 from orchestrator.calculator import (
     BESIDE_CHANNEL,
+    ENTRAINED,
     OF_CRITERION,
     PARAMETERS,
     QUANTITIES,
+    SUSTAINED,
 )
 from orchestrator.physics.constants import CHANNEL, GAS_BELOW
 from orchestrator.physics.fluids import PAPER
@@ -180,18 +182,20 @@ def _of_one(rows: Sequence["Row"]) -> Iterator[str]:
             heads[column] = quantities[column]
     ordered = sorted(rows, key=_place)
     near = nearest(rows)
-    for row, line in zip([None, *ordered], _as_table(ordered, heads), strict=True):
-        marks = []
-        if row is not None and row["answer"]:
-            marks.append("the answer")
-        if row is not None and row["law"] == near:
-            marks.append(f"nearest to {single.what_beside(row)}")
-        yield f"{line}  <- {', '.join(marks)}" if marks else line
+    marks = []
+    for row in ordered:
+        said = ["answer"] if row["answer"] else []
+        said += ["nearest"] if row["law"] == near else []
+        marks.append(f"<- {', '.join(said)}" if said else "")
+    yield from _as_table(ordered, heads, marks)
+    if near:
+        beside = single.what_beside(ordered[0])
+        yield f"Nearest: the law that holds and is nearest to {beside}."
     yield ""
     for term in TERMS.values():
-        yield from textwrap.wrap(f"{term[:1].upper()}{term[1:]}.", 79)
+        yield from _wrapped(f"{term[:1].upper()}{term[1:]}.")
     laws = " and ".join(LAWS_OF[rows[0]["regime"]])
-    yield f"laws of the paper's rule: {laws}"
+    yield f"Laws of the article's rule: {laws}."
 
 
 def _place(row: "Row") -> tuple[bool, bool, float]:
@@ -200,22 +204,35 @@ def _place(row: "Row") -> tuple[bool, bool, float]:
 
 
 def _criteria(chosen: Sequence["Row"]) -> Iterator[str]:
-    """Both criteria of sustained motion, and which of them decides, for each law."""
+    """Both criteria of sustained motion, and which of them controls, for each law."""
     for row in chosen:
         of_law = f"{row['law']}: " if len(chosen) > 1 else ""
-        dislodged = _cell(row["shields_entrained"])
-        sustained = _cell(row["shields_sustained"])
-        ceases = _cell(row["shields_cessation"])
-        yield (
-            f"{of_law}“{row['decides']}” decides: a gust dislodges it from {dislodged} "
-            f"of the mean flow, it rolls and hops on after it from {sustained}; motion "
-            f"ceases below {ceases}"
+        dislodged, sustained, ceases, low, high = (
+            _cell(row[f"shields_{name}"])
+            for name in (
+                "entrained",
+                "sustained",
+                "cessation",
+                "sustained_low",
+                "sustained_high",
+            )
         )
-        low, high = (_cell(row[f"shields_sustained_{end}"]) for end in ("low", "high"))
-        yield (
-            f"{of_law}at least {low}, at most {high}: a quarter of the grains over "
-            "half of the way, three quarters over twice the way"
+        controls = "Sustained motion controls"
+        if row["decides"] == ENTRAINED:
+            controls = "Entrainment controls"
+        yield from _wrapped(
+            f"{of_law}{controls}: dislodgement by a gust at θ = {dislodged} of the "
+            f"mean flow, continued motion at {sustained} ({low} … {high}: a quarter of "
+            "the grains over half of the way, three quarters over twice the way), "
+            f"cessation below {ceases}."
         )
+
+
+def _wrapped(text: str) -> list[str]:
+    """A text in lines of a terminal."""
+    from orchestrator.report.card import WIDTH
+
+    return textwrap.wrap(text, WIDTH, break_long_words=False, break_on_hyphens=False)
 
 
 def _of_channel(row: "Row") -> Iterator[str]:
@@ -224,7 +241,7 @@ def _of_channel(row: "Row") -> Iterator[str]:
     The depth is one, that of the answer.
     """
     from orchestrator.report.card import apart
-    from orchestrator.report.lines import table
+    from orchestrator.report.lines import head_width, table
 
     def cells(words: str, roughness: float, speed: float, interval: str) -> list[str]:
         discharge = speed * row["depth_m"]
@@ -243,7 +260,11 @@ def _of_channel(row: "Row") -> Iterator[str]:
     ):
         rows.append(cells(words, roughness, row[column], ""))
     heads = ["channel", "z0, m", "mean velocity, m/s", "discharge, m2/s", "interval"]
-    yield from table(rows, heads)
+    widths = [
+        max(head_width(head), *map(len, column))
+        for head, column in zip(heads, zip(*rows, strict=True), strict=True)
+    ]
+    yield from table(rows, heads, widths)
     d84 = row["d84_m"]
     of_grain = ", taken for d (--d84)" if d84 == row["d_m"] else ""
     yield f"depth {row['depth_m']:.3g} m, d84 {d84:.3g} m{of_grain}"
@@ -287,24 +308,55 @@ def _quantities(rows: Sequence["Row"]) -> dict[str, str]:
 
 
 def _whether_it_holds(row: "Row") -> str:
-    """Whether the law holds: at entrainment, which sustained motion may exceed."""
-    if row["valid"]:
-        return "yes"
-    is_further = row.get("decides") == "sustained"
-    where = "no, when it is entrained" if is_further else "no"
-    return f"{where}: {row['why_not']}"
+    """Whether the law holds where the grain is entrained."""
+    return "yes" if row["valid"] else "no"
 
 
-def _as_table(rows: Sequence["Row"], heads: Mapping[str, str]) -> list[str]:
-    """Lines of a table, with a last column that says whether the law holds."""
-    from orchestrator.report.lines import table
+def _as_table(
+    rows: Sequence["Row"], heads: Mapping[str, str], marks: Sequence[str] = ()
+) -> Iterator[str]:
+    """Lines of a table that fit a terminal, with whether each law holds, and why not.
 
-    shown = [column for column in heads if column not in TOO_MANY]
-    cells = []
+    Columns before the last that do not fit are named below it. `marks` are words
+    behind the rows.
+    """
+    from orchestrator.report.card import WIDTH
+    from orchestrator.report.lines import BETWEEN, head_width, table
+
+    columns = [[heads[name], *(_cell(row[name]) for row in rows)] for name in heads]
+    columns = [
+        column
+        for name, column in zip(heads, columns, strict=True)
+        if name not in TOO_MANY
+    ]
+    reasons: dict[str, int] = {}
+    holds = ["holds"]
     for row in rows:
-        told = [_cell(row[column]) for column in shown]
-        cells.append([*told, _whether_it_holds(row)])
-    return table(cells, [*(heads[column] for column in shown), "holds"])
+        word = _whether_it_holds(row)
+        if not row["valid"]:
+            where = "at entrainment: " if row.get("decides") == SUSTAINED else ""
+            why = f"{where}{row['why_not']}"
+            number = reasons.setdefault(why, len(reasons) + 1)
+            word = f"{word} ({number})"
+        holds.append(word)
+    last = [holds, ["", *marks]] if any(marks) else [holds]
+
+    def widths(shown: Sequence[Sequence[str]]) -> list[int]:
+        return [max(head_width(each[0]), *map(len, each[1:])) for each in shown]
+
+    left_out = []
+    while sum(widths([*columns, *last])) + BETWEEN * len([*columns, *last[1:]]) > WIDTH:
+        left_out.append(columns.pop()[0])
+    shown = [*columns, *last]
+    cells = [list(row) for row in zip(*(each[1:] for each in shown), strict=True)]
+    yield from table(cells, [each[0] for each in shown], widths(shown))
+    if left_out or reasons:
+        yield ""
+    if left_out:
+        names = "; ".join(reversed(left_out))
+        yield from _wrapped(f"Not shown: {names} (--csv has every column).")
+    for text, number in reasons.items():
+        yield from _wrapped(f"({number}) The law does not hold: {text}.")
 
 
 def _cell(value: float | str) -> str:

@@ -131,7 +131,10 @@ def test_piles_are_compared_that_differ_in_the_obstacle_alone(tmp_path: Path) ->
         assert len(alone) == 1
         assert _change(sentence) == _change(alone[0])
         rows = table[table["pile"].str.endswith(name)]
-        assert rows["surface"].tolist()[:2] == ["no obstacle", "fence of 4 m at -4 m"]
+        assert rows["surface"].tolist()[:2] == [
+            "no obstacle",
+            "fence 4 m high at x = −4 m",
+        ]
         assert len(rows) == 6  # and the four piles of AP-42
         drop = ["pile"]
         assert (
@@ -146,12 +149,12 @@ def test_piles_are_compared_that_differ_in_the_obstacle_alone(tmp_path: Path) ->
 def test_obstacles_are_not_compared_with_one_another(tmp_path: Path) -> None:
     """Without a bare pile no part is told that an obstacle takes away."""
     (told,), table = _run(_text(f'"bed.obstacles" = [{FENCE}, {BLOCK}]'), tmp_path)
-    assert "; with a fence of 4 m at -4 m)" in told
-    assert " With a block of 3 m at -6 m: " in told
+    assert "; with a fence 4 m high at x = −4 m)" in told
+    assert " With a block 3 m high at x = −6 m: " in told
     assert "%" not in told
     assert table["surface"].tolist()[:2] == [
-        "fence of 4 m at -4 m",
-        "block of 3 m at -6 m",
+        "fence 4 m high at x = −4 m",
+        "block 3 m high at x = −6 m",
     ]
 
 

@@ -104,7 +104,7 @@ def test_motion_starts_where_the_answer_says(
     said = capsys.readouterr().out
     assert f"in a wind of {row['starts, m/s']:.3g} m/s at 10 m from 270°" in said
     # before the sentences stands the card
-    card = said.partition("compared with: ")[0]
+    card = said.partition("Where the numbers come from: ")[0]
     assert card.startswith("In which wind does this surface start to move")
     assert "hours a year" in card
     assert "Wall stress over a bed in three dimensions has not been" in said
