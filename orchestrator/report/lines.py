@@ -76,7 +76,7 @@ def head_width(head: str, most: int = 2) -> int:
     Examples
     --------
     >>> head_width("wind at 10 m, m/s"), head_width("u*")
-    (10, 2)
+    (9, 2)
     """
     width = max(map(len, head.split()), default=1)
     while len(textwrap.wrap(head, width, break_on_hyphens=False)) > most:

@@ -12,6 +12,7 @@ import pandas as pd
 from orchestrator.physics.reported import REPORTED, in_units
 from orchestrator.study import fields
 from orchestrator.tables.columns import several
+from orchestrator.tables.facts import needs_run
 from orchestrator.types import FloatArray, Row
 
 SHELTER = ("obstacles", "spacing", "forms")
@@ -97,7 +98,7 @@ def _pairs(rows: pd.DataFrame, curves: Mapping[str, pd.DataFrame]) -> Iterator[R
     keys = [*fields.others(rows, *SHELTER), "fraction"]
     every = fields.others(rows, "seed")
     kinds = rows.groupby(every, dropna=False).ngroup()
-    rows = rows.assign(kind=kinds)
+    rows = rows.assign(kind=kinds, stepped=needs_run(rows))
     for _, part in rows.groupby(keys, dropna=False, sort=False):
         is_bare = part["obstacles"].fillna("").astype(str).eq("")
         by = part.assign(bare=is_bare).sort_values(
@@ -147,10 +148,9 @@ def _ends(row: pd.Series, curve: pd.DataFrame, which: str) -> FloatArray:
     curve = curve.sort_values("ustar0_m_s", kind="stable")
     flows = curve["ustar0_m_s"].to_numpy(float)
     moved = curve["moved"].to_numpy(float)
-    is_stepped = row["method"] == "dem"
     low = high = value
     before = np.flatnonzero(moved >= max(needed - 1, 1))
-    if len(before) and (needed > 1 or is_stepped):
+    if len(before) and (needed > 1 or row["stepped"]):
         low = flows[max(int(before[0]) - 1, 0)]
     # grains that go at the same flow are one step
     after = np.flatnonzero((moved >= needed + 1) & (flows > value * (1 + SAME)))
