@@ -4,19 +4,22 @@ import contextlib
 import logging
 import math
 import shlex
+import subprocess
 import sys
-from collections.abc import Iterator, Mapping
-from functools import partial
+import threading
+import time
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.extras import imported
-from orchestrator.runs import engine, locks, process
+from orchestrator.runs import engine, locks, process, processors
 from orchestrator.runs.case import Case, done_state, names_in
 from orchestrator.runs.engine import Pool
 from orchestrator.runs.files import PACKAGE
-from orchestrator.runs.queues import SYSTEMS, Queue
+from orchestrator.runs.queues import REASONS, SYSTEMS, Queue
 
 EXTRA = "cluster"
 """The extra of the package with dask-jobqueue."""
@@ -25,13 +28,22 @@ AHEAD = 2
 
 No core waits for the next case while this process is busy.
 """
+ONE_PROCESS = 8
+"""Cores of a job up to which one process of Python hands them to solvers.
+
+Those of more are shared by several: a case that takes two cores needs both of one.
+"""
 LOST_S = 5.0
 """Time without a sign of life after which a worker is lost, s.
 
 Its job is asked for again.
 """
+LOOK_S = 1.0
+"""Time between two looks whether a job runs, s."""
+ASKED_S = 20.0
+"""Time that a queue may take to say why jobs wait, s."""
 PATIENCE_S = 60.0
-"""Time without a job that has begun until a line says so, s.
+"""Time without a job that runs until a line says why, s.
 
 Until the next line it is twice as long.
 """
@@ -82,13 +94,14 @@ def pool(queue: Queue, cases: Path, *, workers: int, limit_s: float) -> Iterator
         print(f"asked {queue.system} for {jobs} jobs; logs: {logs}", file=sys.stderr)
         # at least as many jobs as at most: it only makes up for those that are lost
         cluster.adapt(minimum_jobs=jobs, maximum_jobs=jobs)
-        _await_first(client, Path(logs))
-        yield Pool(
-            executor=client.get_executor(pure=False),
-            task=partial(execute_unless_done, cases=cases, limit_s=limit_s),
-            places=AHEAD * jobs * cores,
-            lost=(distributed.KilledWorker,),
-        )
+        task = partial(execute_unless_done, cases=cases, limit_s=limit_s, cores=cores)
+        with _waits_told(cluster, queue.system, Path(logs)):
+            yield Pool(
+                executor=client.get_executor(pure=False),
+                task=task,
+                places=AHEAD * jobs * cores,
+                lost=(distributed.KilledWorker,),
+            )
     for case in names_in(cases):
         _lock_of(case, cases).unlink(missing_ok=True)
 
@@ -104,8 +117,12 @@ def _settings(queue: Queue, given: Mapping[str, Any], logs: str) -> dict[str, An
         "dashboard_address": ":0",
         **queue.settings.get("scheduler_options", {}),
     }
+    processes = given.get("processes")
+    if processes is None and int(given["cores"] or 0) <= ONE_PROCESS:
+        processes = 1
     return {
         **queue.settings,
+        "processes": processes,
         "python": given.get("python") or shlex.quote(sys.executable),
         "log_directory": logs,
         "job_script_prologue": prologue,
@@ -132,7 +149,7 @@ def _lock_of(case: str, cases: Path) -> Path:
     return cases / f".{case}.lock"
 
 
-def execute_unless_done(case: Case, cases: Path, limit_s: float) -> float:
+def execute_unless_done(case: Case, cases: Path, limit_s: float, cores: int) -> float:
     """Run one case on a machine of the cluster, unless it is done by now.
 
     A worker that was given up as lost, or one of an earlier study, may still be at work
@@ -146,12 +163,16 @@ def execute_unless_done(case: Case, cases: Path, limit_s: float) -> float:
         Directory of the cases.
     limit_s
         Time that the solver may take, s.
+    cores
+        The cores that a job asks for.
 
     Returns
     -------
     float
         Its time, s.
     """
+    from distributed import get_worker
+
     lock = _lock_of(case.name, cases)
     # the other one's solver is killed after that time; what it leaves is read quickly
     waits_s = 2 * limit_s
@@ -160,7 +181,19 @@ def execute_unless_done(case: Case, cases: Path, limit_s: float) -> float:
         state = done_state(case, cases)
         if state:
             return float(state["wall_s"])
-        return engine.execute(case, cases, limit_s)
+        share = _share_of(get_worker().state.nthreads, cores)
+        return engine.execute(case, cases, limit_s, cores=share)
+
+
+@cache
+def _share_of(threads: int, cores: int) -> engine.Cores:
+    """The cores that a process of a job gives to solvers.
+
+    They are those of its threads, or fewer where the machine has given fewer to the job
+    than it asked for.
+    """
+    given = processors.usable_count() * threads // cores
+    return engine.Cores(max(1, min(threads, given)))
 
 
 def _submit(cluster: Any, jobs: int, system: str, failed: object) -> None:
@@ -184,22 +217,72 @@ def _submit(cluster: Any, jobs: int, system: str, failed: object) -> None:
         raise OrchestratorError(
             f"{system} does not take the job: {cause}",
             where="--cluster",
-            remedy=f"see [cluster] in the study file; {machine}",
+            remedy=f"see [cluster] in the study file, docs/cluster.md; {machine}",
         ) from None
 
 
-def _await_first(client: Any, logs: Path) -> None:
-    """Wait for the first job to begin; where that takes long, say so."""
-    patience_s = PATIENCE_S
-    while True:
-        try:
-            client.wait_for_workers(1, timeout=patience_s)
-            return
-        except TimeoutError:
-            hint = _last_words_of_jobs(logs) or "ask the queue"
-            waited = f"no job has begun for {patience_s:.0f} s"
-            print(f"{waited}; {hint}", file=sys.stderr)
-            patience_s *= 2
+@contextlib.contextmanager
+def _waits_told(cluster: Any, system: str, logs: Path) -> Iterator[None]:
+    """Say from time to time why no job runs, while there is none."""
+    over = threading.Event()
+
+    def watch() -> None:
+        patience_s = PATIENCE_S
+        since = time.monotonic()
+        while not over.wait(LOOK_S):
+            waited_s = time.monotonic() - since
+            if cluster.scheduler.workers:
+                patience_s, since = PATIENCE_S, time.monotonic()
+            elif waited_s > patience_s:
+                ids = [job.job_id for job in [*cluster.workers.values()]]
+                hint = why_waiting(system, ids, logs)
+                print(f"no job has run for {waited_s:.0f} s; {hint}", file=sys.stderr)
+                patience_s *= 2
+
+    thread = threading.Thread(target=watch, daemon=True, name="queue")
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+def why_waiting(system: str, ids: Collection[str | None], logs: Path) -> str:
+    """Say why jobs do not run, in the words of the queue and of their logs.
+
+    Parameters
+    ----------
+    system
+        One of `SYSTEMS`.
+    ids
+        Their numbers.
+    logs
+        The directory of their logs.
+
+    Returns
+    -------
+    str
+        The words; what to do where there are none.
+    """
+    said = [
+        f"{system} says: job {line}"
+        for line in _asked(REASONS.get(system, ()))
+        if line.partition(" ")[0] in ids
+    ]
+    last = _last_words_of_jobs(logs)
+    return "; ".join([*said, *([last] if last else [])]) or "ask the queue"
+
+
+def _asked(command: Sequence[str]) -> list[str]:
+    """The lines that a command of the queue prints; none if it does not work."""
+    if not command:
+        return []
+    with contextlib.suppress(OSError, subprocess.SubprocessError):
+        return subprocess.check_output(
+            command, text=True, timeout=ASKED_S, stderr=subprocess.DEVNULL
+        ).splitlines()
+    return []
 
 
 def _last_words_of_jobs(logs: Path) -> str:

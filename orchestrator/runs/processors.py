@@ -9,8 +9,14 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 
-SLURM = ("SLURM_CPUS_PER_TASK", "SLURM_CPUS_ON_NODE")
-"""Variables of a job of Slurm, the narrowest first: the second one is always there."""
+JOBS = (
+    ("", ("SLURM_CPUS_PER_TASK", "SLURM_CPUS_ON_NODE")),
+    ("PBS_JOBID", ("NCPUS", "PBS_NUM_PPN")),
+    ("JOB_ID", ("NSLOTS",)),
+    ("LSB_JOBID", ("LSB_DJOB_NUMPROC",)),
+)
+"""For each batch system a variable that only its jobs have, and those of a job's
+processors, the narrowest first: Slurm, PBS, Grid Engine, LSF."""
 V1 = ("cpu,cpuacct", "cpu")
 """Names that the controller of times is mounted under, in the first version of control
 groups."""
@@ -28,9 +34,9 @@ def usable_count(root: Path = Path("/")) -> int:
     -------
     int
         The least of what the machine, the affinity of the process, the quota of its
-        control groups and its job of Slurm allow; at least 1.
+        control groups and its job of a batch system allow; at least 1.
     """
-    allowed = [_by_affinity(), *_by_groups(root), *_by_slurm(os.environ)]
+    allowed = [_by_affinity(), *_by_groups(root), *_by_job(os.environ)]
     return max(1, min(allowed))
 
 
@@ -41,13 +47,14 @@ def _by_affinity() -> int:
     return os.cpu_count() or 1
 
 
-def _by_slurm(environment: Mapping[str, str]) -> Iterator[int]:
-    """What the job of Slurm has on this machine, if there is one."""
-    for name in SLURM:
-        text = environment.get(name, "")
-        if text.isdecimal():
-            yield int(text)
-            return
+def _by_job(environment: Mapping[str, str]) -> Iterator[int]:
+    """What the job of each batch system has on this machine, if there is one."""
+    for of_job, names in JOBS:
+        if of_job and of_job not in environment:
+            continue
+        counts = [environment.get(name, "") for name in names]
+        numbers = [int(text) for text in counts if text.isdecimal()]
+        yield from numbers[:1]
 
 
 def _by_groups(root: Path) -> Iterator[int]:

@@ -15,6 +15,11 @@ SYSTEMS = {
 }
 """Names of the queues, and dask-jobqueue's classes for them."""
 
+REASONS = {
+    "slurm": ("squeue", "--me", "--noheader", "--format=%i %T, %r"),
+}
+"""Commands of a queue that print a line for each job: its number, and why it waits."""
+
 
 @dataclass(frozen=True)
 class Queue:

@@ -176,7 +176,9 @@ def _not_toml(error: str, text: str, where: str) -> InputError:
         line = text.splitlines()[int(place[1]) - 1]
         value = line.partition("=")[2].partition("#")[0]
         remedy = units.meant(value)
-    return InputError(f"not TOML: {error}", where, remedy)
+    # the parser quotes the character as Python would
+    said = error.replace(r"character '\n'", "end of a line")
+    return InputError(f"not TOML: {said}", where, remedy)
 
 
 def at_points(

@@ -116,6 +116,10 @@ def test_study_files_with_one_wrong_value(shell: Shell) -> None:
             shell.refuses(text, f"bad.toml: {place}")
 
 
+def test_a_text_that_does_not_end_is_told_without_an_escape(shell: Shell) -> None:
+    shell.refuses('title = "first look\n[grain]\n', "Illegal end of a line (at line 1")
+
+
 GRAIN = "[grain]\ndiameter = 1e-3\n"
 PROTOCOL = "[method.grains]\nload_increment = 0.2\nwaiting_time = 3.0\n"
 BAD_FILES = (

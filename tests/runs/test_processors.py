@@ -17,8 +17,9 @@ ROOT = Path(__file__).parents[2]
 def eight(monkeypatch: pytest.MonkeyPatch) -> None:
     """A process that is bound to eight processors of a larger machine, in no job."""
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(8)), raising=False)
-    for name in processors.SLURM:
-        monkeypatch.delenv(name, raising=False)
+    for of_job, names in processors.JOBS:
+        for name in (of_job, *names):
+            monkeypatch.delenv(name or "none", raising=False)
 
 
 def _written(root: Path, files: dict[str, str]) -> Path:
@@ -80,9 +81,15 @@ def test_the_quota_of_a_control_group_counts(
         ({"SLURM_CPUS_ON_NODE": "6"}, 6),
         ({"SLURM_CPUS_ON_NODE": "128"}, 8),
         ({"SLURM_CPUS_PER_TASK": ""}, 8),
+        ({"PBS_JOBID": "12.server", "NCPUS": "4"}, 4),
+        ({"PBS_JOBID": "12.server", "PBS_NUM_PPN": "3"}, 3),
+        ({"NCPUS": "4"}, 8),
+        ({"JOB_ID": "12", "NSLOTS": "5"}, 5),
+        ({"LSB_JOBID": "12", "LSB_DJOB_NUMPROC": "6"}, 6),
+        ({"SLURM_CPUS_PER_TASK": "0"}, 1),
     ],
 )
-def test_the_processors_of_a_job_of_slurm_count(
+def test_the_processors_of_a_job_count(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, job: dict[str, str], expected: int
 ) -> None:
     for name, value in job.items():
