@@ -226,7 +226,7 @@ def test_no_message_has_an_escaped_line_end() -> None:
                 ast.walk(said) if is_said or isinstance(said, ast.Raise) else ()
             ):
                 text = part.value if isinstance(part, ast.Constant) else ""
-                assert "\\n" not in str(text), (module.name, said.lineno)
+                assert "\\n" not in str(text), (module.name, getattr(said, "lineno", 0))
 
 
 def test_any_failure_has_a_message_of_one_printable_line() -> None:

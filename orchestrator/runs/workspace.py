@@ -489,6 +489,8 @@ def status(directory: Path) -> tuple[str, bool]:
     ]
     kind = STUDY if "study" in about else EXPERIMENT
     lines = [f"{kind.word} {about['name']}: {', '.join(counts)}"]
+    if is_running:
+        lines.append(f"running: {locks.holder(space.root / LOCK)}")
     lines += [f"  {word}: {name}" for name in unfinished]
     lines += [f"  failed: {name}: {cause}" for name, cause in causes.items()]
     lines += [f"  done: {each}" for each in _said(markers)]

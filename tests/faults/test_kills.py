@@ -3,6 +3,7 @@
 import contextlib
 import itertools
 import os
+import shlex
 import shutil
 import signal
 import subprocess
@@ -10,6 +11,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import NamedTuple
 
+import psutil
 import pytest
 
 from orchestrator.runs import process
@@ -26,7 +28,7 @@ from tests.faults.bench import (
     wait_for,
     wrapper,
 )
-from tests.waiting import HANGS_S
+from tests.waiting import HANGS_S, until
 
 SOLVERS = {"simpleFoam": "flow", "liggghts": "pile"}
 """The solvers of a study in their order, by the kind of their case."""
@@ -142,6 +144,55 @@ def test_a_terminal_that_is_closed(pile: Bench, under: tuple[str, ...]) -> None:
     assert driver.wait(HANGS_S) == (0 if under else 130)
     await_none_in(pile.folder)
     assert (pile.out / "report.html").exists() == bool(under)
+    pile.check_finished()
+
+
+def test_a_study_outlives_its_terminal_and_is_watched_from_another(
+    pile: Bench,
+) -> None:
+    """As the guide has it: nohup, an output of its own, and status --watch."""
+    words = bench.halting("*/flow-*/log.Allrun")
+    study = shlex.join(["nohup", *words, "study", "small.toml", "--out", "out"])
+    script = f"{study} >study.log 2>&1 & echo $! >pid; wait"
+    master, slave = os.openpty()
+    shell = subprocess.Popen(
+        ["setsid", "--ctty", "sh", "-c", script],
+        cwd=pile.folder,
+        env=bench.ENVIRONMENT,
+        stdin=slave,
+        stdout=slave,
+        stderr=slave,
+    )
+    os.close(slave)
+    until((pile.folder / "pid").exists)
+    until(lambda: bool((pile.folder / "pid").read_text()))
+    driver = psutil.Process(int((pile.folder / "pid").read_text()))
+    until(lambda: driver.status() == psutil.STATUS_STOPPED)
+    with subprocess.Popen(
+        [*bench.ORCHESTRATOR, "status", "out", "--watch"],
+        cwd=pile.folder,
+        env=bench.ENVIRONMENT,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as watch:
+        assert watch.stdout
+        said = [watch.stdout.readline(), watch.stdout.readline()]
+        # the terminal closes: SIGHUP to its session
+        os.close(master)
+        assert shell.wait(HANGS_S) == -HUP
+        assert driver.is_running()
+        driver.send_signal(signal.SIGCONT)
+        rest, _ = watch.communicate(timeout=HANGS_S)
+    assert said[0].startswith("study small: ")
+    assert said[1].startswith(f"running: process {driver.pid} on ")
+    assert " since " in said[1]
+    assert " running, " in said[0]
+    last = rest[rest.rindex("study small: ") :]
+    assert "3 done, 0 unfinished, 0 not begun, 0 failed" in last
+    assert "running: " not in last
+    assert f"page: {pile.out / 'report.html'}" in last
+    assert watch.returncode == 0
+    await_none_in(pile.folder)
     pile.check_finished()
 
 
