@@ -132,15 +132,15 @@ class Bed:
         Centres of its grains, in diameters of the sphere, shape (n, 3).
     sides
         Length and width, in the same unit.
-    size
-        Diameter of its grains, in the same unit.
+    sizes
+        Diameters of its grains, in the same unit, shape (n,).
     seed
         Chooses the places at which spheres are laid on it.
     """
 
     centres: FloatArray
     sides: tuple[float, float]
-    size: float
+    sizes: FloatArray
     seed: int
 
     def of_sphere(self, relative_size: float) -> "Bed":
@@ -149,9 +149,14 @@ class Bed:
         return Bed(
             np.ascontiguousarray(self.centres / relative_size),
             (length / relative_size, width / relative_size),
-            self.size / relative_size,
+            self.sizes / relative_size,
             self.seed,
         )
+
+    @cached_property
+    def grains(self) -> FloatArray:
+        """Its grains as the solver has them: centres and diameters, shape (n, 4)."""
+        return np.column_stack([self.centres, self.sizes])
 
     @cached_property
     def columns(self) -> tuple[int, int, IntArray, IntArray]:
@@ -230,13 +235,13 @@ class Sphere:
     def level(self, bed: Bed, shields: float, depth: float) -> float:
         """Height at which the drags on a bed at rest add up to the stress of a flow, d."""
         heights = bed.centres[:, 2]
-        low, high = float(heights.min()), float(heights.max() + bed.size)
+        low, high = float(heights.min()), float(heights.max() + bed.sizes.max())
         stress = self.density_ratio * shields * bed.sides[0] * bed.sides[1]
         for _ in range(24):
             middle = (low + high) / 2
             speed = self.speed(heights - middle, shields, depth)
-            factor = CLIFT_GAUVIN.factor(speed * bed.size / self.viscosity)
-            drags = 3 * np.pi * self.viscosity * bed.size * speed * factor
+            factor = CLIFT_GAUVIN.factor(speed * bed.sizes / self.viscosity)
+            drags = 3 * np.pi * self.viscosity * bed.sizes * speed * factor
             if drags.sum() > stress:
                 low = middle
             else:
@@ -259,7 +264,7 @@ def beds(directory: Path, seeds: Sequence[int] = SEEDS) -> list[Bed]:
             engine.execute(case, directory, 1200.0)
         packed = joined(directory / case.name, LENGTH, CUT, LAYERS, WIDTH)
         centres = np.ascontiguousarray(packed.places.xyz)
-        found.append(Bed(centres, (LENGTH, WIDTH), 1.0, seed))
+        found.append(Bed(centres, (LENGTH, WIDTH), packed.sizes, seed))
     return found
 
 
@@ -308,11 +313,11 @@ def _over(
     scale = float(np.interp(0.8, HEIGHTS, flows[1])) + 1e-9
     columns, rows, first, order = bed.columns
     scene = _Scene(
-        bed=bed.centres.ctypes.data,
+        bed=bed.grains.ctypes.data,
         grains=len(bed.centres),
         length=bed.sides[0],
         width=bed.sides[1],
-        size=bed.size,
+        size=float(bed.sizes.max()),
         ratio=s,
         viscosity=nu,
         along=-np.sin(slope),
@@ -543,7 +548,8 @@ def chains() -> Iterator[tuple[dict[str, float], Sequence[float]]]:
         for roughness in ROUGHNESS:
             yield {"density_ratio": s, "roughness": roughness}, OF_FACTORS
         for size in SIZES:
-            yield {"density_ratio": s, "relative_size": size}, OF_FACTORS
+            # how much deeper a small sphere lies in the flow depends on the viscous sublayer
+            yield {"density_ratio": s, "relative_size": size}, FEWER
 
 
 def main(directory: Path) -> None:

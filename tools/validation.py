@@ -212,6 +212,29 @@ def hiding() -> str:
     return table(["forces", "m = 1", "m = 2"], rows)
 
 
+def probes() -> str:
+    """Spheres over fixed beds: how many move on by the solver and by LIGGGHTS."""
+    rows = []
+    for row in pd.read_csv(STORED / "probes.csv").to_dict("records"):
+        shares = [
+            f"{percent(row[f'{what}_{by}'] / row['spheres'])}"
+            for what in ("started", "sustained")
+            for by in ("solver", "liggghts")
+        ]
+        rows.append(
+            [
+                f"{row['galileo']:g}",
+                f"{row['density_ratio']:g}",
+                f"{row['slope_deg']:g}°",
+                written(row["shields"], 4),
+                *shares,
+                percent(row["same"] / row["spheres"]),
+            ]
+        )
+    heads = ("Ga", "s", "slope", "θ", "30 d in the gust, solver", "LIGGGHTS")
+    return table([*heads, "20 d more, solver", "LIGGGHTS", "the same spheres"], rows)
+
+
 def intervals() -> str:
     """The tested intervals of the default, with the coverage of sets left out."""
     found = pd.read_csv(GRAINS)
@@ -530,7 +553,7 @@ BLOCKS: Mapping[str, Mapping[str, Callable[[], str]]] = {
         "sizes": sizes,
     },
     "how-sure": {"short": short, "factors": factors, "single": in_words},
-    "model": {"slopes": slopes, "steps": steps},
+    "model": {"probes": probes, "slopes": slopes, "steps": steps},
 }
 """What stands in each page, by the name of its place."""
 

@@ -164,3 +164,41 @@ def test_a_sphere_over_one_bed_is_near_the_table(tmp_path: Path) -> None:
     in_gust, after = TOOL["ways"](sand, sized, (1e-5, 1e-5), 16)
     assert (in_gust < 1).all()
     assert (after == 0).all()
+
+
+def test_grains_on_a_bed_of_other_sizes_are_as_the_points_of_their_galileo_numbers() -> (
+    None
+):
+    points = pd.read_csv(TOOL["POINTS"])
+    points = points[points["relative_size"] != 1]
+    size = points["relative_size"].to_numpy()
+    grains = Grain.of_numbers(
+        points["galileo"],
+        points["density_ratio"],
+        relative_size=size,
+        ratio=1 / 30 / size,
+    )
+    over = rolling.sustained(grains).start / points["start_50"].to_numpy()
+    assert len({*points["galileo"].round(2)}) == 11
+    # a parabola through three of the Galileo numbers had been off by 1.5
+    assert np.exp(np.abs(np.log(over))).max() < 1.2
+    assert np.exp(np.abs(np.log(over)).mean()) < 1.04
+
+
+@pytest.mark.parametrize(
+    ("galileo", "density_ratio", "exponent"),
+    [(127.0, 2.65, -0.92), (1420.0, 2.65, -1.01), (38.8, 2208.0, -1.40)],
+)
+def test_hiding_of_grains_in_sustained_motion_is_as_the_page_says(
+    galileo: float, density_ratio: float, exponent: float
+) -> None:
+    size = np.geomspace(0.5, 2.0, 9)
+    grains = Grain.of_numbers(
+        galileo * size**1.5,
+        np.full(9, density_ratio),
+        relative_size=size,
+        ratio=1 / 30 / size,
+    )
+    shields = rolling.sustained(grains).initiation(PEAK)
+    found, _ = np.polyfit(np.log(size), np.log(shields), 1)
+    assert found == pytest.approx(exponent, abs=0.02)

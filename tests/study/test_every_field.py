@@ -163,13 +163,14 @@ WITHOUT: Mapping[str, Mapping[str, str]] = {
     "a poured pile by DEM": OF_DEM,
     "a strip by DEM": {**OF_DEM, "bed.height": LEVEL_HEIGHT},
     "a strip that DEM follows": {
-        **OF_GRAINS,
+        **{name: why for name, why in OF_DEM.items() if name != "threshold.criterion"},
         "bed.height": LEVEL_HEIGHT,
         **dict.fromkeys(
             (
                 "forces.law",
                 "forces.lift_coefficient",
                 "forces.loaded_grains",
+                "method.flow.roughness",
                 "method.grains.waiting_time",
                 "threshold.displacement",
             ),

@@ -18,7 +18,7 @@ static const double MARGIN = 0.3;        /* grains within this of a contact are 
 static const double INERTIA = 0.1;
 
 typedef struct {
-    /* the bed: centres (x, y, z of each), its periodic length and width, its grains' diameter */
+    /* the bed: x, y, z and diameter of each grain, its periodic length and width, its largest diameter */
     const double *bed;
     int grains;
     double length, width, size;
@@ -42,7 +42,7 @@ typedef struct {
 
 typedef struct {
     double at[3], v[3], w[3];
-    double near[NEAR][3];                /* centres of the grains near it */
+    double near[NEAR][4];                /* centres of the grains near it, and how far it touches each */
     int count;
     double listed[3];                    /* where it was when the list was made */
     double reynolds, factor;             /* the drag is renewed where Re has changed by 2 % */
@@ -63,7 +63,7 @@ static void list_near(const Scene *s, Sphere *p)
         for (int j = row - far; j <= row + far; j++) {
             int cell = turned(i, s->columns) * s->rows + turned(j, s->rows);
             for (int k = s->first_of_column[cell]; k < s->first_of_column[cell + 1]; k++) {
-                const double *b = s->bed + 3 * s->of_column[k];
+                const double *b = s->bed + 4 * s->of_column[k];
                 double z = p->at[2] - b[2];
                 if (z > reach || z < -reach) continue;
                 double x = wrapped(p->at[0] - b[0], s->length);
@@ -73,6 +73,7 @@ static void list_near(const Scene *s, Sphere *p)
                 image[0] = p->at[0] - x;
                 image[1] = p->at[1] - y;
                 image[2] = b[2];
+                image[3] = (1 + b[3]) / 2;
             }
         }
     for (int i = 0; i < 3; i++) p->listed[i] = p->at[i];
@@ -134,13 +135,13 @@ static void contacts(const Scene *s, Sphere *p, double dt)
 {
     double n[MOST_CONTACTS][3], least[MOST_CONTACTS], push[MOST_CONTACTS], rub[MOST_CONTACTS][3];
     double mass = 1 + 0.5 / s->ratio;
-    double touch = (1 + s->size) / 2;
     double speed = sqrt(p->v[0] * p->v[0] + p->v[1] * p->v[1] + p->v[2] * p->v[2]);
-    double reach = touch + 2 * speed * dt;
+    double further = 2 * speed * dt;
     int count = 0;
     for (int c = 0; c < p->count && count < MOST_CONTACTS; c++) {
         double x = p->at[0] - p->near[c][0], y = p->at[1] - p->near[c][1], z = p->at[2] - p->near[c][2];
         double square = x * x + y * y + z * z;
+        double touch = p->near[c][3], reach = touch + further;
         if (square > reach * reach) continue;
         double apart = sqrt(square), gap = apart - touch;
         double *m = n[count];
@@ -192,11 +193,10 @@ static void contacts(const Scene *s, Sphere *p, double dt)
     }
 }
 
-static void apart(const Scene *s, Sphere *p)  /* takes away what overlap the steps have left */
+static void apart(Sphere *p)             /* takes away what overlap the steps have left */
 {
-    double touch = (1 + s->size) / 2;
     for (int c = 0; c < p->count; c++) {
-        double *b = p->near[c];
+        double *b = p->near[c], touch = b[3];
         double x = p->at[0] - b[0], y = p->at[1] - b[1], z = p->at[2] - b[2];
         double square = x * x + y * y + z * z;
         if (square >= touch * touch) continue;
@@ -223,7 +223,7 @@ static double follow(const Scene *s, Sphere *p, const double *flow, double level
         pull(s, p, flow, level, dt);
         if (p->count) contacts(s, p, dt);
         for (int i = 0; i < 3; i++) p->at[i] += p->v[i] * dt;
-        if (p->count) apart(s, p);
+        if (p->count) apart(p);
         clock += dt;
         most = fmax(most, p->at[0] - start);
         if (most >= way) return most;
@@ -248,9 +248,9 @@ int roll(const Scene *s, int count, const double *places, int settle, const doub
 {
     for (int probe = 0; probe < count; probe++) {
         Sphere p = {.at = {places[2 * probe], places[2 * probe + 1], -1e9}};
-        double reach = (1 + s->size) / 2;
         for (int g = 0; g < s->grains; g++) {
-            const double *b = s->bed + 3 * g;
+            const double *b = s->bed + 4 * g;
+            double reach = (1 + b[3]) / 2;
             double x = wrapped(p.at[0] - b[0], s->length), y = wrapped(p.at[1] - b[1], s->width);
             double room = reach * reach - x * x - y * y;
             if (room > 0) p.at[2] = fmax(p.at[2], b[2] + sqrt(room));

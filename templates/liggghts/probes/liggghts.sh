@@ -1,0 +1,1 @@
+../bed/liggghts.sh
