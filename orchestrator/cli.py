@@ -1,5 +1,6 @@
 """The command line: parse, call."""
 
+import logging
 import os
 import re
 import sys
@@ -53,6 +54,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for name in ("SOURCE_DATE_EPOCH", "MPLBACKEND"):
         # numpy and matplotlib raise at import where these are odd; figures need neither
         os.environ.pop(name, None)
+    # a home that cannot be written is no news: matplotlib has then a cache of its own
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     warnings.showwarning = lambda message, *_, **__: say(f"warning: {message}")
     # PYTHONWARNINGS=error is about libraries: a message of this program ends no command
     warnings.simplefilter("default", UserWarning)

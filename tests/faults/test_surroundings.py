@@ -16,6 +16,7 @@ from tests.faults.bench import (
     await_halt,
     await_none_in,
     ended,
+    tables,
     wrapper,
 )
 from tests.waiting import until
@@ -159,6 +160,40 @@ def test_a_directory_that_vanishes(pile: Bench) -> None:
     await_none_in(pile.folder)
     shutil.rmtree(pile.out, ignore_errors=True)
     pile.check_finished()
+
+
+NOBODY = 65534
+ANOTHER_USER = (
+    *("unshare", "--net", "setpriv", f"--reuid={NOBODY}", f"--regid={NOBODY}"),
+    # the tests may lie where only their own user can read
+    *("--clear-groups", "--inh-caps=+dac_read_search"),
+    *("--ambient-caps=+dac_read_search", "env", "HOME=/proc/nohome"),
+)
+"""As in a container that is run as another user, without a home and without a network."""
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root may become another user")
+def test_another_user_without_a_home_or_a_network(pile: Bench) -> None:
+    for path in (pile.folder, pile.source):
+        os.chown(path, NOBODY, NOBODY)
+    code, printed = ended(pile.start(under=ANOTHER_USER))
+    assert code == 0, printed
+    assert "nohome" not in printed
+    assert tables(pile.out) == tables(pile.undisturbed)
+    assert {path.stat().st_uid for path in pile.out.rglob("*")} == {NOBODY}
+    # on another machine, at another path: the path of the run is in none of its notes
+    notes = [*pile.out.glob("*.json"), *pile.out.glob("*.html")]
+    assert notes
+    own = str(pile.folder).encode()
+    assert not [path for path in notes if own in path.read_bytes()]
+    moved = pile.folder / "moved"
+    pile.out.rename(moved)
+    (moved / ".lock").write_text("process 1 on elsewhere\n")
+    pile.out = moved
+    code, printed = pile.command("status")
+    assert (code, "0 failed" in printed, "running" in printed) == (0, True, False)
+    assert "no solver was started" in pile.command("study")[1]
+    assert pile.command("report")[0] == 0
 
 
 STREAMS = {
