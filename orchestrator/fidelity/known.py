@@ -7,6 +7,7 @@ measured, and a scene of it where it is within what they were
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cache, cached_property
 
 from orchestrator.fidelity import measured
 from orchestrator.fidelity.classes import (
@@ -67,10 +68,10 @@ class Known:
         """
         if self.parts is None:
             return NOTHING
-        found = together(tuple(part.at(fraction) for part in self.parts))
+        found = _together_at(self.parts, fraction)
         return found if found.total < UNBOUND else NOTHING
 
-    @property
+    @cached_property
     def worst(self) -> Error:
         """The error at the asked fraction at which it is largest."""
         found = map(self.at, self.fractions)
@@ -80,6 +81,12 @@ class Known:
     def total(self) -> float:
         """The largest error with its uncertainty, of the asked fractions."""
         return self.worst.total
+
+
+@cache  # thousands of piles share a few errors
+def _together_at(parts: tuple[Measured, ...], fraction: float) -> Error:
+    """The error of flow and grains together at a fraction."""
+    return together(tuple(part.at(fraction) for part in parts))
 
 
 UNKNOWN = Known(None)

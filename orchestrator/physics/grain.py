@@ -115,10 +115,13 @@ class Grain:
             "relative_size": relative_size,
         }
         arrays = {name: np.asarray(value, float) for name, value in given.items()}
-        shape = np.broadcast_shapes(*[array.shape for array in arrays.values()])
+        # most have one shape already, and a law is asked for some of them often
+        shapes = {array.shape for array in arrays.values()}
+        shape = np.broadcast_shapes(*shapes)
         for name, array in arrays.items():
+            every = array if array.shape == shape else np.broadcast_to(array, shape)
             # the dataclass is frozen
-            object.__setattr__(self, name, np.broadcast_to(array, shape))
+            object.__setattr__(self, name, every)
 
     @classmethod
     def of_table(cls, table: Any) -> Self:
