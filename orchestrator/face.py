@@ -16,6 +16,8 @@ from orchestrator.calculator import BY_FLUID, LENGTHS, PARAMETERS
 from orchestrator.calculator.asked import thresholds_and_questions
 from orchestrator.calculator.cli import OPTIONS
 from orchestrator.errors import InputError, OrchestratorError, SolverError
+from orchestrator.report import words
+from orchestrator.report.card import Card
 from orchestrator.report.results import Results
 from orchestrator.runs import processors
 from orchestrator.runs.workspace import Workspace
@@ -418,6 +420,12 @@ class Opened:
         return report.said(
             self._results, guests.cards(self._results.study, self.tables)
         )
+
+    @property
+    def card(self) -> Card:
+        """The answer card: its question, its numbers with units, and its verdict."""
+        cards = guests.cards(self._results.study, self.tables)
+        return words.answer_card(self._results, cards)
 
     def __repr__(self) -> str:
         """The study in five lines."""

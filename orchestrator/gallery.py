@@ -51,16 +51,18 @@ def _card(study: Path) -> dict[str, Any]:
     try:
         opened = face.open(study)
         title = opened.title
-        first_paragraph, *_ = opened.answer.split("\n\n")
-        says = first_paragraph.splitlines()
+        answer = opened.card
+        says = [answer.question]
     except OrchestratorError as error:
         title = study.name
         says = [error.what]
+        answer = None
     return {
         "title": title,
         "directory": study.name,
         "link": quote(f"{study.name}/{PAGE}"),
         "says": says,
+        "answer": answer,
         "image": _picture(study / LIST),
     }
 

@@ -141,7 +141,7 @@ def _templates(folder: Path, autoescape: bool = True) -> Environment:
     )
     environment.filters |= {
         "typeset": typeset,
-        "n": format,
+        "n": _number,
         "address": address,
         "inline": _inline,
         "cell": _cell,
@@ -236,6 +236,11 @@ def _with_titles(svg: str, group: str, points: Sequence[Sequence[str]]) -> str:
         return f"<use {found[1]}><title>{escape(lines)}</title></use>"
 
     return before + re.sub(r"<use ([^>]*)/>", titled, after, count=len(points))
+
+
+def _number(value: Any, form: str) -> str:
+    """A number by a format, with a space before a percent sign and a true minus."""
+    return format(value, form).replace("%", " %").replace("-", "−")
 
 
 def _kind(element: object) -> str:

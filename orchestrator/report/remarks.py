@@ -14,9 +14,10 @@ from orchestrator.grains.corrected import CorrectedPile, Correction
 from orchestrator.physics.fluids import is_gas
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.measured import wilcock_crowe_hiding
+from orchestrator.physics.reported import CHOICES
 from orchestrator.physics.velocity import log_law_speed
 from orchestrator.physics.verdict import USABLE
-from orchestrator.report import counted, labels, sheets, single, theory
+from orchestrator.report import answers, counted, labels, sheets, single, theory
 from orchestrator.report.card import Remark
 from orchestrator.report.page import caption
 from orchestrator.report.results import Results
@@ -56,6 +57,19 @@ SHARP_CREST = Remark(
     f"{crest.told(crest.TENTH)} for 10 %. No numerical interval contains it. "
     "`orchestrator convergence` estimates it for a study.",
 )
+OF_FLOWS = (
+    Remark(
+        "The bed shear stress was not measured.",
+        "Speeds and the ends of the reversed flow test the flow, not the stress that "
+        "moves grains.",
+    ),
+    Remark(
+        "Steady, two-dimensional flow.",
+        "The turbulence models are averages over time; the wind tunnel's flow was "
+        "averaged over time as well.",
+    ),
+)
+"""Caveats of flows over hills, in which no grain counts."""
 FIRST_MOTION = Remark(
     "First motion, not transport.",
     "The answer is when grains start to move, not how many are carried on or how far.",
@@ -79,6 +93,8 @@ def remarks(results: Results) -> list[Remark]:
     """
     piles = results.joined("pile_threshold")
     table = piles if len(piles) else sheets.single_grains_sheet(results)
+    if answers.is_of_hills(results):
+        return [*_questions(results), *OF_FLOWS]
     if table.empty:
         return [*_questions(results)]
     said = [*_of_laws(results), *_correction(results, table), *_questions(results)]
@@ -157,13 +173,14 @@ def _correction(results: Results, table: pd.DataFrame) -> Iterator[Remark]:
         return
     ratio = computed / measured
     flow = "wind" if is_gas(float(row["rho_f_kg_m3"])) else "flow"
-    who, other = "flumes found", "the measured one"
+    who = "flumes found"
     if single.is_by_formula(row):
         who = f"the formula of {single.formula_of(row)} gives"
-        other = "that of the formula"
     size = length(float(row["d_m"]))
     law = labels.value("force_law", row["force_law"])
-    head = f"The computed {flow} differs from {other} by a factor of {ratio:.2g}."
+    over = "over" if ratio > 1 else "under"
+    factor = max(ratio, 1 / ratio)
+    head = f"The model {over}predicts the threshold {flow} by a factor of {factor:.2g}."
     text = (
         f"On a level bed of grains of {size} the force law {law} asks for a friction "
         f"velocity of {computed:#.3g} m/s; {who} {measured:#.3g} m/s. The table "
@@ -413,9 +430,11 @@ def _model(row: pd.Series, results: Results) -> Iterator[Remark]:
         return
     choice = row["model_share"]
     part = percent(row["fraction"])
-    of_intervals = "The intervals in the table do not contain this."
-    if row["tested_rows"] > 0:
-        of_intervals = "The intervals in the table are those of measured thresholds."
+    of_intervals = "The intervals do not contain this."
+    if row["interval_of"] == CHOICES:
+        of_intervals = "The intervals contain this."
+    elif row["tested_rows"] > 0:
+        of_intervals = "The intervals are those of measured thresholds."
     text = (
         f"Models with other choices of packing, forces and angles give Shields numbers "
         f"of {labels.interval(low, high)} for the {part}. {of_intervals}"
