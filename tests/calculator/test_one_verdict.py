@@ -44,7 +44,8 @@ NAMED: tuple[tuple[Given, dict[str, Any], str], ...] = (
     ((1e-3, 2650.0, WATER), {"roughness": "d/31"}, GOOD),
     ((1e-3, 2650.0, WATER), {"roughness": "d/30"}, GOOD),
     ((6e-5, 2650.0, WATER), {}, GOOD),
-    ((8e-5, 2650.0, WATER), {}, GOOD),
+    # at the upper end of its interval: nearly all that was measured is below it
+    ((8e-5, 2650.0, WATER), {}, CARE),
     # above the rows of flumes
     ((1e-4, 2650.0, WATER), {}, CARE),
     # of such densities nothing was measured
