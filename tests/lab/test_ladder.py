@@ -15,7 +15,7 @@ from orchestrator.experiment import Runs, piles
 from orchestrator.fidelity.classes import LEVEL_BED, scene_class
 from orchestrator.fidelity.fidelities import FLAT
 from orchestrator.fidelity.measured import LEAST_SCENES
-from orchestrator.lab import ladder
+from orchestrator.lab import choices, ladder
 from orchestrator.lab.ladder import REFERENCES, RUNGS
 from orchestrator.lab.timing import time_alone_s
 from orchestrator.physics import threshold
@@ -138,7 +138,7 @@ def test_a_ladder_has_all_of_its_tables(
     text = f"grain = {{ diameter = 1e-3 }}\nbed = {{ {bed} }}"
     one = ladder.Ladder(study.parse(text, name="one", where="one"), tmp_path)
     monkeypatch.setattr(ladder, "points", lambda *_: _table())
-    monkeypatch.setattr(ladder.choices, "shares", lambda *_: pd.DataFrame())
+    monkeypatch.setattr(choices, "shares", lambda *_: pd.DataFrame())
     found = one.results(Runs(one.planned, tmp_path, {}))
     assert found is not None
     errors = found.tables["scene_errors"]
