@@ -119,7 +119,10 @@ class Grain:
         shapes = {array.shape for array in arrays.values()}
         shape = np.broadcast_shapes(*shapes)
         for name, array in arrays.items():
-            every = array if array.shape == shape else np.broadcast_to(array, shape)
+            every = array.view()
+            every.flags.writeable = False
+            if array.shape != shape:
+                every = np.broadcast_to(array, shape)
             # the dataclass is frozen
             object.__setattr__(self, name, every)
 

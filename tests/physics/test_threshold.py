@@ -357,6 +357,16 @@ def test_what_a_law_does_not_know_is_neither_never_nor_at_once() -> None:
         check_known(found[1:], "blind")
 
 
+def test_the_numbers_of_grains_cannot_be_written() -> None:
+    sizes = np.array([1e-3, 2e-3])
+    fluid = {"fluid_density": np.full(2, 1000.0), "viscosity": 1e-6}
+    grains = Grain(diameter=sizes, **fluid)
+    for numbers in (grains.diameter, grains.viscosity):
+        with pytest.raises(ValueError, match="read-only"):
+            numbers[0] = 1.0
+    sizes[0] = 1.0  # that of whoever gave it can
+
+
 def test_a_grain_on_another_bed_has_the_gap_of_that_bed() -> None:
     rougher = SAND.changed(roughness=2e-4)
     assert float(rougher.gap) == 2e-4
