@@ -106,14 +106,15 @@ def _of_winds(answer: SurfaceAnswer) -> Iterator[str]:
     if len(answer.directions) < 2:
         return
     told = "Between the flows u* on the surface is interpolated"
-    left_out = answer.left_out(TENTH)
-    if left_out is None:
-        yield (f"{told}; flows 45° apart would tell how well, each left out once.")
+    of_tenth, of_half = answer.left_out(TENTH), answer.left_out(HALF)
+    if of_tenth is None or of_half is None:
+        yield f"{told}; flows 45° apart would tell how well, each left out once."
         return
     yield (
-        f"{told}: the flow from {left_out.from_deg:g}°, left out, has its wind for a "
-        f"tenth of the surface met within {left_out.off:.1%} by its neighbours, "
-        f"{left_out.gap:g}° apart, the worst of all."
+        f"{told}. Each flow left out once, its neighbours, {of_tenth.gap:g}° apart, meet "
+        f"its wind for a tenth of the surface within {100 * of_tenth.off:.1f} % (that "
+        f"from {of_tenth.from_deg:g}°), for half of it within "
+        f"{100 * of_half.off:.1f} % (from {of_half.from_deg:g}°)."
     )
 
 

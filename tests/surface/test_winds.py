@@ -101,8 +101,8 @@ def test_a_flow_that_is_left_out_measures_what_lies_between() -> None:
     assert worst.off == pytest.approx(1 - 10 / 12)
     assert worst.gap == 90.0
     said = " ".join(cards.surface_sentences(found, ""))
-    assert "the flow from 135°, left out" in said
-    assert "within 16.7%" in said
+    assert "a tenth of the surface within 16.7 % (that from 135°)" in said
+    assert "half of it within 16.7 % (from 135°)" in said
     apart = answer("0,9,1\n", *circle[::2])
     assert apart.left_out(0.1) is None
     assert "flows 45° apart would tell how well" in " ".join(
