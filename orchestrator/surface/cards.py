@@ -112,9 +112,9 @@ def _of_winds(answer: SurfaceAnswer) -> Iterator[str]:
         return
     yield (
         f"{told}. Each flow left out once, its neighbours, {of_tenth.gap:g}° apart, "
-        f"meet its wind for a tenth of the surface within "
-        f"{100 * of_tenth.off:.1f} % (that from {of_tenth.from_deg:g}°), for half of it within "
-        f"{100 * of_half.off:.1f} % (from {of_half.from_deg:g}°)."
+        "meet its wind for a tenth of the surface within "
+        f"{100 * of_tenth.off:.1f} % (that from {of_tenth.from_deg:g}°), "
+        f"for half of it within {100 * of_half.off:.1f} % (from {of_half.from_deg:g}°)."
     )
 
 
