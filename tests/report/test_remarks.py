@@ -95,7 +95,7 @@ def test_two_beds_are_the_two_numbers_of_the_card_and_one_is_one(
 
     both = small_study.run(tmp_path, TWO_BEDS)
     numbers = answers.card(both).numbers
-    assert [one.meaning.split()[0] for one in numbers[:2]] == ["least", "most"]
+    assert [one.meaning.split()[0] for one in numbers[:2]] == ["lowest", "highest"]
     table = both.tables["pile_threshold"]
     first = table["scene_id"].iloc[0]
     usable = table["scene_id"] == first
