@@ -288,6 +288,8 @@ def _of_many(rows: Sequence["Row"], asked: str, varied: Sequence[str]) -> Iterat
     if len(depths) > 1:
         # those of a river of one slope
         heads["depth_m"] = PARAMETERS["depth"].label
+    if "decides" in rows[0]:
+        heads["decides"] = OF_CRITERION["decides"]
     heads |= _quantities(rows)
     if "decides" in rows[0]:
         heads |= OF_CRITERION

@@ -121,19 +121,23 @@ def test_the_answer_comes_first_and_the_other_laws_beside_it(
         for each in figures
     )
     (table,) = [part for part in out.split("\n\n") if part.startswith("force law")]
-    rows = [line.split() for line in table.splitlines()[1:]]
+    # a head may have two lines
+    rows = [line.split() for line in table.splitlines() if line.split()[0] in LAWS]
     assert rows[0][0] == law
-    assert "<- the answer" in table.splitlines()[1]
-    for name, _, ustar, _, shields, _, holds in (row[:7] for row in rows):
+    (marked,) = [line for line in table.splitlines() if "<- answer" in line]
+    assert marked.split()[0] == law
+    for name, _, ustar, _, shields, *rest in rows:
+        # Re* stands there where the line is not too long
+        holds = next(each for each in rest if each in ("yes", "no"))
         assert (ustar, shields) == tuple(
             f"{record[name][key]:.4g}" for key in ("friction_velocity", "shields")
         )
-        assert holds == ("yes" if record[name]["valid"] else "no:")
+        assert holds == ("yes" if record[name]["valid"] else "no")
 
 
 def test_the_papers_rule_gives_both_equations_in_the_transition(run: Run) -> None:
     lines = run(*SAND_IN_AIR, "--law", "paper")[1].splitlines()
-    marked = [line.split() for line in lines if "<- the answer" in line]
+    marked = [line.split() for line in lines if "<- answer" in line]
     assert [(row[0], row[2]) for row in marked] == [
         ("low", "0.4658"),
         ("high", "0.2242"),
@@ -291,7 +295,7 @@ def test_gravel_is_answered_by_a_law_that_holds(run: Run) -> None:
     assert code == 0
     assert out.startswith("At what flow does a grain of 30 mm start to move?")
     assert "19.2 Pa" in out
-    (answer,) = [line for line in out.splitlines() if "<- the answer" in line]
+    (answer,) = [line for line in out.splitlines() if "<- answer" in line]
     assert answer.startswith("bridged-gravel")
     asked = " ".join(run(*gravel, "--law", "bridged")[1].split())
     assert "Not usable: particle Reynolds number (Schiller and Naumann)" in asked
@@ -302,7 +306,7 @@ def test_gravel_is_answered_by_a_law_that_holds(run: Run) -> None:
     assert answers == ["bridged", "bridged-gravel", "bridged-gravel"]
     lines = run(*sizes)[1].splitlines()
     assert lines[0] == "Force law bridged and bridged-gravel"
-    assert all(line.endswith("yes") for line in lines[2:5])
+    assert all(line.endswith("yes") for line in lines[3:6])
 
 
 def test_grains_that_go_on_have_the_larger_of_two_stresses(run: Run) -> None:
@@ -362,7 +366,7 @@ def test_silt_in_water_goes_on_like_any_other_grain(run: Run) -> None:
     assert low < found["shields"] < high
     assert found["shields_cessation"] == found["shields"]
     assert found["valid"]
-    assert f"at least {low:.4g}, at most {high:.4g}" in run(*silt)[1]
+    assert f"({low:.4g} … {high:.4g}: a quarter of" in " ".join(run(*silt)[1].split())
 
 
 def test_the_papers_rule_has_no_grains_that_go_on(run: Run) -> None:
@@ -384,13 +388,14 @@ def test_the_forces_on_a_grain_that_goes_on_are_those_of_the_gust(run: Run) -> N
 
 def test_text_says_which_criterion_decides(run: Run) -> None:
     one = run(*QUARTZ_IN_WATER, "--depth", "1", "--criterion", "sustained")[1]
-    assert "“sustained” decides: a gust dislodges it" in one
+    assert "Sustained motion controls: dislodgement by a gust at" in one
     many = run(
         "--diameter", RANGE, "--density", "2650", *WATER, "--criterion", "sustained"
     )
-    head, *rows = many[1].splitlines()[1:7]
-    assert "entrained" in head
+    head, _, *rows = many[1].splitlines()[1:8]
     assert "decides" in head
+    assert "Not shown: " in many[1]
+    assert all(len(line) < 80 for line in many[1].splitlines())
     # in water grains stop with their gust
     assert all("sustained" in row for row in rows[:5])
 
@@ -414,7 +419,7 @@ def test_a_river_has_a_depth_and_a_velocity(run: Run) -> None:
     sizes = ("--diameter", "0.01:0.03:3", "--density", "2650", "--fluid", "water")
     many = run(*sizes, "--bed-slope", "0.005")[1].splitlines()
     assert many[1].split("  ")[0:1] == ["d, m"]
-    assert "depth, m" in many[1]
+    assert "depth," in many[1]
     row = run(*gravel, "--bed-slope", "0.005", "--csv")[1].splitlines()
     heads = row[0].split(",")
     values = dict(zip(heads, row[1].split(","), strict=True))
