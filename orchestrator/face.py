@@ -424,6 +424,7 @@ class Opened:
     @property
     def card(self) -> Card:
         """The answer card: its question, its numbers with units, and its verdict."""
+        words.check_version(self._results)
         cards = guests.cards(self._results.study, self.tables)
         return words.answer_card(self._results, cards)
 

@@ -41,6 +41,7 @@ def answer_text(results: Results, guests: Sequence[Guest] = ()) -> str:
     OrchestratorError
         If the tables lack columns, as those of another version do.
     """
+    check_version(results)
     answered = answer_card(results, guests)
     table = sheet(results, guests)
     caveats = remarks.remarks(results)
@@ -50,6 +51,28 @@ def answer_text(results: Results, guests: Sequence[Guest] = ()) -> str:
     if caveats:
         said += ["", *remark_lines(caveats)]
     return "\n".join(said)
+
+
+def check_version(results: Results) -> None:
+    """Refuse tables that another version wrote.
+
+    Parameters
+    ----------
+    results
+        The study with its tables.
+
+    Raises
+    ------
+    OrchestratorError
+        If the tables lack columns, as those of another version do.
+    """
+    lacking = missing(results.tables)
+    if lacking:
+        listed = ", ".join(lacking)
+        what = f"its tables lack {listed}: another version of this program wrote them"
+        where = str(results.cases.parent)
+        remedy = "`orchestrator study` of the same file runs it again"
+        raise OrchestratorError(what, where, remedy)
 
 
 def answer_card(results: Results, guests: Sequence[Guest] = ()) -> Card:
@@ -66,19 +89,7 @@ def answer_card(results: Results, guests: Sequence[Guest] = ()) -> Card:
     -------
     Card
         The card.
-
-    Raises
-    ------
-    OrchestratorError
-        If the tables lack columns, as those of another version do.
     """
-    lacking = missing(results.tables)
-    if lacking:
-        listed = ", ".join(lacking)
-        what = f"its tables lack {listed}: another version of this program wrote them"
-        where = str(results.cases.parent)
-        remedy = "`orchestrator study` of the same file runs it again"
-        raise OrchestratorError(what, where, remedy)
     for guest in guests:
         if guest.card is not None:
             return guest.card

@@ -96,7 +96,7 @@ def test_page_needs_nothing_else(html: str, parsed: Page) -> None:
 
 def test_the_first_screen_answers(html: str, parsed: Page) -> None:
     order = [html.index(text) for text in (
-        'aria-label="On this page"', "along the bed: here motion starts", "What it is compared with",
+        'aria-label="On this page"', "point of first motion", "Where the numbers come from",
         'id="bed-alpha15"', 'id="thresholds"', "<th", 'id="limits"', 'id="figures"', 'id="shields"',
         'id="failed"', 'id="methods"', "<summary>All parameters", 'id="files"',
     )]  # fmt: skip
