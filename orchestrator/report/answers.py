@@ -349,7 +349,8 @@ def _of_several(rows: pd.DataFrame, results: Results) -> Card:
     worth = _worth_of_many(every, rows)
     if _are_unlike(results.at_fraction, telling):
         return _of_unlike(rows, results, told, telling, worth)
-    if set(telling) <= {*SHELTER} and "paired" in results.tables:
+    has_pairs = not results.tables.get("paired", pd.DataFrame()).empty
+    if has_pairs and set(telling) <= {*SHELTER}:
         return _of_shelter(results, told, telling)
     usable = rows[valid(rows)]
     shown = usable if len(usable) else rows

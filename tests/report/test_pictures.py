@@ -240,16 +240,16 @@ def test_motion_starts_on_a_natural_dune_where_stress_and_slope_say(
     assert (local["ustar_over_ustar0"] > 0).all()
 
 
-def test_the_card_of_a_dune_begins_with_the_place_where_motion_starts(
+def test_the_card_of_a_dune_ends_with_the_place_where_motion_starts(
     tmp_path_factory: Studies,
 ) -> None:
     groups = DUNE[DUNE.index("[[group]]") : DUNE.index("[profiles]")]
     alone = DUNE.replace(groups, "")
     dune = small_study.run(tmp_path_factory.mktemp("dune"), alone)
     row = dune.joined("pile_threshold").iloc[0]
-    place = answers.card(dune).numbers[0]
+    place = answers.card(dune).numbers[-1]
     assert (place.value, place.unit) == (row["first_x_m"], "m")
-    assert "here motion starts" in place.meaning
+    assert "point of first motion" in place.meaning
 
 
 def test_each_form_of_a_train_has_its_thresholds(train: Results) -> None:

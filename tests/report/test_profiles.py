@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from orchestrator.fidelity import limits
@@ -145,9 +146,9 @@ def test_a_comparison_says_where_each_bed_starts(fenced: Results) -> None:
     sheet = sheets.short(fenced)
     assert sheet is not None
     part = sheet.frame[sheets.PART]
-    firsts = sheet.frame[part.str.startswith("first grain")]
+    firsts = sheet.frame[part.str.startswith("first motion")]
     assert firsts[sheets.PART].tolist() == [
-        f"first grain, at x = {x:.2f} m" for x in rows["first_x_m"]
+        f"first motion at x = {x:.2f} m" for x in rows["first_x_m"]
     ]
     assert firsts["wind at 10 m, m/s"].astype(float).tolist() == pytest.approx(
         [row["first_wind_10m_m_s"] for _, row in rows.iterrows()],
@@ -157,11 +158,14 @@ def test_a_comparison_says_where_each_bed_starts(fenced: Results) -> None:
     assert part.index[part.str.startswith("first")].tolist() == [0, 3]
     assert sheet.frame["obstacles"].nunique() == 2
     usable = changed(
-        fenced, pile_threshold=fenced.tables["pile_threshold"].assign(usable=True)
+        fenced,
+        pile_threshold=fenced.tables["pile_threshold"].assign(usable=True),
+        # without ratios it is a range
+        paired=pd.DataFrame(),
     )
     first = answers.card(usable).numbers[2]
     least = rows.iloc[int(rows["first_ustar0_m_s"].argmin())]
-    assert f"at x = {least['first_x_m']:.2f} m" in first.meaning
+    assert f"at x = {least['first_x_m']:.2f} m" in first.note
     assert first.value == pytest.approx(least["first_wind_10m_m_s"])
 
 
@@ -174,5 +178,7 @@ def test_a_difference_below_the_errors_is_said_to_be_none(
     """At 30 % the stresses are 4.6 % apart; two errors add by their squares."""
     methods = fenced.tables["methods"].assign(error_estimate=error)
     rows = fenced.tables["pile_threshold"].assign(usable=True, error_estimate=error)
-    study_ = changed(fenced, methods=methods, pile_threshold=rows)
+    study_ = changed(
+        fenced, methods=methods, pile_threshold=rows, paired=pd.DataFrame()
+    )
     assert ("no difference" in answers.card(study_).worth.advice) is is_none

@@ -104,7 +104,9 @@ def test_two_beds_are_the_two_numbers_of_the_card_and_one_is_one(
     )
     numbers = answers.card(changed(both, pile_threshold=alone)).numbers
     assert len(numbers) == 2
-    assert numbers[0].meaning.startswith("stress that moves 30 %: d = ")
+    assert numbers[0].meaning.startswith(
+        "threshold bed shear stress, 30 % entrained: d"
+    )
 
 
 def test_a_pile_with_an_edge_is_told_what_its_mesh_is_worth(
