@@ -262,7 +262,7 @@ def main(directory: Path) -> None:
     }
     for name, canvas in made.items():
         (FIGURES / f"{name}.svg").write_bytes(style.svg(canvas))
-        (directory / f"{name}.png").write_bytes(style._png(canvas))
+        (directory / f"{name}.png").write_bytes(style.as_png(canvas))
 
 
 if __name__ == "__main__":

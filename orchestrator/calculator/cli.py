@@ -93,7 +93,7 @@ def _help(name: str) -> str:
     parameter = PARAMETERS[name]
     parts = [parameter.label]
     if parameter.note:
-        parts.append(parameter.note)
+        parts.append(parameter.note.replace("%", "%%"))  # argparse fills help in
     default = parameter.default
     if isinstance(default, float):
         default = f"{default:g}"

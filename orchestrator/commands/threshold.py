@@ -33,9 +33,6 @@ COMMAND = Command(
     examples={
         "threshold --fluid air --diameter 3e-4 --density 2650": "sand in wind",
         "threshold --fluid water --diameter 1e-4:2e-3:20 --csv": "a table of sizes",
-        "threshold --fluid water --diameter 0.02 --stress tau.tif": (
-            "a map of the stress over the threshold"
-        ),
     },
     options=_options,
     run=_run,

@@ -571,7 +571,19 @@ def by_rows(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 class Part(NamedTuple):
-    """Rows of some sets in a range of a number: above `low`, up to `high`."""
+    """Rows of some sets in a range of a number.
+
+    Attributes
+    ----------
+    name
+        The name of the number, in words.
+    sets
+        The names of the sets.
+    number
+        The column of the number.
+    low, high
+        The ends of the range; the upper one is in it.
+    """
 
     name: str
     sets: tuple[str, ...]

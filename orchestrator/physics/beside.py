@@ -385,7 +385,18 @@ class TestedWindow(NamedTuple):
     held: float
 
     def is_of(self, columns: Mapping[str, NDArray[Any]]) -> BoolArray:
-        """Tell which of some thresholds are in the window."""
+        """Tell which of some thresholds are in the window.
+
+        Parameters
+        ----------
+        columns
+            Their columns, each of shape (n,).
+
+        Returns
+        -------
+        ndarray
+            Truth values, shape (n,).
+        """
         is_within = (_is_within(columns[name], self.ranges[name]) for name in WINDOW)
         return np.asarray(np.logical_and.reduce([*is_within]))
 

@@ -171,13 +171,14 @@ def with_usable(
     rows["standing_out"] = standing_out(rows["relative_size"], rows["beta_deg"])
     rows["flow_reynolds"] = _flow_reynolds(rows)
     measured = beside(rows.assign(**{TESTED_AS: tested_as(rows)}))
-    rows = rows.assign(**measured)
+    # in one step: columns put in one by one would lie in as many pieces
+    rows = _with(rows, measured)
     twins = None
     if "fraction" in rows:
         replicas = rows["scene_id"].map(_replicas(scenes.set_index("scene_id")))
         twins = rows.groupby([replicas, "fraction"], dropna=False).ngroup()
     units = quoted(rows, twins)
-    records = rows.assign(**units).to_dict("records")
+    records = _with(rows, units).to_dict("records")
     reasons = []
     for row, of_law in zip(records, _against_law(rows, is_pile), strict=True):
         against = [*_reasons(row, of_law, tolerance)]
@@ -192,6 +193,12 @@ def with_usable(
     made = {**of_verdict, **measured, **units}
     judged = pd.concat([table, pd.DataFrame(made, index=table.index)], axis=1)
     return Judged(judged, pd.DataFrame(_listed(records, reasons)))
+
+
+def _with(rows: pd.DataFrame, columns: Mapping[str, Any]) -> pd.DataFrame:
+    """Some rows with columns, in place of their own of these names."""
+    others = rows.drop(columns=[*columns], errors="ignore")
+    return pd.concat([others, pd.DataFrame(columns, index=rows.index)], axis=1)
 
 
 REASON: Mapping[str, str] = {

@@ -15,7 +15,7 @@ import pytest
 from orchestrator.errors import OrchestratorError
 from orchestrator.runs import cluster, engine, processors
 from orchestrator.runs.queues import Queue
-from tests.waiting import until
+from tests.waiting import HANGS_S, until
 
 pytestmark = pytest.mark.skipif(
     importlib.util.find_spec("dask_jobqueue") is None, reason="without dask-jobqueue"
@@ -97,7 +97,7 @@ def _files_of_the_guide() -> dict[str, dict[str, Any]]:
 def _ran(settings: dict[str, Any], folder: Path) -> int:
     """The process of a task that a job of these settings has run."""
     queue = Queue("slurm", settings)
-    with cluster.pool(queue, folder / "cases", workers=1, limit_s=60.0) as pool:
+    with cluster.pool(queue, folder / "cases", workers=1, limit_s=HANGS_S) as pool:
         return int(pool.executor.submit(os.getpid).result())
 
 
@@ -152,7 +152,7 @@ def test_a_job_that_never_runs_says_why(
         printed += capsys.readouterr().err
         return told in printed
 
-    with cluster.pool(queue, tmp_path / "cases", workers=1, limit_s=60.0):
+    with cluster.pool(queue, tmp_path / "cases", workers=1, limit_s=HANGS_S):
         until(is_told)
     assert re.search(r"no job has run for \d+ s; ", printed)
     assert "9999" not in printed

@@ -359,8 +359,8 @@ def test_what_a_law_does_not_know_is_neither_never_nor_at_once() -> None:
 
 def test_the_numbers_of_grains_cannot_be_written() -> None:
     sizes = np.array([1e-3, 2e-3])
-    fluid = {"fluid_density": np.full(2, 1000.0), "viscosity": 1e-6}
-    grains = Grain(diameter=sizes, **fluid)
+    water = np.full(2, 1000.0)
+    grains = Grain(diameter=sizes, fluid_density=water, viscosity=1e-6)
     for numbers in (grains.diameter, grains.viscosity):
         with pytest.raises(ValueError, match="read-only"):
             numbers[0] = 1.0
