@@ -62,7 +62,6 @@ COMMAND = Command(
     examples={
         "status results/first-look": "the cases of a study",
         "status results/first-look --watch": "the same, until the study has ended",
-        "status results/erosion": "the cases of an experiment",
     },
     options=_options,
     run=_run,
