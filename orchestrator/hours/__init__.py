@@ -40,6 +40,7 @@ OFFER = Offer(
                 "hours results/dune --wind year.csv --from 270": (
                     "beach, foot, slope and brink in the wind from the west"
                 ),
+                "hours results/dune --wind year.csv --from 270 --csv": "as a table",
             },
             options=_options,
             run=_run,
