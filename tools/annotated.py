@@ -1,8 +1,10 @@
-"""The picture of docs/result-page.md: the page of a study with numbered callouts.
+"""Pictures of a page: its upper part for README.md, and with numbered callouts.
+
+The latter is that of docs/result-page.md.
 
 python tools/annotated.py DIRECTORY
 
-DIRECTORY holds the preset `first-look`, which was run. Chromium draws the picture.
+DIRECTORY holds the preset `first-look`, which was run. Chromium draws the pictures.
 """
 
 import json
@@ -16,12 +18,14 @@ from PIL import Image
 
 PICTURE = Path(__file__).parents[1] / "docs" / "figures" / "result-page.png"
 SIZE = (1280, 1860)  # pixels
+UPPER_PART = PICTURE.with_name("first-look-page.png")
+UPPER_SIZE = (1280, 800)
 COLOURS = 96
 CALLOUTS = (
     "h1",
-    ".number:nth-of-type(3) strong",
-    ".number:nth-of-type(3) .measured",
-    ".number:nth-of-type(3) p:last-child",
+    ".number strong",
+    ".number strong.second",
+    ".number .ends",
     ".worth",
     ".bed-box",
     ".slide",
@@ -41,8 +45,7 @@ addEventListener('load', () => CALLOUTS.forEach((selector, number) => {
   const mark = document.createElement('div');
   mark.textContent = number + 1;
   mark.style.cssText = 'MARK';
-  const left = selector.includes('measured') ? box.right + 6 : box.left - 36;
-  mark.style.left = Math.max(2, left) + 'px';
+  mark.style.left = Math.max(2, box.left - 36) + 'px';
   mark.style.top = box.top + scrollY + 'px';
   document.body.append(mark);
 }));
@@ -50,16 +53,22 @@ addEventListener('load', () => CALLOUTS.forEach((selector, number) => {
 
 
 def main(directory: Path) -> None:
-    """Draw the picture."""
+    """Draw both pictures."""
     text = (directory / "report.html").read_text(encoding="utf-8")
     # the page lets no script but its own run
     text = re.sub(r'(?s)<meta http-equiv="Content-Security-Policy".*?>', "", text)
+    _draw(text, UPPER_PART, UPPER_SIZE)
     script = SCRIPT.replace("CALLOUTS", json.dumps(CALLOUTS)).replace("MARK", MARK)
+    _draw(f"{text}<script>{script}</script>", PICTURE, SIZE)
+
+
+def _draw(text: str, picture: Path, size: tuple[int, int]) -> None:
+    """Draw the upper part of a page."""
     with tempfile.TemporaryDirectory() as scratch:
         page = Path(scratch) / "page.html"
         shot = Path(scratch) / "shot.png"
-        page.write_text(f"{text}<script>{script}</script>", encoding="utf-8")
-        wide, high = SIZE
+        page.write_text(text, encoding="utf-8")
+        wide, high = size
         command = ["chromium", "--headless", "--no-sandbox", "--disable-gpu"]
         command += ["--disable-background-networking", "--hide-scrollbars"]
         command += [
@@ -69,7 +78,7 @@ def main(directory: Path) -> None:
         command += [f"--screenshot={shot}", page.as_uri()]
         subprocess.run(command, check=True, capture_output=True)
         image = Image.open(shot).convert("RGB")
-        image.quantize(COLOURS).save(PICTURE, optimize=True)
+        image.quantize(COLOURS).save(picture, optimize=True)
 
 
 if __name__ == "__main__":
