@@ -170,11 +170,6 @@ class Experiment(ABC):
     def results(self, runs: Runs) -> ExperimentResults | None:
         """Make tables and page of the runs that are done.
 
-        Parameters
-        ----------
-        runs
-            The runs.
-
         Returns
         -------
         Results or None
@@ -320,11 +315,6 @@ class Experiment(ABC):
 
 def piles(study: Study) -> dict[Scene, PileBed]:
     """Find the piles of a study.
-
-    Parameters
-    ----------
-    study
-        The study.
 
     Returns
     -------

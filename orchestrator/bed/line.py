@@ -330,11 +330,6 @@ class BedLine:
 def of_bed(bed: PileBed) -> BedLine:
     """Make the bed line that a pile's bed asks for.
 
-    Parameters
-    ----------
-    bed
-        The bed.
-
     Returns
     -------
     BedLine

@@ -120,11 +120,6 @@ def _grain_class(scene: Scene) -> str:
 def is_curved(bed: PileBed) -> bool:
     """Whether a bed has no edge where a row of grains could begin to leave.
 
-    Parameters
-    ----------
-    bed
-        The bed.
-
     Returns
     -------
     bool
@@ -178,11 +173,6 @@ def is_limiting(scene: Scene) -> bool:
 
 def lift_over_weight(scene: Scene) -> float:
     """Compute lift over the weight normal to the bed when a grain would roll.
-
-    Parameters
-    ----------
-    scene
-        The scene.
 
     Returns
     -------

@@ -20,11 +20,6 @@ PILES = 4
 def has_sharp_crest(scene: Scene) -> bool:
     """Whether a flow is solved over a pile whose crest is an edge.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-
     Returns
     -------
     bool

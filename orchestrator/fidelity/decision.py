@@ -234,11 +234,6 @@ def _by(scene: Scene, method: ThresholdMethod) -> Scene:
 def with_criterion(scene: Scene) -> Scene:
     """A scene with the criterion by which a study answers it.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-
     Returns
     -------
     Scene

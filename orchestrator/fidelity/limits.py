@@ -91,11 +91,6 @@ class Limit(NamedTuple):
 def check_study(study: Study) -> None:
     """Check every scene of a study.
 
-    Parameters
-    ----------
-    study
-        The study.
-
     Raises
     ------
     InputError

@@ -17,11 +17,6 @@ FACTORS = (0.5, 1.0, 2.0)
 def length_of(scene: Scene) -> float:
     """Compute the smoothing of a noisy profile, m.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-
     Returns
     -------
     float

@@ -52,11 +52,6 @@ class BedState:
     def whole(cls, packing: Packing) -> "BedState":
         """Make the grains as they were packed.
 
-        Parameters
-        ----------
-        packing
-            The packing.
-
         Returns
         -------
         BedState

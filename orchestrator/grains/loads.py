@@ -75,11 +75,6 @@ def has_rows_along(scene: Scene) -> bool:
     do. Level rows make stairs of a slope, where each step holds the grains of the one
     below it, and each grain of a poured bed has a pocket of its own.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-
     Returns
     -------
     bool

@@ -101,11 +101,6 @@ class Choice:
     def fidelity(self, scene: Scene) -> Fidelity:
         """Choose the fidelity by which it is changed in a scene.
 
-        Parameters
-        ----------
-        scene
-            The scene.
-
         Returns
         -------
         Fidelity
@@ -117,11 +112,6 @@ class Choice:
 
     def scenes(self, scene: Scene) -> Iterator[tuple[str, Scene]]:
         """List the alternatives that a scene can have.
-
-        Parameters
-        ----------
-        scene
-            The scene.
 
         Yields
         ------
@@ -315,11 +305,6 @@ class Change(NamedTuple):
 
 def changes(study: Study) -> tuple[list[Change], dict[str, Decision]]:
     """List the alternatives of each pile of a study.
-
-    Parameters
-    ----------
-    study
-        The study.
 
     Returns
     -------

@@ -118,11 +118,6 @@ class Kind:
 def key_of(answer: Decision) -> str:
     """Name a decision for a plan.
 
-    Parameters
-    ----------
-    answer
-        The decision.
-
     Returns
     -------
     str
@@ -174,11 +169,6 @@ class OfStudy:
 
 def kinds(study: Study) -> list[Kind]:
     """Sort the piles of a study by kind, with the choices of each.
-
-    Parameters
-    ----------
-    study
-        The study.
 
     Returns
     -------

@@ -155,11 +155,6 @@ class Ladder(Experiment):
 def decisions(study: Study) -> dict[str, Decision]:
     """Decide on the pairs of rungs that each pile of a study is run on.
 
-    Parameters
-    ----------
-    study
-        The study.
-
     Returns
     -------
     dict of str to Decision

@@ -157,13 +157,6 @@ def _card(table: pd.DataFrame) -> Card:
 def judge_map(one: StabilityMap, runs: Runs) -> pd.DataFrame:
     """Judge every run of a map.
 
-    Parameters
-    ----------
-    one
-        The map.
-    runs
-        The runs.
-
     Returns
     -------
     DataFrame

@@ -171,11 +171,6 @@ def rises_along(
 def constant(evidence: Evidence) -> Comparisons:
     """Thresholds of single grains at small Re*, where lift over drag grows with Re*.
 
-    Parameters
-    ----------
-    evidence
-        The tables of a study.
-
     Yields
     ------
     Comparison
@@ -216,11 +211,6 @@ def constant(evidence: Evidence) -> Comparisons:
 def numerical(evidence: Evidence) -> Comparisons:
     """Thresholds by DEM over the closed form, by how the flow is raised.
 
-    Parameters
-    ----------
-    evidence
-        The tables of a study.
-
     Yields
     ------
     Comparison
@@ -245,11 +235,6 @@ def numerical(evidence: Evidence) -> Comparisons:
 
 def best_fit(evidence: Evidence) -> Comparisons:
     """Single grains on a flat bed against the curves for water, and for air.
-
-    Parameters
-    ----------
-    evidence
-        The tables of a study.
 
     Yields
     ------
@@ -594,11 +579,6 @@ def fraction(evidence: Evidence, flow: str) -> Comparisons:
 def conditioning(evidence: Evidence) -> Comparisons:
     """The smallest grains, and the stiffness of the contacts.
 
-    Parameters
-    ----------
-    evidence
-        The tables of a study.
-
     Yields
     ------
     Comparison
@@ -623,11 +603,6 @@ def conditioning(evidence: Evidence) -> Comparisons:
 
 def regimes(evidence: Evidence) -> Comparisons:
     """How many piles of the paper's own range the force laws and the drag law cover.
-
-    Parameters
-    ----------
-    evidence
-        The tables of a study.
 
     Yields
     ------
@@ -680,11 +655,6 @@ def _within_drag_law(name: str, table: pd.DataFrame) -> Comparisons:
 def eq10_against_wall(evidence: Evidence) -> Comparisons:
     """Eq. 10 against the wall stress, in the thresholds of piles.
 
-    Parameters
-    ----------
-    evidence
-        The tables of a study.
-
     Yields
     ------
     Comparison
@@ -721,11 +691,6 @@ def _across_methods(coded: pd.DataFrame) -> Comparisons:
 
 def coupling(evidence: Evidence) -> Comparisons:
     """The flow of the whole pile, kept until the last grain has gone.
-
-    Parameters
-    ----------
-    evidence
-        The tables of a study.
 
     Yields
     ------

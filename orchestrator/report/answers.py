@@ -63,11 +63,6 @@ FLUIDS = ("rho_f_kg_m3", "nu_m2_s")
 def card(results: Results) -> Card:
     """Make the answer card of a study.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Returns
     -------
     Card
@@ -855,11 +850,6 @@ def _behind(aspect: float, rows: pd.DataFrame) -> Number:
 
 def is_of_hills(results: Results) -> bool:
     """Whether a study is about hills that others measured, none of whose grains count.
-
-    Parameters
-    ----------
-    results
-        The study with its tables.
 
     Returns
     -------

@@ -287,11 +287,6 @@ class Card:
 def lines(card: Card) -> Iterator[str]:
     """Write a card for a terminal.
 
-    Parameters
-    ----------
-    card
-        The card.
-
     Yields
     ------
     str

@@ -96,11 +96,6 @@ def way_up(profile: Profile) -> tuple[str, str] | None:
     The toe is where the line lies lowest under the straight one from its first point
     to its top.
 
-    Parameters
-    ----------
-    profile
-        The profile.
-
     Returns
     -------
     tuple of str or None

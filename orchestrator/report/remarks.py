@@ -80,11 +80,6 @@ FIRST_MOTION = Remark(
 def remarks(results: Results) -> list[Remark]:
     """List the caveats of the answer of a study.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Returns
     -------
     list of Remark

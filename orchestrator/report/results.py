@@ -133,11 +133,6 @@ class Results:
     def is_whole(self, case: Case) -> bool:
         """Say whether a case has all of its files, of which some may be read now.
 
-        Parameters
-        ----------
-        case
-            The case.
-
         Returns
         -------
         bool
@@ -323,11 +318,6 @@ class Results:
 
 def measured_hills(results: Results) -> Iterator[tuple[float, pd.DataFrame]]:
     """List the flows over hills that others measured.
-
-    Parameters
-    ----------
-    results
-        The study with its tables.
 
     Yields
     ------

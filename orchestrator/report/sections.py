@@ -80,11 +80,6 @@ def _head(drawn: Sequence[Figure]) -> list[Figure]:
 def links(results: Results) -> dict[str, str]:
     """Find the addresses of the cases on the page.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Returns
     -------
     dict of str to str
@@ -228,11 +223,6 @@ def _files(results: Results) -> Section:
 
 def counts(results: Results) -> dict[str, Any]:
     """Count what a reader must know before using this study's results.
-
-    Parameters
-    ----------
-    results
-        The study with its tables.
 
     Returns
     -------

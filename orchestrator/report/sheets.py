@@ -123,11 +123,6 @@ def quantity_of_rows(rows: pd.DataFrame) -> ReportedQuantity:
 def short(results: Results) -> Sheet | None:
     """List the thresholds in at most a screen: of few scenes each, of many their range.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Returns
     -------
     Sheet or None
@@ -261,11 +256,6 @@ def _fits(rows: pd.DataFrame, keys: Sequence[str]) -> bool:
 def piles_sheet(results: Results) -> pd.DataFrame | None:
     """List the thresholds of the piles at every fraction.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Returns
     -------
     DataFrame or None
@@ -284,11 +274,6 @@ def piles_sheet(results: Results) -> pd.DataFrame | None:
 
 def single_grains_sheet(results: Results) -> pd.DataFrame:
     """List single grains with their thresholds: by DEM, or else by the closed form.
-
-    Parameters
-    ----------
-    results
-        The study with its tables.
 
     Returns
     -------
@@ -497,11 +482,6 @@ def _verdict(count: int, of: int, word: str, why_not: str, is_range: bool) -> st
 def hills(results: Results) -> Sheet:
     """List where the flow runs back behind hills that others measured.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Returns
     -------
     Sheet
@@ -535,11 +515,6 @@ def _or_nowhere(distance: float) -> str:
 
 def sizes_sheet(results: Results) -> Sheet | None:
     """List the thresholds of the sizes of mixtures at one fraction.
-
-    Parameters
-    ----------
-    results
-        The study with its tables.
 
     Returns
     -------
@@ -653,11 +628,6 @@ def _ranges(
 def force_laws(results: Results) -> pd.DataFrame:
     """List the force laws of the scenes.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Returns
     -------
     DataFrame
@@ -678,11 +648,6 @@ def force_laws(results: Results) -> pd.DataFrame:
 
 def parameters(results: Results) -> pd.DataFrame:
     """List the values that each parameter of the scenes takes.
-
-    Parameters
-    ----------
-    results
-        The study with its tables.
 
     Returns
     -------
@@ -726,11 +691,6 @@ def _values(column: pd.Series) -> str:
 
 def fidelities(results: Results) -> pd.DataFrame | None:
     """List the fidelities that answered the piles.
-
-    Parameters
-    ----------
-    results
-        The study with its tables.
 
     Returns
     -------

@@ -385,11 +385,6 @@ def model_name(row: Row) -> str:
 def threshold_name(told: ReportedQuantity) -> str:
     """Name a quantity at the threshold of motion.
 
-    Parameters
-    ----------
-    told
-        The quantity.
-
     Returns
     -------
     str

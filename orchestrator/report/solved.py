@@ -54,13 +54,6 @@ def _solved_once(directory: Path, mesh: tuple[tuple[int, ...], ...]) -> SolvedFl
 def title(results: Results, pile: Pile) -> str:
     """Name a pile by its slope, height, roughness, and fields in which flows differ.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-    pile
-        The pile.
-
     Returns
     -------
     str
@@ -78,11 +71,6 @@ def title(results: Results, pile: Pile) -> str:
 
 def piles_by_kind(results: Results) -> list[list[Pile]]:
     """List piles with flows by slope, height and fields that vary.
-
-    Parameters
-    ----------
-    results
-        The study with its tables.
 
     Returns
     -------
@@ -106,11 +94,6 @@ def piles_by_kind(results: Results) -> list[list[Pile]]:
 def piles_with_files(results: Results) -> list[Pile]:
     """A pile for each kind of flow whose files are kept.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Returns
     -------
     list of Pile
@@ -125,13 +108,6 @@ def piles_with_files(results: Results) -> list[Pile]:
 
 def stress_on(pile: Pile, results: Results) -> pd.DataFrame:
     """Find the stress along the bed of a pile whose flow is solved.
-
-    Parameters
-    ----------
-    pile
-        The pile.
-    results
-        The study with its tables.
 
     Returns
     -------

@@ -487,11 +487,6 @@ def saved(figure: Figure, folder: Folder, *, png: bool = False) -> Figure:
 def drawn(figure: Figure) -> Figure:
     """Draw a figure as SVG.
 
-    Parameters
-    ----------
-    figure
-        The figure.
-
     Returns
     -------
     Figure

@@ -164,11 +164,6 @@ def digits_of_place(profile: Profile) -> int:
 
     They are known to a hundredth or a thousandth of its length.
 
-    Parameters
-    ----------
-    profile
-        The profile.
-
     Returns
     -------
     int

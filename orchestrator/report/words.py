@@ -56,11 +56,6 @@ def answer_text(results: Results, guests: Sequence[Guest] = ()) -> str:
 def check_version(results: Results) -> None:
     """Refuse tables that another version wrote.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Raises
     ------
     OrchestratorError

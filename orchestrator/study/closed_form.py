@@ -31,11 +31,6 @@ from orchestrator.study.scene import CELLS_OVER_Z0, Scene
 def single_grain(scene: Scene) -> Grain:
     """Make the single grain of a scene.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-
     Returns
     -------
     Grain
@@ -120,11 +115,6 @@ def flow_roughness(scene: Scene) -> float | None:
 
 def regime_of(scene: Scene) -> Regime:
     """Say which of Eqs. 2 and 4 holds at the single-grain threshold of a scene.
-
-    Parameters
-    ----------
-    scene
-        The scene.
 
     Returns
     -------

@@ -27,11 +27,6 @@ ENTRAINED, SUSTAINED, AUTO = "entrained", "sustained", "auto"
 def is_sustained(scene: Scene) -> bool:
     """Tell whether the grains of a scene must go on, not only leave their pockets.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-
     Returns
     -------
     bool
@@ -57,11 +52,6 @@ def _is_single_by_dem(scene: Scene) -> bool:
 
 def peak_of(scene: Scene) -> float:
     """Find the stress of the gust that decides, over the mean stress.
-
-    Parameters
-    ----------
-    scene
-        The scene.
 
     Returns
     -------
@@ -142,11 +132,6 @@ def _initiation(
 
 def of_single_grain(scene: Scene) -> Criteria:
     """Find the mean stresses at which the single grain of a scene leaves and goes on.
-
-    Parameters
-    ----------
-    scene
-        The scene.
 
     Returns
     -------

@@ -85,11 +85,6 @@ class Quantity:
     def applies(self, scene: Scene) -> bool:
         """Tell whether it has an effect on a scene.
 
-        Parameters
-        ----------
-        scene
-            The scene.
-
         Returns
         -------
         bool
@@ -99,11 +94,6 @@ class Quantity:
 
     def asked(self, scene: Scene) -> Any:
         """Find its value as a scene has it written.
-
-        Parameters
-        ----------
-        scene
-            The scene.
 
         Returns
         -------
@@ -116,11 +106,6 @@ class Quantity:
 
     def used(self, scene: Scene) -> Any:
         """Find its value as a scene uses it.
-
-        Parameters
-        ----------
-        scene
-            The scene.
 
         Returns
         -------
@@ -305,11 +290,6 @@ open."""
 def question(scene: Scene) -> dict[str, Any]:
     """List what a scene asks.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-
     Returns
     -------
     dict
@@ -321,11 +301,6 @@ def question(scene: Scene) -> dict[str, Any]:
 def method(scene: Scene) -> dict[str, Any]:
     """List how a scene is answered.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-
     Returns
     -------
     dict
@@ -336,11 +311,6 @@ def method(scene: Scene) -> dict[str, Any]:
 
 def asked(scene: Scene) -> dict[str, Any]:
     """List what a scene asks and how its method is written.
-
-    Parameters
-    ----------
-    scene
-        The scene.
 
     Returns
     -------
@@ -354,11 +324,6 @@ def asked(scene: Scene) -> dict[str, Any]:
 def used(scene: Scene) -> dict[str, Any]:
     """List all quantities of a scene.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-
     Returns
     -------
     dict
@@ -369,11 +334,6 @@ def used(scene: Scene) -> dict[str, Any]:
 
 def written(scene: Scene) -> str:
     """List the fields of the method that a scene does not leave at their defaults.
-
-    Parameters
-    ----------
-    scene
-        The scene.
 
     Returns
     -------

@@ -50,11 +50,6 @@ class ThresholdMethod:
     def misfit(self, question: Question) -> UnfitError | None:
         """Say what of a question the method does not know.
 
-        Parameters
-        ----------
-        question
-            The question.
-
         Returns
         -------
         UnfitError, or None

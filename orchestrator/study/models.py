@@ -40,11 +40,6 @@ class FlowModel:
     def misfit(self, question: Question) -> UnfitError | None:
         """Say what of the question on a pile the model does not know.
 
-        Parameters
-        ----------
-        question
-            The question.
-
         Returns
         -------
         UnfitError, or None

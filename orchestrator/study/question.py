@@ -175,11 +175,6 @@ class Question(Part):
 def check(question: Question) -> None:
     """Raise an `UnfitError` for the first fields that do not go together.
 
-    Parameters
-    ----------
-    question
-        The question.
-
     Raises
     ------
     UnfitError
@@ -205,11 +200,6 @@ def check(question: Question) -> None:
 
 def why_not_sustained(question: Question) -> str:
     """Say why grains in sustained motion are not known for a question.
-
-    Parameters
-    ----------
-    question
-        The question.
 
     Returns
     -------

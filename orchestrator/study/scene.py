@@ -99,11 +99,6 @@ class Scene(Question):
     def by(self, method: ThresholdMethod) -> "Scene":
         """Make the same question by another threshold method.
 
-        Parameters
-        ----------
-        method
-            The method.
-
         Returns
         -------
         Scene

@@ -36,11 +36,6 @@ DIRECTIONS_DEG = np.arange(0.0, 180.0, 15.0)
 def form_places(surface: Surface) -> FloatArray:
     """Find the nodes of a surface that are a part of the form.
 
-    Parameters
-    ----------
-    surface
-        The surface.
-
     Returns
     -------
     FloatArray

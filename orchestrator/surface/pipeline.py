@@ -132,11 +132,6 @@ class SurfaceMotion(OverSurfaces):
 def flow_of(scene: SurfaceScene) -> SurfaceFlowCase:
     """The run of a scene.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-
     Returns
     -------
     SurfaceFlowCase

@@ -81,11 +81,6 @@ crest."""
 def point(scene: Scene) -> Row:
     """Make the columns by which a scene is found in a figure.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-
     Returns
     -------
     dict
@@ -488,11 +483,6 @@ def flow(pile: Pile, cases: Path) -> Row:
 
 def measured_hill(pile: Pile) -> measured.MeasuredHill | None:
     """Find the hill of a wind tunnel that a pile is.
-
-    Parameters
-    ----------
-    pile
-        The pile.
 
     Returns
     -------

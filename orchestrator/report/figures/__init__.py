@@ -64,11 +64,6 @@ class FigureKind:
     def draw(self, results: Results) -> Iterator[Figure]:
         """Make its figures.
 
-        Parameters
-        ----------
-        results
-            The study with its tables.
-
         Yields
         ------
         Figure

@@ -28,11 +28,6 @@ OVER = ("reynolds", "value", "low", "high")
 def draw(results: Results) -> Iterator[Figure]:
     """Draw u* of DEM over that of the closed form, for each increment of load steps.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Yields
     ------
     Figure

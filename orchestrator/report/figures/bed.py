@@ -207,11 +207,6 @@ def chosen(results: Results) -> Iterator[tuple[pd.Series, Pile]]:
     Poured beds have one for each slope and method, whose grains go otherwise. Where the
     files of a pile were pruned, the next one has its place.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Yields
     ------
     row : Series
@@ -234,11 +229,6 @@ def chosen(results: Results) -> Iterator[tuple[pd.Series, Pile]]:
 
 def draw(results: Results) -> Iterator[Figure]:
     """Draw the bed of each slope.
-
-    Parameters
-    ----------
-    results
-        The study with its tables.
 
     Yields
     ------
@@ -273,11 +263,6 @@ def draw(results: Results) -> Iterator[Figure]:
 
 def files(results: Results) -> Sequence[Case]:
     """List the cases of the beds that are drawn.
-
-    Parameters
-    ----------
-    results
-        The study with its tables.
 
     Returns
     -------
@@ -395,11 +380,6 @@ def _paths(steps: Steps) -> list[list[Any]]:
 
 def window(pile: Pile) -> tuple[solved.Window, str]:
     """Choose what of a bed the picture shows.
-
-    Parameters
-    ----------
-    pile
-        The pile.
 
     Returns
     -------

@@ -31,11 +31,6 @@ part near the pile is shown. {% if lid %}The lid is far above. {% endif %}To sca
 def draw(results: Results) -> Iterator[Figure]:
     """Speed and streamlines: a panel for each slope and height, at its least z0.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Yields
     ------
     Figure
@@ -130,11 +125,6 @@ def _smooth(psi: FloatArray) -> FloatArray:
 
 def files(results: Results) -> Sequence[Case]:
     """List the flows that are drawn.
-
-    Parameters
-    ----------
-    results
-        The study with its tables.
 
     Returns
     -------

@@ -85,11 +85,6 @@ less stress. Above n/N = 90 % a curve may leave the frame. Forces: {{ laws(about
 def draw(results: Results) -> Iterator[Figure]:
     """Draw the part that has moved of the bed of the card, and of all beds.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Yields
     ------
     Figure

@@ -38,11 +38,6 @@ CAPTION = (
 def draw(results: Results) -> Iterator[Figure]:
     """Draw the threshold by every law, and by the law that answers for other sizes.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Yields
     ------
     Figure

@@ -47,11 +47,6 @@ CAPTION = (
 def draw(results: Results) -> Iterator[Figure]:
     """Draw thresholds of size classes over that of the median size, by method.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Yields
     ------
     Figure

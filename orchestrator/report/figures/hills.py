@@ -28,11 +28,6 @@ measured ones."""
 def draw(results: Results) -> Iterator[Figure]:
     """Draw hills over which others measured the flow: computed beside measured.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Yields
     ------
     Figure

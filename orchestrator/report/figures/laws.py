@@ -20,11 +20,6 @@ CAPTION = (
 def draw(results: Results) -> Iterator[Figure]:
     """Draw the ranges of Re* in which laws are within what was measured in water.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Yields
     ------
     Figure

@@ -37,11 +37,6 @@ FOLLOWED = {
 def draw(results: Results) -> Iterator[Figure]:
     """Draw Figs. 5 to 8: on a flat bed by entrainment angle or law, and on slopes.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Yields
     ------
     Figure

@@ -25,11 +25,6 @@ CAPTION = (
 def draw(results: Results) -> Iterator[Figure]:
     """Draw the pivots of the exposed grains of poured beds.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Yields
     ------
     Figure

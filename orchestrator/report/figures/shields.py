@@ -48,11 +48,6 @@ grains. {{ references(about) }}"""
 def draw(results: Results) -> Iterator[Figure]:
     """Draw the one diagram of a study: piles, single grains, laws and measurements.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Yields
     ------
     Figure

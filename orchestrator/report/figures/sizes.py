@@ -30,11 +30,6 @@ CAPTION = (
 def draw(results: Results) -> Iterator[Figure]:
     """Draw the stress that moves each size of the mixture of the card.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Yields
     ------
     Figure

@@ -42,11 +42,6 @@ back. Below: the bed of height h, exaggerated. All panels share the axes."""
 def draw(results: Results) -> Iterator[Figure]:
     """The friction velocity along beds, for each slope at its least and largest z0.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Yields
     ------
     Figure

@@ -29,11 +29,6 @@ CAPTION = (
 def draw(results: Results) -> Iterator[Figure]:
     """Draw thresholds over the size, or over the first other number that varies.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Yields
     ------
     Figure

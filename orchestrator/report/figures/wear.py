@@ -26,11 +26,6 @@ CAPTION = (
 def draw(results: Results) -> Iterator[Figure]:
     """Draw beds that change beside the frozen ones.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Yields
     ------
     Figure

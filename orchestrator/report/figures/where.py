@@ -63,11 +63,6 @@ the part that is named."""
 def draw(results: Results) -> Iterator[Figure]:
     """Draw three panels along each bed: thresholds, stress, bed line.
 
-    Parameters
-    ----------
-    results
-        The study with its tables.
-
     Yields
     ------
     Figure
