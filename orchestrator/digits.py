@@ -211,11 +211,11 @@ def plain(value: float, digits: int = 3) -> str:
 
     Examples
     --------
-    >>> plain(1e-5), plain(1.4607e-5), plain(-0.05), plain(2650.0, 4)
-    ('1.0 × 10⁻⁵', '1.46 × 10⁻⁵', '−0.05', '2650')
+    >>> plain(1e-5), plain(1.4607e-5), plain(-0.05), plain(11923.0, 3)
+    ('1.0 × 10⁻⁵', '1.46 × 10⁻⁵', '−0.05', '11900')
     """
     if value == 0 or not np.isfinite(value) or 1e-3 <= abs(value) < 1e5:
-        return f"{value:.{digits}g}".replace("-", "−")
+        return f"{float(f'{value:.{digits}g}'):.15g}".replace("-", "−")
     mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
     whole, _, rest = mantissa.partition(".")
     rest = rest.rstrip("0") or "0"

@@ -74,6 +74,28 @@ def single_card(row: Row) -> Card:
         With speed, friction velocity and stress.
     """
     told = quantity_of_row(row)
+    return Card(
+        f"At what {told.flow} does {motion_of_grain(row)}?",
+        _scene_of_grain(row),
+        numbers_of_grain(row, told),
+        source(row),
+        worth(row),
+    )
+
+
+def motion_of_grain(row: Row) -> str:
+    """Say what is asked of one grain: that it starts to move, or keeps moving, too.
+
+    Parameters
+    ----------
+    row
+        Its threshold, as that of `single_card`.
+
+    Returns
+    -------
+    str
+        The words behind "does".
+    """
     size = length(float(row["d_m"]))
     # rows of `threshold` have no column for the criterion, and this one for
     # sustained motion alone
@@ -82,13 +104,7 @@ def single_card(row: Row) -> Card:
     ending = ""
     if is_sustained and is_decided:
         ending = " and keep moving"
-    return Card(
-        f"At what {told.flow} does a grain of {size} start to move{ending}?",
-        _scene_of_grain(row),
-        numbers_of_grain(row, told),
-        source(row),
-        worth(row),
-    )
+    return f"a grain of {size} start to move{ending}"
 
 
 def known_number(value: Any) -> float:

@@ -18,10 +18,11 @@ from matplotlib.figure import Figure as Canvas
 
 from orchestrator.calculator import cli
 from orchestrator.calculator.answer import grain_card
-from orchestrator.digits import FORMAT
+from orchestrator.digits import FORMAT, plain
 from orchestrator.errors import InputError
 from orchestrator.report import style
 from orchestrator.report.card import Card, Number, lines
+from orchestrator.report.single import motion_of_grain
 from orchestrator.runs.files import write_durably
 from orchestrator.surface.raster import Opened, is_empty, opened_raster, rasterio
 from orchestrator.types import FloatArray, Row
@@ -378,17 +379,15 @@ def _card(
             scale * summary.above[0],
             shown,
             "its area",
-            f"of {scale * summary.area:.4g} {shown} with a stress of "
+            f"of {plain(scale * summary.area, 4)} {shown} with a stress of "
             f"{summary.least:.3g} … {summary.most:.3g} Pa",
             low=scale * summary.above[1] if has_interval else nan,
             high=scale * summary.above[2] if has_interval else nan,
         ),
         of_grain.numbers[-1],
     )
-    question = of_grain.question.removeprefix("At which flow does ")
-    question = question.removeprefix("At which wind does ").removesuffix("?")
     return Card(
-        f"Where on {name} does {question}?",
+        f"Where on {name} does {motion_of_grain(row)}?",
         of_grain.scene,
         numbers,
         of_grain.source,

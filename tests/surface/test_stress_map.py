@@ -151,7 +151,9 @@ def test_a_file_without_a_unit_is_said_to_be_taken_as_pascal(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     mapped(write(tmp_path / "told.tif"), tmp_path / "a")
-    assert "taken as Pa" not in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "taken as Pa" not in printed
+    assert printed.startswith("Where on told.tif does a grain of ")
     mapped(write(tmp_path / "untold.tif", unit=""), tmp_path / "b")
     assert "names no unit: its numbers are taken as Pa" in capsys.readouterr().out
 
