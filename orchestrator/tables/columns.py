@@ -59,7 +59,7 @@ SEVERAL: Mapping[str, str] = {
         "passed the displacement criterion; in pile_grain: 1 if that happened to the "
         "grain, else 0"
     ),
-    "fraction": "n/N at which the threshold is read",
+    "fraction": "n/N at which the threshold is read; empty of the first motion",
     "fraction_moved": "n/N, moved over counted grains",
     "size_over_d": "diameter of the grain over d; of a size class the geometric mean",
     "decides": (

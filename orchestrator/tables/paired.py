@@ -31,7 +31,7 @@ PAIRED: Mapping[str, str] = {
         "scene of the same bed without obstacles, of trains that with the widest "
         "spacing"
     ),
-    "fraction": "fraction n/N; empty of the first motion",
+    **several("fraction"),
     "pairs": "number of pairs of beds that differ in their seed alone",
     "ratio_usable": (
         "whether nothing speaks against either threshold but its numerical error, "

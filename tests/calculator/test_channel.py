@@ -113,8 +113,9 @@ def test_the_command_prints_the_discharge_with_its_interval(
     river = [*GRAVEL_IN_WATER, "--bed-slope", "0.004", "--d84", "0.053"]
     assert cli.main(["threshold", *river]) == 0
     lines = capsys.readouterr().out.splitlines()
-    heads = [place for place, line in enumerate(lines) if "discharge, m2/s" in line]
-    head = heads[0]
+    heads = [place for place, line in enumerate(lines) if "discharge, " in line]
+    head = heads[0] + 1
+    assert lines[head].split() == ["velocity,", "m/s", "m2/s"]
     of_answer, coarse, strickler, grains = (
         line.split() for line in lines[head + 1 : head + 5]
     )

@@ -127,6 +127,11 @@ def test_a_slope_beyond_those_of_the_table_is_told() -> None:
     assert not [*verdict.of_measurements(leaving, is_closed=False)]
 
 
+def test_the_compiled_solver_leaves_the_arithmetic_of_the_process_alone() -> None:
+    TOOL["solver"]()
+    assert np.finfo(float).tiny / 4 > 0
+
+
 def test_the_tables_are_made_of_the_stored_points() -> None:
     points = pd.read_csv(TOOL["POINTS"])
     for made, path in (

@@ -44,5 +44,5 @@ def test_assumptions_matter_more_only_where_they_do(
     text, below = _said(packing, slope)
     assert below == is_less
     assert ("assumptions of the model change a threshold by more" in text) == is_less
-    assert ("at 1 of 1 beds this error is larger" in " ".join(text.split())) != is_less
+    assert ("At 1 of 1 beds this is more than" in " ".join(text.split())) != is_less
     assert "measured on" in text
