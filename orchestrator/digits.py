@@ -194,7 +194,7 @@ RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 """Digits of an exponent."""
 
 
-def plain(value: float, digits: int = 3) -> str:
+def plain_number(value: float, digits: int = 3) -> str:
     """Write a number for a reader.
 
     Parameters
@@ -211,8 +211,8 @@ def plain(value: float, digits: int = 3) -> str:
 
     Examples
     --------
-    >>> plain(1e-5), plain(1.4607e-5), plain(-0.05), plain(11923.0, 3)
-    ('1.0 × 10⁻⁵', '1.46 × 10⁻⁵', '−0.05', '11900')
+    >>> [plain_number(value) for value in (1e-5, 1.4607e-5, -0.05, 11923.0)]
+    ['1.0 × 10⁻⁵', '1.46 × 10⁻⁵', '−0.05', '11900']
     """
     if value == 0 or not np.isfinite(value) or 1e-3 <= abs(value) < 1e5:
         return f"{float(f'{value:.{digits}g}'):.15g}".replace("-", "−")
@@ -244,5 +244,5 @@ def metres(value: float, digits: int = 3) -> str:
     ('40 m', '0.3 mm', '−50 mm')
     """
     if abs(value) >= 1:
-        return f"{plain(value, digits)} m"
-    return f"{plain(1e3 * value, digits)} mm"
+        return f"{plain_number(value, digits)} m"
+    return f"{plain_number(1e3 * value, digits)} mm"

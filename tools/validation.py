@@ -180,7 +180,7 @@ def in_motion() -> str:
 def by_dem() -> str:
     """Both thresholds of the strips that DEM follows, beside the closed form."""
     rows = []
-    for row in followed.compare(followed.stored()).to_dict("records"):
+    for row in followed.compare_strips(followed.stored_strips()).to_dict("records"):
         numbers = (row[name] for name in ("entrained", "sustained", "cessation"))
         rows.append(
             [

@@ -76,7 +76,7 @@ def roughnesses(
     return {"channel_roughness": roughness, "d84": d84}
 
 
-def beside(table: Mapping[str, Any]) -> dict[str, FloatArray]:
+def channel_beside(table: Mapping[str, Any]) -> dict[str, FloatArray]:
     """Find the mean velocities of the same stress and depth by other roughnesses.
 
     Parameters

@@ -40,7 +40,7 @@ from orchestrator.physics.laws import DEFAULT, LAWS, law
 from orchestrator.physics.onset import Onset, of_grains
 from orchestrator.physics.reported import (
     Interval,
-    compared,
+    compared_columns,
     compared_range,
     every_unit,
     has_no_law,
@@ -139,7 +139,7 @@ def thresholds(
                 against[row].append(Reason("depth", text))
                 table["valid"][row] = False
     _judge(table, against)
-    return table | river.beside(table) | _reported(table)
+    return table | river.channel_beside(table) | _reported(table)
 
 
 def _check_criterion(criterion: str) -> None:
@@ -241,7 +241,7 @@ def _reported(table: Table) -> Table:
             by_law.append((own, holds & is_asked))
     with np.errstate(all="ignore"):
         interval = Interval.tested(table, ustar).or_of_laws(by_law)
-        made = interval.columns(flow) | compared(flow, ustar)
+        made = interval.columns(flow) | compared_columns(flow, ustar)
         ends = compared_range(made, ustar, table["usable"])
         for end, at in zip(("_low", "_high"), ends, strict=True):
             made |= in_units(at, flow, end, "compared_")

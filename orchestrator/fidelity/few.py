@@ -232,7 +232,7 @@ def _corrected(answer: Decision, few: FewRuns) -> Corrected:
     )
 
 
-def correction(
+def corrected_by(
     few: FewRuns, answers: Decisions, piles: Mapping[str, Pile]
 ) -> Correction:
     """Find the piles that correct others.
@@ -284,7 +284,7 @@ def with_corrections(piles: Mapping[str, Pile], answers: Decisions) -> dict[str,
     for asked, answer in answers.items():
         if isinstance(answer, Corrected):
             if answer.few not in made:
-                made[answer.few] = correction(answer.few, answers, piles)
+                made[answer.few] = corrected_by(answer.few, answers, piles)
             found[asked] = corrected(piles[asked], made[answer.few], answer.stratum)
     return found
 

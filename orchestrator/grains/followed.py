@@ -206,7 +206,7 @@ class FollowedCase(DeckCase):
         bed = self.geometry.bed
         d = scene.grain.diameter
         packed = self.packing(cases)
-        table = grain_table(scene, packed)
+        table = followed_table(scene, packed)
         length = self.geometry.closed_length
         dropped = bed.dropped_grains
         numbers: dict[str, float | int] = {
@@ -287,11 +287,11 @@ class FollowedCase(DeckCase):
             what = "grains were lost before the flow rose"
             remedy = "another bed.seed, or softer springs (method.grains.stiffness)"
             raise SolverError(what, where=str(settling), remedy=remedy)
-        table = grain_table(self.scene, self.packing(directory.parent))
+        table = followed_table(self.scene, self.packing(directory.parent))
         read_kept(directory, table).to_csv(directory, table)
 
 
-def grain_table(scene: Scene, packed: Packing) -> GrainTable:
+def followed_table(scene: Scene, packed: Packing) -> GrainTable:
     """List the grains of the strip as the deck has them, but for dropped ones.
 
     Parameters

@@ -24,9 +24,9 @@ def _options(command: Parser) -> None:
 
 def _run(options: Namespace) -> int:
     """Print the hours of a finished study."""
-    from orchestrator.hours.places import run
+    from orchestrator.hours.places import run_hours
 
-    return run(options)
+    return run_hours(options)
 
 
 OFFER = Offer(

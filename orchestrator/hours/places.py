@@ -48,7 +48,7 @@ PARTS = {"a tenth": 0.1, "half": 0.5}
 
 
 @dataclass(frozen=True)
-class Place:
+class DunePlace:
     """A place of a bed.
 
     Attributes
@@ -81,7 +81,7 @@ class Place:
 
         Examples
         --------
-        >>> foot = Place("foot", np.array([0.3, 0.2]), np.array([1.0, 1.0]))
+        >>> foot = DunePlace("foot", np.array([0.3, 0.2]), np.array([1.0, 1.0]))
         >>> foot.at(0.1), foot.at(0.6)
         (0.2, 0.3)
         """
@@ -127,7 +127,7 @@ def _along(winds: Winds, from_deg: float) -> tuple[FloatArray, FloatArray, Float
 
 def places_of(
     pile: Pile, grains: pd.DataFrame, level: float, cases: Path
-) -> list[Place]:
+) -> list[DunePlace]:
     """Find the places of a bed.
 
     Parameters
@@ -153,7 +153,7 @@ def places_of(
         is_beach &= np.abs(stress.x_m - each.x) > each.reach
     with np.errstate(divide="ignore"):
         ustar0 = level / np.abs(stress.ustar_over_ustar0_wall[is_beach])
-    found = [Place("beach", ustar0, stress.length_m[is_beach])]
+    found = [DunePlace("beach", ustar0, stress.length_m[is_beach])]
     s = grains["s_m"].to_numpy(float)
     z = np.interp(s, stress.s_m, stress.z_m)
     foot, crest = np.interp([0.0, line.crest_s], stress.s_m, stress.z_m)
@@ -162,7 +162,7 @@ def places_of(
     flows = grains["ustar0_m_s"].fillna(np.inf).to_numpy(float)
     for name, (low, high) in ENDS.items():
         here = on_way & (part >= low) & (part < high)
-        found.append(Place(name, flows[here], _lengths(s)[here]))
+        found.append(DunePlace(name, flows[here], _lengths(s)[here]))
     return [place for place in found if len(place.ustar0)]
 
 
@@ -174,7 +174,7 @@ def _lengths(s: FloatArray) -> FloatArray:
     return lengths
 
 
-def run(options: Namespace) -> int:
+def run_hours(options: Namespace) -> int:
     """Print the hours a year by place of a finished study.
 
     Parameters

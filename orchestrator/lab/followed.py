@@ -28,7 +28,7 @@ CUT, DROPPED = "start of the bed as cut", "sustained, grains dropped"
 """What the two thresholds are called."""
 
 
-def stored() -> pd.DataFrame:
+def stored_strips() -> pd.DataFrame:
     """Read the load steps of the strips that were run.
 
     Returns
@@ -77,7 +77,7 @@ def strip_thresholds(steps: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(made)
 
 
-def compare(steps: pd.DataFrame) -> pd.DataFrame:
+def compare_strips(steps: pd.DataFrame) -> pd.DataFrame:
     """Compare both thresholds of each set of strips with the closed form of one grain.
 
     Parameters

@@ -570,7 +570,7 @@ def by_rows(rows: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(made)
 
 
-class Part(NamedTuple):
+class ScoredPart(NamedTuple):
     """Rows of some sets in a range of a number.
 
     Attributes
@@ -596,13 +596,16 @@ GALILEO = (0.0, 3.0, 10.0, 30.0, 60.0, 300.0, 2000.0, np.inf)
 """Galileo numbers between which the rows by eye are scored."""
 VISUAL = ("flumes, visual",)
 PARTS = (
-    *(Part("Galileo number", VISUAL, "galileo", *two) for two in pairwise(GALILEO)),
     *(
-        Part("Re*", VISUAL, "reynolds", *two)
+        ScoredPart("Galileo number", VISUAL, "galileo", *two)
+        for two in pairwise(GALILEO)
+    ),
+    *(
+        ScoredPart("Re*", VISUAL, "reynolds", *two)
         for two in pairwise((0.0, 1.0, 400.0, np.inf))
     ),
     *(
-        Part("slope", ("steep flumes",), "slope", *two)
+        ScoredPart("slope", ("steep flumes",), "slope", *two)
         for two in pairwise((0.0, 0.12, np.inf))
     ),
 )
@@ -702,7 +705,7 @@ class Validation(Experiment):
             "rows": by_rows(rows),
             "parts": by_parts(rows),
             "activity": activity.compare_activity(),
-            "followed": followed.compare(followed.stored()),
+            "followed": followed.compare_strips(followed.stored_strips()),
             "hiding": stored_hiding(),
         }
         return ExperimentResults(tables, _sections(tables))

@@ -260,7 +260,7 @@ def has_no_law(table: Any, count: int) -> BoolArray:
     return np.asarray(np.asarray(table["decides"], object) == SUSTAINED)
 
 
-def compared(
+def compared_columns(
     table: Any,
     ustar: FloatArray,
     is_level: Any = False,

@@ -194,7 +194,9 @@ def _scene(row: pd.Series, pile: Pile, results: Results) -> str:
     if bed.profile or bed.counted:
         grains_ = results.tables["pile_grain"]
         of_bed = grains_["scene_id"] == row["scene_id"]
-        count += f"; counted: {counted.metres(grains_.loc[of_bed, 'x_m'], bed)}"
+        count += (
+            f"; counted: {counted.metres_of_place(grains_.loc[of_bed, 'x_m'], bed)}"
+        )
     obstacles = pile.scene.obstacles
     if obstacles:
         shape += f", behind {', '.join(map(str, obstacles))}"

@@ -17,7 +17,7 @@ MOST = 3
 """Stretches that are named each; of more the number is told."""
 
 
-def metres(x: pd.Series, bed: PileBed) -> str:
+def metres_of_place(x: pd.Series, bed: PileBed) -> str:
     """Say which metres of a bed are counted.
 
     Parameters

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from orchestrator.digits import metres, plain
+from orchestrator.digits import metres, plain_number
 from orchestrator.report.card import apart
 from orchestrator.study import fields
 from orchestrator.study.declare import Info
@@ -205,10 +205,10 @@ def amount(value: float, unit: str) -> str:
     if unit == "m":
         return metres(value, 4)
     if unit == "%":
-        return f"{plain(100.0 * value, 4)} %"
+        return f"{plain_number(100.0 * value, 4)} %"
     if unit == "°":
-        return f"{plain(value, 4)}°"
-    return f"{plain(value, 6)} {unit}".rstrip()
+        return f"{plain_number(value, 4)}°"
+    return f"{plain_number(value, 6)} {unit}".rstrip()
 
 
 def interval(low: float, high: float, digits: int = 3, form: str = "#g") -> str:

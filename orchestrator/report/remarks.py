@@ -382,7 +382,7 @@ def _counted(scene: Scene, bed: PileBed, x: pd.Series) -> Iterator[Remark]:
             )
     else:
         rest = 'the windward sides alone: `bed.counted = "windward"`'
-    metres = counted.metres(x, bed)
+    metres = counted.metres_of_place(x, bed)
     if metres:
         where += f": {metres}"
     yield Remark(f"{where}.", f"{rest[0].upper()}{rest[1:]}.")

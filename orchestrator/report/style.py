@@ -479,12 +479,12 @@ def saved(figure: Figure, folder: Folder, *, png: bool = False) -> Figure:
         raster = as_png(figure.canvas)
         folder.put(f"{FIGURES}/{figure.name}.png", raster)
         figure.canvas.set_layout_engine("none")  # it is laid out now
-    made = drawn(figure)
+    made = drawn_as(figure)
     folder.put(f"{FIGURES}/{figure.name}.svg", made.image)
     return replace(made, image=raster or made.image)
 
 
-def drawn(figure: Figure) -> Figure:
+def drawn_as(figure: Figure) -> Figure:
     """Draw a figure as SVG.
 
     Returns

@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 from orchestrator import digits
-from orchestrator.digits import plain
+from orchestrator.digits import plain_number
 from orchestrator.physics.fluids import is_gas, is_like_paper
 from orchestrator.study.profile import Profile
 
@@ -127,7 +127,7 @@ def fluid(density: float, viscosity: float) -> str:
     >>> fluid(1.225, 1.46e-5), fluid(1000.0, 1e-6), fluid(1.0, 1e-5)
     ('air', 'water', 'the article’s gas (1 kg/m³, 1.0 × 10⁻⁵ m²/s), close to air')
     """
-    numbers = f"{plain(density, 4)} kg/m³, {plain(viscosity)} m²/s"
+    numbers = f"{plain_number(density, 4)} kg/m³, {plain_number(viscosity)} m²/s"
     if is_like_paper(density, viscosity):
         return f"the article’s gas ({numbers}), close to air"
     for name, (densities, viscosities) in (("air", AIR), ("water", WATER)):

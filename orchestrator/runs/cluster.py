@@ -177,7 +177,7 @@ def execute_unless_done(case: Case, cases: Path, limit_s: float, cores: int) -> 
     # the other one's solver is killed after that time; what it leaves is read quickly
     waits_s = 2 * limit_s
     else_ = "wait for its end, then give the same command again"
-    with locks.held(lock, limit_s=waits_s, else_=else_):
+    with locks.lock_held(lock, limit_s=waits_s, else_=else_):
         state = done_state(case, cases)
         if state:
             return float(state["wall_s"])

@@ -64,7 +64,7 @@ def _machine(recorded: str) -> str:
 
 
 @contextlib.contextmanager
-def held(
+def lock_held(
     path: Path,
     *,
     limit_s: float,

@@ -83,7 +83,7 @@ def claimed(
         raise OrchestratorError(shortage)
     folder = Folder(root)
     remedy = "wait for its end, or choose another directory with --out"
-    held = locks.held(root / LOCK, limit_s=locks.AT_ONCE_S, else_=remedy)
+    held = locks.lock_held(root / LOCK, limit_s=locks.AT_ONCE_S, else_=remedy)
     holding = contextlib.ExitStack()
     try:
         root.mkdir(parents=True, exist_ok=True)

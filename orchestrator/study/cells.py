@@ -203,7 +203,7 @@ def _has_numbers_between_blanks(line: str) -> bool:
     )
 
 
-def split(line: str, separator: str | None) -> list[str]:
+def split_cells(line: str, separator: str | None) -> list[str]:
     """Divide a line into its cells.
 
     Parameters
@@ -282,7 +282,7 @@ class TextTable:
             yield line, [cells[at] if at < len(cells) else "" for at in places]
 
 
-def read_table(
+def read_cells(
     text: str, is_head: Callable[[Sequence[str]], bool], where: str, remedy: str
 ) -> TextTable:
     """Read the table of a text.
@@ -312,7 +312,7 @@ def read_table(
     separator = separator_of(lines)
     for place, line in enumerate(lines[:LONGEST_HEAD]):
         for mark in dict.fromkeys([separator, ";", "\t", ",", None]):
-            names = split(COMMENT.sub("", line), mark)
+            names = split_cells(COMMENT.sub("", line), mark)
             if not is_head(names):
                 continue
             inner = separator if _is_data(lines[place + 1 :], separator) else mark
@@ -330,7 +330,7 @@ def _fits(lines: Sequence[str], names: Sequence[str], separator: str | None) -> 
     """Whether the next line that is no comment has a cell for each name."""
     for line in lines:
         if line.strip() and not COMMENT.match(line):
-            return len(split(line, separator)) >= len(names)
+            return len(split_cells(line, separator)) >= len(names)
     return True
 
 
@@ -338,7 +338,7 @@ def _is_data(lines: Sequence[str], separator: str | None) -> bool:
     """Whether the next line with cells has several by a separator."""
     for line in lines:
         if line.strip():
-            return len(split(line, separator)) > 1
+            return len(split_cells(line, separator)) > 1
     return False
 
 
@@ -357,7 +357,7 @@ def _table(
         is_comment = COMMENT.match(line) and not SIEVE_NUMBER.match(line)
         if not line.strip() or is_comment:
             continue
-        cells = split(line, separator)
+        cells = split_cells(line, separator)
         if not any(cells):
             continue
         if not rows and _is_of_units(cells):

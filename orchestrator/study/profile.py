@@ -18,7 +18,7 @@ from orchestrator.digits import number as counted
 from orchestrator.digits import on_grid
 from orchestrator.errors import InputError
 from orchestrator.runs.files import digest_file, digest_text
-from orchestrator.study.cells import Marks, TextTable, marks_of, read_table
+from orchestrator.study.cells import Marks, TextTable, marks_of, read_cells
 from orchestrator.study.heads import (
     ALONG,
     DEGREES,
@@ -473,7 +473,7 @@ def _points_of(text: str, where: str) -> _Points:
     """
     if not text.strip():
         raise InputError("it is empty", f"{where}: line 1", PROFILE_REMEDY)
-    table = read_table(text, _names_both, where, _remedy_of(text))
+    table = read_cells(text, _names_both, where, _remedy_of(text))
     place = f"{where}: line {table.head}"
     try:
         columns = [_column(table, name) for name in COLUMNS]

@@ -16,7 +16,7 @@ import numpy as np
 from orchestrator.digits import number as counted
 from orchestrator.digits import rounded
 from orchestrator.errors import InputError
-from orchestrator.study.cells import Marks, TextTable, marks_of, read_table
+from orchestrator.study.cells import Marks, TextTable, marks_of, read_cells
 from orchestrator.study.heads import UNITS, name_of
 
 LARGEST_RATIO = 10.0
@@ -240,7 +240,7 @@ def read_sieve(text: str, where: str) -> SieveTable:
     InputError
         With the line and the remedy.
     """
-    table = read_table(text, _is_head, where, REMEDY)
+    table = read_cells(text, _is_head, where, REMEDY)
     size = _size_column(table, where)
     values = _value_columns(table, size)
     if not values:

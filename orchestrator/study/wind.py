@@ -18,7 +18,7 @@ from orchestrator.digits import number as counted
 from orchestrator.digits import percent, rounded
 from orchestrator.errors import InputError
 from orchestrator.study import compass
-from orchestrator.study.cells import Marks, TextTable, marks_of, read_table
+from orchestrator.study.cells import Marks, TextTable, marks_of, read_cells
 from orchestrator.types import FloatArray
 
 USUAL_HEIGHT = 10.0
@@ -296,7 +296,7 @@ def read_winds(text: str, where: str) -> Winds:
     found = _of_wasp(text, where)
     if found is not None:
         return found
-    table = read_table(text, _is_head, where, REMEDY)
+    table = read_cells(text, _is_head, where, REMEDY)
     if not table.rows:
         raise InputError("its shares add up to 0: no line has a wind", where, REMEDY)
     columns = [_column(name) for name in table.names]

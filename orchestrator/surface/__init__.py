@@ -76,9 +76,9 @@ def _stress_map(options: Namespace) -> int | None:
                 remedy = "leave it out, or name a raster: --stress FILE"
                 raise InputError("there is no map without a raster", option, remedy)
         return None
-    from orchestrator.surface.stress_map import run
+    from orchestrator.surface.stress_map import run_stress_map
 
-    return run(options)
+    return run_stress_map(options)
 
 
 def _hint(table: str, name: str) -> tuple[str, str] | None:

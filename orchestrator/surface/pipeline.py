@@ -444,7 +444,7 @@ def _sections(
         drawing = maps.figure(answer.grid, hours, "hours a year", colours="magma")
         text = words["hours"]
         figures.append(Figure(f"hours{end}", "Hours of motion", text, (), drawing))
-        drawing = winds.figure(answer)
+        drawing = winds.rose_figure(answer)
         text = f"{words['rose']} {answer.rose.said}"
         figures.append(Figure(f"rose{end}", "Winds of the place", text, (), drawing))
     yield Section(answer.name, figures)

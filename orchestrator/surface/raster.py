@@ -220,7 +220,7 @@ def _is_isolated(value: float, count: int, others: FloatArray, step: float) -> b
 
 
 @contextmanager
-def opened_raster(path: Path, where: str) -> Iterator["Opened"]:
+def opened_raster(path: Path, where: str) -> Iterator["OpenedRaster"]:
     """Open a GeoTIFF or an ESRI grid, of whatever quantity.
 
     Parameters
@@ -249,13 +249,13 @@ def opened_raster(path: Path, where: str) -> Iterator["Opened"]:
             yield opened
     elif ending in (".tif", ".tiff"):
         with _opened(path, "GTiff", where) as dataset:
-            yield Opened(dataset, dataset.crs, dataset.nodata)
+            yield OpenedRaster(dataset, dataset.crs, dataset.nodata)
     else:
         what = f"the ending {ending!r} is of no raster"
         raise InputError(what, where, "endings: .tif .tiff (GeoTIFF), .asc (ESRI)")
 
 
-class Opened(NamedTuple):
+class OpenedRaster(NamedTuple):
     """A raster as rasterio opens it.
 
     Attributes
@@ -444,7 +444,7 @@ def _of_grid(path: Path, text: str, where: str) -> Raster:
 
 
 @contextmanager
-def _grid(path: Path, text: str, where: str) -> Iterator[Opened]:
+def _grid(path: Path, text: str, where: str) -> Iterator[OpenedRaster]:
     """An ESRI ASCII grid, or one of GRASS, as rasterio opens it."""
     system = _system_beside(path.with_suffix(".prj"), where)
     text, marks = _with_points(text, where)
@@ -458,7 +458,7 @@ def _grid(path: Path, text: str, where: str) -> Iterator[Opened]:
     # numbers as they are written: 32-bit ones have seven digits
     precise = {"DATATYPE": "Float64"}
     with memory, _opened(memory.name, "AAIGrid", where, **precise) as dataset:
-        yield Opened(dataset, system, empty, tuple(said))
+        yield OpenedRaster(dataset, system, empty, tuple(said))
 
 
 def _with_points(text: str, where: str) -> tuple[str, Marks]:

@@ -18,13 +18,13 @@ from matplotlib.figure import Figure as Canvas
 
 from orchestrator.calculator import cli
 from orchestrator.calculator.answer import grain_card
-from orchestrator.digits import FORMAT, plain
+from orchestrator.digits import FORMAT, plain_number
 from orchestrator.errors import InputError
 from orchestrator.report import style
 from orchestrator.report.card import Card, Number, lines
 from orchestrator.report.single import motion_of_grain
 from orchestrator.runs.files import write_durably
-from orchestrator.surface.raster import Opened, is_empty, opened_raster, rasterio
+from orchestrator.surface.raster import OpenedRaster, is_empty, opened_raster, rasterio
 from orchestrator.types import FloatArray, Row
 
 PASCAL: dict[str, float] = {
@@ -117,7 +117,7 @@ class Summary:
             self.most = max(self.most, float(np.nanmax(stress)))
 
 
-def run(options: Namespace) -> int:
+def run_stress_map(options: Namespace) -> int:
     """Map the stress of a raster over the threshold of a grain.
 
     Parameters
@@ -179,7 +179,7 @@ def _rows(options: Namespace) -> list[Row]:
     return rows
 
 
-def _unit(opened: Opened, asked: str | None, where: str) -> tuple[str, bool]:
+def _unit(opened: OpenedRaster, asked: str | None, where: str) -> tuple[str, bool]:
     """The unit of a stress, and whether the file or the user names it."""
     told = (opened.dataset.units[0] or "").strip()
     if asked is None and not told:
@@ -200,7 +200,7 @@ def _unit(opened: Opened, asked: str | None, where: str) -> tuple[str, bool]:
     return found[0], True
 
 
-def _sizes(opened: Opened) -> tuple[FloatArray, str]:
+def _sizes(opened: OpenedRaster) -> tuple[FloatArray, str]:
     """The area of a cell of each row, and its unit: m2, or cells."""
     dataset, system = opened.dataset, opened.system
     transform = dataset.transform
@@ -217,7 +217,7 @@ def _sizes(opened: Opened) -> tuple[FloatArray, str]:
     return np.full(count, across * metres**2), "m2"
 
 
-def _windows(opened: Opened) -> Iterator[Any]:
+def _windows(opened: OpenedRaster) -> Iterator[Any]:
     """Windows of some whole rows, which cover a raster."""
     dataset = opened.dataset
     rows = max(1, CELLS_AT_ONCE // dataset.width)
@@ -227,7 +227,7 @@ def _windows(opened: Opened) -> Iterator[Any]:
         yield window(0, first, dataset.width, count)
 
 
-def _stress(opened: Opened, unit: float, where: str, **part: Any) -> FloatArray:
+def _stress(opened: OpenedRaster, unit: float, where: str, **part: Any) -> FloatArray:
     """The stress of a part of a raster, Pa, NaN in empty cells."""
     dataset, empty = opened.dataset, opened.empty
     try:
@@ -266,7 +266,9 @@ def _ratios(stress: FloatArray, row: Row) -> FloatArray:
     return np.stack([stress / end for end in ends])
 
 
-def _written(opened: Opened, row: Row, unit: float, out: Path, where: str) -> Summary:
+def _written(
+    opened: OpenedRaster, row: Row, unit: float, out: Path, where: str
+) -> Summary:
     """Write the map as a GeoTIFF, and count what it has."""
     dataset, system = opened.dataset, opened.system
     _check_kind(dataset, where)
@@ -379,7 +381,7 @@ def _card(
             scale * summary.above[0],
             shown,
             "its area",
-            f"of {plain(scale * summary.area, 4)} {shown} with a stress of "
+            f"of {plain_number(scale * summary.area, 4)} {shown} with a stress of "
             f"{summary.least:.3g} … {summary.most:.3g} Pa",
             low=scale * summary.above[1] if has_interval else nan,
             high=scale * summary.above[2] if has_interval else nan,
@@ -395,7 +397,7 @@ def _card(
     )
 
 
-def _picture(opened: Opened, row: Row, unit: float) -> bytes:
+def _picture(opened: OpenedRaster, row: Row, unit: float) -> bytes:
     """The picture of a map: its ratio, and lines of 1 by the threshold and its ends."""
     dataset = opened.dataset
     most = max(dataset.width, dataset.height)
@@ -408,7 +410,7 @@ def _picture(opened: Opened, row: Row, unit: float) -> bytes:
         return style.as_png(canvas)
 
 
-def _drawn(opened: Opened, ratios: FloatArray) -> Canvas:
+def _drawn(opened: OpenedRaster, ratios: FloatArray) -> Canvas:
     """The drawing of a map."""
     ratio = ratios[0]
     extent, labels = _extent(opened.dataset)

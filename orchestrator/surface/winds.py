@@ -21,7 +21,7 @@ SHARES = {onset.STARTS: "1 %", cards.TENTH: "10 %", cards.HALF: "50 %"}
 """Parts of the surface whose hours are drawn."""
 
 
-def figure(answer: SurfaceAnswer) -> Canvas:
+def rose_figure(answer: SurfaceAnswer) -> Canvas:
     """Draw the winds of a place, and the hours a year in which parts of a bed move.
 
     Parameters

@@ -27,7 +27,7 @@ from orchestrator.physics.reported import (
     NUMERICAL,
     SEEDS,
     Interval,
-    compared,
+    compared_columns,
     compared_range,
     has_no_law,
     in_units,
@@ -181,10 +181,10 @@ def quoted(rows: pd.DataFrame, twins: "pd.Series[int] | None" = None) -> dict[st
     columns |= of_grain
     rows = rows.assign(**of_grain)
     level = is_flat(rows)
-    columns |= compared(rows, ustar, level)
+    columns |= compared_columns(rows, ustar, level)
     if "first_ustar0_m_s" in rows:
         first = rows["first_ustar0_m_s"].to_numpy(float)
-        columns |= compared(rows, first, level, "first_")
+        columns |= compared_columns(rows, first, level, "first_")
     return columns
 
 
@@ -346,7 +346,7 @@ def reported(rows: pd.DataFrame) -> pd.DataFrame:
     for stem in ("", "first_"):
         ustar = rows[f"{stem}ustar0_m_s"].to_numpy(float)
         changed |= in_units(ustar, rows, before=stem)
-        changed |= compared(rows, ustar, is_flat(rows), stem)
+        changed |= compared_columns(rows, ustar, is_flat(rows), stem)
     return rows.assign(**changed)
 
 

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from orchestrator import cli
-from orchestrator.hours.places import Place, hours_above
+from orchestrator.hours.places import DunePlace, hours_above
 from orchestrator.physics.velocity import outer_roughness
 from orchestrator.study.wind import Winds
 
@@ -56,7 +56,7 @@ def test_winds_along_the_section_and_above_the_speed_count() -> None:
 
 
 def test_a_part_of_a_place_is_a_part_of_its_length() -> None:
-    place = Place("foot", np.array([0.5, 0.2, np.inf]), np.array([1.0, 2.0, 1.0]))
+    place = DunePlace("foot", np.array([0.5, 0.2, np.inf]), np.array([1.0, 2.0, 1.0]))
     assert [place.at(part) for part in (0.1, 0.5, 0.6, 0.75)] == [0.2, 0.2, 0.5, 0.5]
     assert place.at(0.9) == math.inf
 

@@ -47,7 +47,7 @@ def test_each_threshold_is_called_what_it_is_and_stands_beside_the_closed_form()
     None
 ):
     steps = pd.concat([_steps([0, 4, 5], 0), _steps([0, 5, 0], 4)])
-    cut, sustained = followed.compare(steps).to_dict("records")
+    cut, sustained = followed.compare_strips(steps).to_dict("records")
     assert cut["threshold"] == followed.CUT
     assert sustained["threshold"] == followed.DROPPED
     # 1 mm of quartz in water: sustained motion decides, and ends where it begins
@@ -60,9 +60,9 @@ def test_each_threshold_is_called_what_it_is_and_stands_beside_the_closed_form()
 def test_the_stored_strips_start_above_the_closed_form_and_go_on_below_it_in_air() -> (
     None
 ):
-    steps = followed.stored()
+    steps = followed.stored_strips()
     assert (steps["sustained"] >= 0).all()
-    compared = followed.compare(steps)
+    compared = followed.compare_strips(steps)
     in_air = compared[compared["set"].str.startswith("air")]
     over = in_air.groupby("threshold")["over_closed_form"]
     assert over.min()[followed.CUT] > 1.2

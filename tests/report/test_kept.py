@@ -146,7 +146,7 @@ def test_a_figure_that_cannot_be_drawn_is_tried_again(
     results: Results, draw: Draw, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / KEPT).unlink()
-    drawn = style.drawn
+    drawn = style.drawn_as
 
     def without_room(figure: style.Figure) -> style.Figure:
         if figure.name == "shields":
@@ -154,7 +154,7 @@ def test_a_figure_that_cannot_be_drawn_is_tried_again(
         return drawn(figure)
 
     with monkeypatch.context() as broken:
-        broken.setattr(style, "drawn", without_room)
+        broken.setattr(style, "drawn_as", without_room)
         assert len(report.write(results, {}, Folder(tmp_path))) == 1
     assert draw(results) == {"shields"}
 

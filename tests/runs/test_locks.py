@@ -125,10 +125,12 @@ def test_no_wait_is_without_a_word(
     said: list[str] = []
 
     def again() -> None:
-        with locks.held(path, limit_s=REFUSED_AFTER_S, else_="else", say=said.append):
+        with locks.lock_held(
+            path, limit_s=REFUSED_AFTER_S, else_="else", say=said.append
+        ):
             pass
 
-    with locks.held(path, limit_s=HANGS_S, else_="", say=said.append):
+    with locks.lock_held(path, limit_s=HANGS_S, else_="", say=said.append):
         assert not said
         with pytest.raises(OrchestratorError, match=r"in use by process \d+ on "):
             again()

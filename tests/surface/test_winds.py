@@ -113,7 +113,7 @@ def test_a_flow_that_is_left_out_measures_what_lies_between() -> None:
 def test_the_rose_is_drawn_with_all_hours_of_its_year() -> None:
     circle = [direction(45.0 * k, 6.0) for k in range(8)]
     rows = "".join(f"{22.5 * k},{3 + k % 5},0.05\n" for k in range(16))
-    canvas = winds.figure(answer(f"{rows}0,0,0.2\n", *circle))
+    canvas = winds.rose_figure(answer(f"{rows}0,0,0.2\n", *circle))
     polar, bars = canvas.axes
     drawn = sum(patch.get_height() for patch in polar.patches)  # type: ignore[attr-defined]
     assert drawn == pytest.approx(0.8 * 8760)

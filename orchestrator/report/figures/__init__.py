@@ -148,7 +148,9 @@ def drawn(results: Results, kind: FigureKind, every: bool, is_paper: bool) -> Dr
                     figure = replace(figure, place="")
                 is_drawn = every or figure.place != "folded"
                 made.append(
-                    style.drawn(figure) if is_drawn else replace(figure, drawing=None)
+                    style.drawn_as(figure)
+                    if is_drawn
+                    else replace(figure, drawing=None)
                 )
         except Exception as error:
             fault = f"{kind.name}: {type(error).__name__}: {error}"
