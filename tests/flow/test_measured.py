@@ -32,6 +32,7 @@ def script() -> ModuleType:
 
 
 @pytest.mark.long
+@pytest.mark.filterwarnings("ignore:method.flow.cells_per_face")
 def test_the_flow_is_measured_and_what_has_run_is_not_run_again(
     script: ModuleType,
     finished_pile: Path,
