@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from orchestrator.digits import number
+from orchestrator.digits import number, plain_number
 from orchestrator.report.card import Card, Number, Worth
 from orchestrator.report.subjects import length
 from orchestrator.surface import onset
@@ -91,7 +91,7 @@ def heaps(answer: SurfaceAnswer) -> str:
         The words.
     """
     counted = number(len(answer.surface.heaps), "heap")
-    return f"{counted} of {answer.easiest.area:.3g} m²"
+    return f"{counted} of {plain_number(answer.easiest.area)} m²"
 
 
 def _of_winds(answer: SurfaceAnswer) -> Iterator[str]:

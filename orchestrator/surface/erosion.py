@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 
-from orchestrator.digits import number
+from orchestrator.digits import number, plain_number
 from orchestrator.experiment import ExperimentResults, page_texts
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.report.card import Card, Number, Worth
@@ -351,7 +351,8 @@ def heaps_sentences(heaps: Heaps, source: str) -> Iterator[str]:
         told = (
             f"Wind of {speeds} m/s at 10 m can take {lost:.3g} g/m² from the surface of"
             f" a pile ({pile.name}; {first.name}), {lost * first.area / GRAMS:.3g} kg"
-            f" from its {first.area:.3g} m², {by_epa} {' to '.join(ends)} g/m²."
+            f" from its {plain_number(first.area)} m², {by_epa}"
+            f" {' to '.join(ends)} g/m²."
             f" Its threshold u*ₜ is {first.threshold:.3g} m/s{source}."
         )
         for other in others:
@@ -399,7 +400,7 @@ def heaps_card(found: Sequence[Heaps], source: str) -> Card:
     heaps = found[0]
     speeds = ", ".join(map("{:g}".format, heaps.speeds))
     counted = number(len(heaps.heaps), "heap")
-    subject = f"{heaps.name}; {counted} of {heaps.worst.whole.area:.3g} m²"
+    subject = f"{heaps.name}; {counted} of {plain_number(heaps.worst.whole.area)} m²"
     if len(found) > 1:
         subject += f"; {len(found)} surfaces are compared below"
     return Card(
