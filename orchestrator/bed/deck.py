@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from orchestrator import digits
 from orchestrator.errors import SolverError
+from orchestrator.runs import process
 from orchestrator.runs.case import Case
 from orchestrator.solvers.dem import ENGINE
 from orchestrator.study.method import GrainMethod
@@ -139,6 +140,22 @@ class DeckCase(Case):
             The version of each.
         """
         return ENGINE.programs(self.ranks)
+
+    def begun(self, directory: Path) -> int:
+        """Count the load steps that have begun.
+
+        Parameters
+        ----------
+        directory
+            The case.
+
+        Returns
+        -------
+        int
+            The number of the last one; 0 where none has.
+        """
+        step, *_ = process.last_words(directory / "samples.csv").split(",")
+        return int(step) if step.isdecimal() else 0
 
 
 def protocol(

@@ -17,7 +17,6 @@ from orchestrator.bed import deck
 from orchestrator.bed.deck import DENSITY, DIAMETER, GRAVITY, WEIGHT, DeckCase
 from orchestrator.grains import motion
 from orchestrator.grains.loads import forces
-from orchestrator.runs import process
 from orchestrator.runs.files import canonical_json
 from orchestrator.solvers.dem import ENGINE
 from orchestrator.study.closed_form import closed_form
@@ -74,11 +73,11 @@ class GrainCase(DeckCase):
         float
             The share of the work that is done.
         """
-        step, *_ = process.last_words(directory / "samples.csv").split(",")
-        if not step.isdecimal():
+        begun = self.begun(directory)
+        if not begun:
             return 0.0
         steps = len((directory / "load_steps.txt").read_text(encoding="ascii").split())
-        return min(int(step) / steps, 1.0)
+        return min(begun / steps, 1.0)
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,6 @@ from orchestrator.grains.loads import Geometry
 from orchestrator.grains.motion import MODES, Motion
 from orchestrator.physics import saltation
 from orchestrator.physics.constants import SAND_GRAIN
-from orchestrator.runs import process
 from orchestrator.solvers.dem import ENGINE
 from orchestrator.study.closed_form import single_grain
 from orchestrator.study.criterion import sustaining
@@ -171,10 +170,7 @@ class FollowedCase(DeckCase):
         float
             The share of the work that is done.
         """
-        step, *_ = process.last_words(directory / "samples.csv").split(",")
-        if not step.isdecimal():
-            return 0.0
-        return min(int(step) / len(self.flows), 1.0)
+        return min(self.begun(directory) / len(self.flows), 1.0)
 
     @property
     def gust_time(self) -> float:

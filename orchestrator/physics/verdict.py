@@ -281,6 +281,10 @@ def texts(reasons: Iterable[Reason]) -> str:
     return "; ".join(each.text for each in reasons)
 
 
+BETWEEN = "; "
+"""Between the codes of several reasons, in their column."""
+
+
 def columns(
     rows: Iterable[Mapping[Any, Any]], reasons: Iterable[Sequence[Reason]]
 ) -> dict[str, list[Any]]:
@@ -303,11 +307,27 @@ def columns(
         made["usable"].append(not against)
         made["verdict"].append(verdict(row, against))
         codes = dict.fromkeys(each.code for each in against)
-        made["reason"].append("; ".join(codes))
+        made["reason"].append(BETWEEN.join(codes))
         made["why_not"].append(texts(against))
         remedies = dict.fromkeys(each.remedy for each in against if each.remedy)
         made["remedy"].append("; ".join(remedies))
     return made
+
+
+def codes_of(reason: object) -> set[str]:
+    """Read the codes of a cell of the column `reason`.
+
+    Parameters
+    ----------
+    reason
+        The cell, as `columns` makes it.
+
+    Returns
+    -------
+    set of str
+        The codes; none where nothing speaks against the threshold.
+    """
+    return {*filter(None, str(reason).split(BETWEEN))}
 
 
 def advised(rows: Iterable[Mapping[Any, Any]]) -> Advised:

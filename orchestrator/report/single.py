@@ -6,6 +6,7 @@ which the command `threshold` does without.
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from orchestrator.digits import percent
@@ -277,29 +278,19 @@ def reported_number(
     ]
     has_other = math.isfinite(other[0])
     advised = row.get("advised", verdict.MODEL) if has_other else verdict.MODEL
+    of_model = Number(
+        own[0],
+        told.unit,
+        meaning,
+        note,
+        low=own[1],
+        high=own[2],
+        interval_of=interval_of(row, numerical),
+    )
     if row["verdict"] == verdict.UNUSABLE:
-        return Number(
-            own[0],
-            told.unit,
-            meaning,
-            note,
-            low=own[1],
-            high=own[2],
-            interval_of=interval_of(row, numerical),
-            is_grey=True,
-        )
+        return replace(of_model, is_grey=True)
     if advised == verdict.MODEL:
-        return Number(
-            own[0],
-            told.unit,
-            meaning,
-            note,
-            low=own[1],
-            high=own[2],
-            interval_of=interval_of(row, numerical),
-            other=other[0],
-            other_is=with_threshold(row),
-        )
+        return replace(of_model, other=other[0], other_is=with_threshold(row))
     is_pair = advised == verdict.BOTH
     of_what = corrected_interval_of(row, numerical, bool(which), own)
     return Number(

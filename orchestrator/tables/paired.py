@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.physics.reported import REPORTED, in_units
+from orchestrator.physics.verdict import codes_of
 from orchestrator.study import fields
 from orchestrator.tables.columns import several
 from orchestrator.tables.facts import needs_run
@@ -138,7 +139,7 @@ def _pair(
 
 def _is_usable(row: pd.Series) -> bool:
     """Whether nothing but its numerical error speaks against a threshold."""
-    return set(filter(None, str(row["reason"]).split("; "))) <= CANCELS
+    return codes_of(row["reason"]) <= CANCELS
 
 
 def _ends(row: pd.Series, curve: pd.DataFrame, which: str) -> FloatArray:
