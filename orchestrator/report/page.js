@@ -19,8 +19,9 @@ for (const box of document.querySelectorAll("[data-steps]")) {
     const line = data.lines?.findLast(([first]) => first <= step);
     if (line) box.querySelector(".line").setAttribute("d", line[1]);
     const [n, N] = [data.moved[step], data.count];
-    box.querySelector("output").textContent = `at ${data.flow[step]} ${data.unit} ${n} of ${N} grains `
-      + `have moved (${Math.round(100 * n / N)} %)`;
+    const model = data.model ? ` ${data.names[0]} (${data.names[1]} ${data.model[step]})` : "";
+    box.querySelector("output").innerHTML = `${data.flow[step]} ${data.unit}${model}: ${n} of ${N} entrained `
+      + `(${Math.round(100 * n / N)} %)`;
   };
   slider.addEventListener("input", () => show(+slider.value));
 }

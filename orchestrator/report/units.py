@@ -5,6 +5,7 @@ from typing import Any
 import pandas as pd
 
 from orchestrator.physics.reported import in_units
+from orchestrator.report import single
 from orchestrator.report.subjects import ReportedQuantity
 from orchestrator.types import FloatArray
 
@@ -43,3 +44,23 @@ def compared_over_computed(row: pd.Series) -> float:
         The ratio of the friction velocities.
     """
     return float(row["compared_level_ustar_m_s"]) / float(row["level_ustar_m_s"])
+
+
+def advised_over_computed(row: pd.Series) -> float:
+    """Compute the ratio of the flows of a bed that a reader should take to its own.
+
+    Parameters
+    ----------
+    row
+        A threshold with the columns of its scene.
+
+    Returns
+    -------
+    float
+        The ratio of the friction velocities; 1 where the computed ones are advised, and
+        on a level bed, whose measured threshold is that of each of its grains.
+    """
+    told = single.quantity_of_row(row)
+    if single.is_level(row) or single.advised_column(row, told) == told.column():
+        return 1.0
+    return compared_over_computed(row)

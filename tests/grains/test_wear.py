@@ -116,11 +116,10 @@ def test_a_bed_changes_after_each_part_of_its_grains(
     starts = [step for step, _ in steps.lines]
     assert (starts[0], len(starts)) == (0, 3)
     assert all(steps.totals[step - 1] < steps.totals[step] for step in starts[1:])
-    assert [
-        step
-        for step, _ in bed.data(steps, steps.first(0.5), steps.flow, "m/s")["lines"]
-    ] == starts
-    assert "lines" not in bed.data(frozen, 0, frozen.flow, "m/s")
+    moving, still = (bed.Flows("m/s", each.flow.tolist()) for each in (steps, frozen))
+    lines = bed.data(steps, steps.first(0.5), moving)["lines"]
+    assert [step for step, _ in lines] == starts
+    assert "lines" not in bed.data(frozen, 0, still)
 
 
 def test_the_table_sets_both_beds_side_by_side(results: Results) -> None:

@@ -225,7 +225,7 @@ def test_in_a_browser_the_slider_moves_grains_above_the_fold(
         }
         moved = results.tables["pile_curve"]["moved"].max()
         count = results.tables["pile_curve"]["count"].max()
-        assert f" {moved} of {count} grains have moved (" in dom
+        assert f": {moved} of {count} entrained (" in dom
     # card and picture are above the fold, and nothing is wider than the screen
     assert shown[1280]["bottom"] < 800
     assert shown[1280]["wide"] <= 1280

@@ -163,6 +163,15 @@ def test_the_slider_has_every_place_of_every_load_step(
     assert counts == curve["moved"].tolist()[: len(counts)]
     assert steps.flow == pytest.approx(curve["ustar0_m_s"][: len(counts)])
     assert counts[data["shown"] - 1] < 0.3 * data["count"] <= counts[data["shown"]]
+    # the flows are those that the card advises, beside those of the model
+    first = answers.card(results).numbers[0]
+    assert first.is_pair
+    assert data["unit"] == first.unit
+    for flows, number in (("flow", first.value), ("model", first.other)):
+        before, here = data[flows][data["shown"] - 1 : data["shown"] + 1]
+        assert before * 0.99 < number < here * 1.01
+        assert f"{here:g}" in figure.title
+        assert f"{here:g}" in data["said"]
     assert len(data["frames"]) == len(steps.places) - 1
     mobile = steps.pile.packing.mobile[steps.grains]
     now = np.array(data["start"])
@@ -201,7 +210,8 @@ def test_a_bed_without_dem_has_a_picture_of_few_stops(
     at, share = few.first(FRACTION), peeled.packing.count * FRACTION
     assert few.totals[at] == every.totals[every.first(FRACTION)] >= share
     assert ((few.level > 0) & (few.level <= at)).sum() == few.totals[at]
-    found = bed.data(few, at, few.flow, "m/s")
+    found = bed.data(few, at, bed.Flows("m/s", few.flow.tolist()))
+    assert "model" not in found
     assert not any(found["frames"])
     assert found["step"] == "flow"
     assert "load step" not in bed.bed_caption(results, peeled)

@@ -19,7 +19,7 @@ from orchestrator.grains.methods import Dem
 from orchestrator.grains.pile import Pile
 from orchestrator.report import labels, single, solved, units
 from orchestrator.report.figures import FigureKind
-from orchestrator.report.page import fill, filled
+from orchestrator.report.page import fill, filled, typeset
 from orchestrator.report.results import FRACTION, Results, split_by
 from orchestrator.report.style import Figure
 from orchestrator.runs.case import Case
@@ -101,6 +101,47 @@ class Steps:
         """
         enough = self.totals >= fraction * self.pile.packing.count - 1e-9
         return int(np.argmax(enough)) if enough.any() else len(self.totals) - 1
+
+
+@dataclass(frozen=True)
+class Flows:
+    """The flows of the stops in a unit that can be measured.
+
+    Attributes
+    ----------
+    unit
+        The unit.
+    advised
+        The flows that the card advises, for each stop.
+    model
+        The computed ones where these are others; else none.
+    advised_is, model_is
+        What both are called.
+    """
+
+    unit: str
+    advised: Sequence[float]
+    model: Sequence[float] = ()
+    advised_is: str = ""
+    model_is: str = ""
+
+    def said(self, stop: int) -> str:
+        """Write the flow of a stop.
+
+        Parameters
+        ----------
+        stop
+            The stop.
+
+        Returns
+        -------
+        str
+            The text.
+        """
+        text = f"{self.advised[stop]:g} {self.unit}"
+        if self.model:
+            text += f" {self.advised_is} ({self.model_is} {self.model[stop]:g})"
+        return text
 
 
 def read_steps(pile: Pile, cases: Path) -> Steps:
@@ -242,23 +283,52 @@ def draw(results: Results) -> Iterator[Figure]:
         shown = steps.first(FRACTION)
         share = percent(steps.totals[shown] / pile.packing.count)
         told = ", ".join(labels.told(row, ["alpha_deg", "d_m", *telling]))
-        told_by = single.quantity_of_row(row)
-        flows = units.told_by(row, steps.flow, told_by)
+        flows = flows_of(row, steps)
         name = f"bed-alpha{pile.bed.slope_deg:g}"
         if name in seen:
             name = f"{name}-{row['method']}"
         yield Figure(
             name=name,
-            title=f"The bed when {share} of its grains have moved, {told}",
+            title=f"The bed at {flows.said(shown)}: {share} entrained, {told}",
             caption=bed_caption(results, pile),
             cases=tuple(run.name for run in reversed(pile.runs)),
             drawing=None,
             image=_svg(steps, shown, results.cases).encode(),
-            data=data(steps, shown, flows, told_by.unit),
+            data=data(steps, shown, flows),
             place="" if seen else "lead",
             follows="Fig. 13",
         )
         seen.add(name)
+
+
+def flows_of(row: pd.Series, steps: Steps) -> Flows:
+    """Take the flows of the stops in the unit of the card.
+
+    Parameters
+    ----------
+    row
+        The threshold that the picture is of, with the columns of its scene.
+    steps
+        The grains at each stop.
+
+    Returns
+    -------
+    Flows
+        Those that the card advises, and those of the model where these are others.
+    """
+    told = single.quantity_of_row(row)
+    factor = units.advised_over_computed(row)
+    advised = _three_digits(units.told_by(row, factor * steps.flow, told))
+    if factor == 1:
+        return Flows(told.unit, advised)
+    model = _three_digits(units.told_by(row, steps.flow, told))
+    names = (single.with_threshold(row), single.model_name(row))
+    return Flows(told.unit, advised, model, *names)
+
+
+def _three_digits(values: FloatArray) -> list[float]:
+    """Numbers with the digits that a picture has."""
+    return [float(f"{value:.3g}") for value in values.tolist()]
 
 
 def files(results: Results) -> Sequence[Case]:
@@ -308,7 +378,7 @@ def bed_caption(results: Results, pile: Pile) -> str:
     )
 
 
-def data(steps: Steps, shown: int, told: FloatArray, unit: str) -> dict[str, Any]:
+def data(steps: Steps, shown: int, flows: Flows) -> dict[str, Any]:
     """Collect the data of the slider.
 
     Parameters
@@ -317,10 +387,8 @@ def data(steps: Steps, shown: int, told: FloatArray, unit: str) -> dict[str, Any
         The grains at each stop.
     shown
         The stop at which the picture is drawn.
-    told
-        The flows of the stops in a unit that can be measured, shape (K + 1,).
-    unit
-        That unit.
+    flows
+        The flows of the stops.
 
     Returns
     -------
@@ -345,22 +413,24 @@ def data(steps: Steps, shown: int, told: FloatArray, unit: str) -> dict[str, Any
                 frame += [grain, round(x, 2), round(-z, 2)]
         frames.append(frame)
         last[is_new] = now[is_new]
-    flow = [float(f"{value:.3g}") for value in told.tolist()]
     moved = int(steps.totals[shown])
     count = steps.pile.packing.count
     found = {
         "step": "load step" if _follows_dem(steps.pile) else "flow",
         "shown": shown,
-        "said": f"at {flow[shown]:g} {unit} {moved} of {count} grains have moved "
+        "said": f"{flows.said(shown)}: {moved} of {count} entrained "
         f"({percent(moved / count)})",
         "count": count,
-        "flow": flow,
-        "unit": unit,
+        "flow": flows.advised,
+        "unit": flows.unit,
         "moved": steps.totals.tolist(),
         "level": steps.level[mobile].tolist(),
         "start": np.round(steps.places[0, mobile] * [1, -1], 2).tolist(),
         "frames": frames,
     }
+    if flows.model:
+        found["model"] = flows.model
+        found["names"] = [typeset(flows.advised_is), typeset(flows.model_is)]
     if len(steps.lines) > 1:
         found["lines"] = _paths(steps)
     return found
