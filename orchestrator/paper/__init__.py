@@ -39,7 +39,7 @@ def cards(study: "Study", tables: "Tables") -> "list[Guest]":
     judged = claims.judge_claims(tables)
     if all(one.verdict == "no data" for one in judged):
         return []
-    return [claims.guest(judged, tables, CLAIMS)]
+    return [claims.guest(judged, tables, CLAIMS, study.tolerance)]
 
 
 OFFER = Offer(cards=cards)

@@ -3,13 +3,14 @@
 import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 import pandas as pd
 from markupsafe import Markup
 
+from orchestrator.digits import number, percent
 from orchestrator.paper import findings, measures
 from orchestrator.paper.evidence import FLOWS, RULE, Comparison, Evidence, Verdict
 from orchestrator.paper.findings import COUNTED, WORDS, Finding, columns_of, finding_of
@@ -18,6 +19,7 @@ from orchestrator.report.card import Card, Mark, Number, Worth
 from orchestrator.report.page import Guest, Section, Text
 from orchestrator.report.sheets import Sheet
 from orchestrator.tables import Tables
+from orchestrator.tables.usable import ABOVE_TOLERANCE
 
 FILE = Path(__file__).with_name("claims.toml")
 IN_PART: tuple[Verdict, ...] = ("mostly", "half", "mostly not")
@@ -125,7 +127,9 @@ def judge_claims(tables: Tables) -> list[JudgedClaim]:
     return [JudgedClaim(claim, tuple(claim.measure(evidence))) for claim in CLAIMS]
 
 
-def guest(judged: Sequence[JudgedClaim], tables: Tables, file: str) -> Guest:
+def guest(
+    judged: Sequence[JudgedClaim], tables: Tables, file: str, tolerance: float | None
+) -> Guest:
     """Make what the page of a study of the paper has beside that of any study.
 
     Parameters
@@ -136,6 +140,8 @@ def guest(judged: Sequence[JudgedClaim], tables: Tables, file: str) -> Guest:
         The tables of the study.
     file
         Name of the CSV file of the claims.
+    tolerance
+        The tolerance of the study.
 
     Returns
     -------
@@ -164,13 +170,14 @@ def guest(judged: Sequence[JudgedClaim], tables: Tables, file: str) -> Guest:
         return [Section(title, [Text(Markup(text))], "claims", "Claims")]
 
     files = {file: frame(judged).to_csv(index=False)}
-    return Guest(
-        sections, files, claims_card(judged, tables), claims_sheet(judged, file), True
-    )
+    card = claims_card(judged, tables, tolerance)
+    return Guest(sections, files, card, claims_sheet(judged, file), True)
 
 
-def claims_card(judged: Sequence[JudgedClaim], tables: Tables) -> Card:
-    """Make the answer card: how many claims hold.
+def claims_card(
+    judged: Sequence[JudgedClaim], tables: Tables, tolerance: float | None
+) -> Card:
+    """Make the answer card: how many claims were judged, and how many of them hold.
 
     Parameters
     ----------
@@ -178,32 +185,43 @@ def claims_card(judged: Sequence[JudgedClaim], tables: Tables) -> Card:
         The claims.
     tables
         The tables of the study.
+    tolerance
+        The tolerance of the study.
 
     Returns
     -------
     Card
-        The counts of the verdicts, and how many thresholds are usable.
+        The counts of the verdicts, of the claims that were judged.
     """
     counts = Counter(one.verdict for one in judged)
     of = len(judged)
-    refuted = [n for n, one in enumerate(judged, 1) if one.verdict == "not"]
-    numbers = [str(number) for number in refuted]
-    which = f"claim {', '.join(numbers)}" if numbers else "no claim is refuted"
     lacking = counts["no data"]
-    if lacking:
-        which += f"; {lacking} could not be judged: this study has nothing to compare, "
-        which += "since it lacks the scenes, or its methods lack the load steps"
+    refuted = [str(n) for n, one in enumerate(judged, 1) if one.verdict == "not"]
+    which = f"claim {', '.join(refuted)}" if refuted else "no claim is refuted"
     sides = [f"{counts[side]} {WORDS[side]}" for side in IN_PART if counts[side]]
     part = ", ".join(sides) or "none"
-    told: tuple[tuple[tuple[Verdict, ...], str, str], ...] = (
+    told: list[tuple[tuple[Verdict, ...], str, str]] = [
         (("reproduced",), "claims reproduced", "in at least 95 % of the comparisons"),
         (IN_PART, "claims that hold in part", part),
         (("not",), "claims not reproduced", which),
-    )
+    ]
+    if lacking:
+        # a card has three numbers: what is missing stands in place of the last
+        last = f"not reproduced: {which}" if refuted else which
+        told[1:] = [(IN_PART, "claims that hold in part", f"{part}; {last}")]
     figures = []
     for verdicts, meaning, note in told:
         count = sum(counts[verdict] for verdict in verdicts)
-        figures.append(Number.counted(count, of, meaning, note, MARKS[verdicts[0]]))
+        whole = of - lacking
+        figures.append(
+            replace(
+                Number.counted(count, whole, meaning, note, MARKS[verdicts[0]]),
+                unit=f"of {whole} judged" if lacking else f"of {whole}",
+            )
+        )
+    if lacking:
+        note = _why_lacking(judged, tolerance)
+        figures.append(Number.counted(lacking, of, "claims not judged", note))
     return Card(
         "Do the paper’s claims hold when its method is run anew?",
         "Bravo, Ortiz and Pérez-Aparicio on sediment transport by the discrete element"
@@ -212,7 +230,20 @@ def claims_card(judged: Sequence[JudgedClaim], tables: Tables) -> Card:
         "The claims are compared with this study’s own numbers; claim 4 is about the "
         "published curves for water. “Caveats” has what was"
         " measured in air.",
-        _worth(tables, lacking),
+        _worth(tables, of, lacking, tolerance),
+    )
+
+
+def _why_lacking(judged: Sequence[JudgedClaim], tolerance: float | None) -> str:
+    """Which claims have nothing to be judged by, why, and what to do."""
+    found = [n for n, one in enumerate(judged, 1) if one.verdict == "no data"]
+    which = f"claim{'s' if len(found) > 1 else ''} {', '.join(map(str, found))}"
+    if tolerance is None:
+        return f"{which}: this study has no scenes, or no load steps, to compare"
+    return (
+        f"{which}: at a tolerance of {percent(tolerance)} too few scenes are answered "
+        "by DEM, whose load steps these claims are about; run the study without "
+        "`--tolerance`"
     )
 
 
@@ -220,19 +251,39 @@ def _tested(tables: Tables) -> str:
     """On how many piles and grains the claims were tested."""
     piles = tables.get("pile_threshold", pd.DataFrame({"scene_id": []}))
     grains = tables.get("single_grain", pd.DataFrame({"scene_id": []}))
-    beds = piles["scene_id"].nunique()
-    return f"tested on {beds} piles and {len(grains)} single grains"
+    beds = number(piles["scene_id"].nunique(), "pile")
+    return f"tested on {beds} and {number(len(grains), 'single grain')}"
 
 
-def _worth(tables: Tables, lacking: int) -> Worth:
-    """What the thresholds are worth that the claims were judged on."""
-    parts = [tables[name] for name in ("pile_threshold",) if name in tables]
-    of = sum(len(part) for part in parts)
-    usable = sum(int(part["usable"].sum()) for part in parts)
-    if usable == of and not lacking:
+def _worth(tables: Tables, of: int, lacking: int, tolerance: float | None) -> Worth:
+    """What the verdicts are worth, by the claims and thresholds that they stand on."""
+    piles = tables.get("pile_threshold", pd.DataFrame({"usable": []}))
+    count = len(piles)
+    usable = int(piles["usable"].sum())
+    if usable == count and not lacking:
         return Worth("good", "usable", "All thresholds of piles are usable.")
-    advice = f"{usable} of {of} thresholds of piles; the others are marked, with the "
-    return Worth("care", "usable, with gaps", f"{advice}reason.")
+    word = f"usable, with gaps: {of - lacking} of {of} claims judged"
+    advice = f"Of the thresholds of piles {usable} of {count} are usable; the table "
+    advice += "has the reason against each of the others."
+    alone = _for_tolerance_alone(tables)
+    if alone and tolerance is not None:
+        verb = "have" if alone > 1 else "has"
+        advice += (
+            f" {alone} of the others {verb} a numerical error above the tolerance of "
+            f"{percent(tolerance)} and nothing else against them."
+        )
+    return Worth("care", word, advice)
+
+
+def _for_tolerance_alone(tables: Tables) -> int:
+    """How many thresholds of piles have the tolerance alone against them."""
+    if not {"reason", "pile_threshold"} <= tables.keys():
+        return 0
+    reasons = tables["reason"]
+    piles = tables["pile_threshold"]
+    reasons = reasons[reasons["scene_id"].isin(piles["scene_id"])]
+    each = reasons.groupby(["scene_id", "fraction"])["reason"]
+    return int(((each.nunique() == 1) & (each.first() == ABOVE_TOLERANCE)).sum())
 
 
 def claims_sheet(judged: Sequence[JudgedClaim], file: str) -> Sheet:
@@ -251,13 +302,14 @@ def claims_sheet(judged: Sequence[JudgedClaim], file: str) -> Sheet:
         A row for each.
     """
     rows = []
-    for number, one in enumerate(judged, 1):
+    for n, one in enumerate(judged, 1):
         whole, *by_flow = one.findings
         verdict = WORDS[whole.verdict]
         if len({each.verdict for each in by_flow}) > 1:
             told = [f"by {FLOWS[each.flow]} {each}" for each in by_flow]
             verdict = f"{verdict}: {'; '.join(told)}"
-        rows.append((str(number), one.claim.says, whole.count, verdict))
+        count = whole.count if whole.verdict in MARKS else "—"
+        rows.append((str(n), one.claim.says, count, verdict))
     columns = ["no", "claim of the paper", "holds in", "verdict"]
     return Sheet("The claims", pd.DataFrame(rows, columns=columns), file=file)
 

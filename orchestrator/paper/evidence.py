@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
+from orchestrator.digits import percent
 from orchestrator.study import fields
 from orchestrator.study.method import HELD_FROM
 from orchestrator.tables import Tables, meanings, with_methods, with_scenes
@@ -21,10 +22,10 @@ SHARE = 0.95
 
 It counts as false if at most the other part is."""
 RULE = (
-    f"reproduced: so in at least {SHARE:.0%} of the comparisons of each judged line; "
-    f"not: in at most {1 - SHARE:.0%} of each; else mostly or mostly not: in more or "
-    "in less than half of all comparisons of these lines together; no data: if a judged"
-    " line has none"
+    f"reproduced: so in at least {percent(SHARE)} of the comparisons of each judged "
+    f"line; not: in at most {percent(1 - SHARE)} of each; else mostly or mostly not: "
+    "in more or in less than half of all comparisons of these lines together; "
+    "not judged: if a judged line has none"
 )
 REGIMES = {"low": "low regime", "high": "high regime"}
 BRIDGED = "bridged"

@@ -14,11 +14,12 @@ from orchestrator.physics.verdict import codes_of
 from orchestrator.study import fields
 from orchestrator.tables.columns import several
 from orchestrator.tables.facts import needs_run
+from orchestrator.tables.usable import ABOVE_TOLERANCE
 from orchestrator.types import FloatArray, Row
 
 SHELTER = ("obstacles", "spacing", "forms")
 """Columns of what shelters a bed."""
-CANCELS = {"error not known", "tolerance"}
+CANCELS = {"error not known", ABOVE_TOLERANCE}
 """Reasons against a threshold that are of its numerical error: both beds share it."""
 SAME = 1e-9
 """Relative difference up to which two flows are one."""

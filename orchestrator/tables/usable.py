@@ -38,6 +38,8 @@ that."""
 SIMILAR = ["layout", "lifted", "alpha_deg", "force_law", "fraction"]
 """Piles that agree in these scatter alike: their grains lie alike, and lifted ones
 collide or do not."""
+ABOVE_TOLERANCE = "tolerance"
+"""The reason against a threshold whose numerical error is above the tolerance."""
 LAYOUTS = {"aligned": "rows along the bed", "disordered": "rows along the bed"}
 """Packings whose grains lie alike: a lattice scatters as one with small random gaps."""
 POURED = ["width", "sizes", "poured_depth"]
@@ -302,7 +304,7 @@ def _reasons_of_pile(
         yield Reason("error not known", what, remedy)
     elif tolerance and error > tolerance * (1 + 1e-9):
         what = f"numerical error {error:.1%} is above the tolerance of {tolerance:.3g}"
-        yield Reason("tolerance", what)
+        yield Reason(ABOVE_TOLERANCE, what)
     if row["fraction"] * row["count"] < 1 - 1e-9:
         what = f"{row['fraction']:.3g} of {row['count']:.0f} grains is less than one"
         yield Reason("few grains", what)

@@ -26,6 +26,7 @@ from orchestrator.runs.files import Folder
 from orchestrator.study import fields, study
 from orchestrator.study.closed_form import closed_form, law_holds
 from orchestrator.tables import Tables
+from orchestrator.tables.usable import ABOVE_TOLERANCE
 from tests.report.conftest import copies
 
 NAMES = [
@@ -302,11 +303,48 @@ def test_a_study_of_the_paper_alone_gets_a_report_card(
     assert ('id="claims"' in page) == (tmp_path / paper.CLAIMS).exists() == is_paper
     if is_paper:
         assert cards[0].card is not None
-        assert {number.unit for number in cards[0].card.numbers} == {"of 17"}
+        # what was not judged is told, and is no part of what was
+        reproduced, in_part, lacking = cards[0].card.numbers
+        judged = sum(one.verdict != "no data" for one in claims.judge_claims(grains))
+        assert 0 < judged < len(CLAIMS)
+        assert reproduced.unit == in_part.unit == f"of {judged} judged"
+        assert (lacking.figure, lacking.unit) == (str(17 - judged), "of 17")
         assert "Do the paper’s claims hold" in page
         table = pd.read_csv(tmp_path / paper.CLAIMS)
         assert len(table) == len(CLAIMS)
         assert set(table["verdict"]) > {"no data"}
+
+
+@pytest.mark.parametrize("tolerance", [None, 0.2])
+def test_the_card_says_why_claims_were_not_judged(
+    results: Results, tolerance: float | None
+) -> None:
+    judged = claims.judge_claims(results.tables)
+    card = claims.claims_card(judged, results.tables, tolerance)
+    note = card.numbers[-1].note
+    assert ("at a tolerance of 20 %" in note) == (tolerance is not None)
+    table = claims.claims_sheet(judged, "").frame
+    not_judged = table["verdict"] == "not judged"
+    assert set(table.loc[not_judged, "holds in"]) == {"—"}
+    assert not (table.loc[~not_judged, "holds in"] == "—").any()
+
+
+def test_thresholds_that_the_tolerance_alone_forbids_are_told(results: Results) -> None:
+    piles = results.tables["pile_threshold"]
+    assert piles["usable"].all()
+    first = piles[["scene_id", "fraction"]].iloc[:3]
+    reasons = first.assign(reason=ABOVE_TOLERANCE, why_not="", remedy="")
+    reasons = pd.concat([reasons, reasons.iloc[:1].assign(reason="law")])
+    index = piles.index.isin(first.index)
+    tables = {
+        **results.tables,
+        "reason": reasons,
+        "pile_threshold": piles.assign(usable=~index),
+    }
+    judged = claims.judge_claims(tables)
+    advice = claims.claims_card(judged, tables, 0.05).worth.advice
+    assert f"{len(piles) - 3} of {len(piles)} are usable" in advice
+    assert "2 of the others have a numerical error above the tolerance of 5 %" in advice
 
 
 def test_every_pile_in_air_has_an_answer_of_a_law_that_holds() -> None:
