@@ -130,7 +130,9 @@ class Decision:
         method = self.scene.method.facts
         # rows without an end hold their grains by DEM: it is no check of places
         is_quasi_static = method.packs_grains and not method.is_resolved_in_time
-        return is_pile and self.is_chosen and is_quasi_static
+        # nor does DEM check a method that the study asks for
+        stands_for_dem = self.asked.method.kind != method.name
+        return is_pile and self.is_chosen and is_quasi_static and stands_for_dem
 
 
 Decisions = Mapping[str, Decision]
@@ -145,8 +147,9 @@ def decide(scene: Scene, tolerance: float | None) -> Decision:
     """How a resolved scene is answered.
 
     The methods ``auto`` and, with a tolerance, ``dem`` are answered by the cheapest
-    fidelity that is known to be good enough. All other scenes are answered as they are
-    written: those whose method or flow model says how, those for which no error is
+    fidelity that is known to be good enough; of other methods a tolerance chooses the
+    mesh of the flow. All other scenes are answered as they are written: those whose
+    method or flow model says how, those for which no error is
     known, and with ``auto`` those in which one of `NUMBERS` has another value than its
     default.
 
@@ -194,36 +197,48 @@ def _along_the_bed(scene: Scene, tolerance: float | None) -> Decision:
     They are answered in closed form. A tolerance chooses the mesh of the flow.
     """
     answer = _by(scene, methods.LOCAL)
-    model = answer.method.flow.facts
     written = Decision(scene, answer, LOCAL, known(LOCAL, answer), ENDLESS)
-    if tolerance is None or not model.follows_bed:
+    if tolerance is None:
         return written
-    if not model.is_solved:
-        why = f"the study asks for the flow model {model.name}"
-        return replace(written, why=f"{ENDLESS}; {why}")
-    ways = [*_ways_along(answer)]
-    if not ways:
-        beyond = unmeasured(answer) or "such a bed"
-        return replace(written, why=f"{ENDLESS}; {NOT_MET} for {beyond}")
-    offers = choice.offered(ways, choice.cost_s(answer))
-    if not offers:
-        return replace(written, why=f"{ENDLESS}; {NONE_CHEAPER}")
-    way = choice.chosen(offers, tolerance)
-    why = f"{ENDLESS}, its flow by {choice.in_words(way, ways, tolerance)}"
-    return Decision(scene, way.answer, LOCAL, way.known, why, is_chosen=True)
+    return _on_chosen_mesh(written, _ways_along(answer), tolerance)
 
 
 def _ways_along(scene: Scene) -> Iterator[Way]:
-    """The rungs of the flow beside the closed form along the bed, of known errors."""
-    if math.isfinite(known(LOCAL, scene).total):
-        yield Way(LOCAL, scene, known(LOCAL, scene), choice.cost_s(scene))
+    """The rungs of the flow beside the closed form along the bed."""
+    yield Way(LOCAL, scene, known(LOCAL, scene), choice.cost_s(scene))
     for flow in {one.flow.name: one.flow for one in PAIRS}.values():
         if flow.takes(scene):
             answer = changed(scene, flow.changes(scene))
-            found = known(LOCAL, answer)
-            if math.isfinite(found.total):
-                one = replace(LOCAL, name=f"{flow.name} flow", flow=flow)
-                yield Way(one, answer, found, choice.cost_s(answer))
+            one = replace(LOCAL, name=f"{flow.name} flow", flow=flow)
+            yield Way(one, answer, known(LOCAL, answer), choice.cost_s(answer))
+
+
+def _on_chosen_mesh(
+    written: Decision, ways: Iterable[Way], tolerance: float
+) -> Decision:
+    """A decision whose flow, alone, is solved on the mesh that a tolerance chooses."""
+    model = written.scene.method.flow.facts
+    if not model.follows_bed:
+        return written
+    if not model.is_solved:
+        return _with_reason(written, f"the study asks for the flow model {model.name}")
+    known_ways = [one for one in ways if math.isfinite(one.known.total)]
+    if not known_ways:
+        beyond = unmeasured(written.scene) or "such a bed"
+        return _with_reason(written, f"{NOT_MET} for {beyond}")
+    offers = choice.offered(known_ways, choice.cost_s(written.scene))
+    if not offers:
+        return _with_reason(written, NONE_CHEAPER)
+    way = choice.chosen(offers, tolerance)
+    why = f"{written.why}, its flow by {choice.in_words(way, known_ways, tolerance)}"
+    return Decision(
+        written.asked, way.answer, way.fidelity, way.known, why, is_chosen=True
+    )
+
+
+def _with_reason(decision: Decision, why: str) -> Decision:
+    """The decision with one reason more."""
+    return replace(decision, why=f"{decision.why}; {why}")
 
 
 def _by(scene: Scene, method: ThresholdMethod) -> Scene:
@@ -270,6 +285,8 @@ def _leaving(scene: Scene, tolerance: float | None) -> Decision:
     """The decision on a scene whose grains are counted as they leave."""
     if not isinstance(scene.bed, PileBed):
         return _of_grain(scene, tolerance)
+    if tolerance is not None and not _may_be_by_dem(scene):
+        return _on_chosen_mesh(as_written(scene), _ways_on_meshes(scene), tolerance)
     why_as_written = _why_as_written(scene, tolerance)
     if why_as_written is not None:
         return as_written(scene, why_as_written)
@@ -445,7 +462,7 @@ def _why_as_written(scene: Scene, tolerance: float | None) -> str | None:
 
     It is empty where the method says it all.
     """
-    if not any(each.is_resolved_in_time for each in scene.method.candidates):
+    if not _may_be_by_dem(scene):
         return ""
     is_open = scene.method.is_open
     if is_open and (methods.DEM.misfit(scene) or is_along(scene)):
@@ -466,6 +483,11 @@ def _why_as_written(scene: Scene, tolerance: float | None) -> str | None:
     if beyond:
         return f"no error is known for {beyond}"
     return None
+
+
+def _may_be_by_dem(scene: Scene) -> bool:
+    """Whether a pile leaves its grains to DEM, or to what stands for it."""
+    return any(each.is_resolved_in_time for each in scene.method.candidates)
 
 
 def _why_not_by_default(scene: Scene) -> str:
@@ -504,6 +526,21 @@ def _ways(scene: Scene) -> Iterator[Way]:
             if math.isfinite(found.total):
                 answer = one.answer(scene)
                 yield Way(one, answer, found, choice.cost_s(answer))
+
+
+def _ways_on_meshes(scene: Scene) -> Iterator[Way]:
+    """A scene as it is written, and with each rung of the flow in place of it."""
+    yield Way(fidelity_of(scene), scene, _known(scene), choice.cost_s(scene))
+    for one in PAIRS:
+        flow = one.flow_over(scene)
+        if one.grains.describes(scene) and flow.takes(scene):
+            answer = changed(scene, flow.changes(scene))
+            yield Way(one, answer, _known(answer), choice.cost_s(answer))
+
+
+def _known(scene: Scene) -> Known:
+    """The numerical error of a pile as it is written."""
+    return known(fidelity_of(scene), scene)
 
 
 def _check_group(scene: Scene) -> tuple[object, ...]:

@@ -85,7 +85,8 @@ def test_where_nothing_meets_the_tolerance_the_message_says_what_would_help(
     ("fields", "word"),
     [
         ({"method.grains.waiting_time": 1.0}, "ramp"),
-        ({"method.kind": "peeling"}, "peeling"),
+        ({"method.kind": "peeling", "flow.gusts": GUSTS}, "peeling"),
+        ({"method.kind": "peeling", "method.flow.model": "waves"}, "waves"),
         ({"method.flow.model": "waves"}, "waves"),
         ({"threshold.update": 0.1, "method.flow.first_cell_height": 5e-4}, "changes"),
         ({"bed.packing": "poured", "bed.width": 6.0}, "no error is known"),
@@ -103,6 +104,24 @@ def test_what_is_asked_for_or_not_known_is_answered_as_asked(
     assert not chosen.is_chosen
     assert chosen.scene == written(scene)
     assert word in chosen.why
+
+
+@pytest.mark.parametrize("kind", ["peeling", "pivot"])
+def test_of_a_method_that_is_asked_for_a_tolerance_chooses_the_mesh(
+    kind: str, pile: MakePile
+) -> None:
+    """The grains stay with the method, and no DEM checks what was not asked of it."""
+    scene = pile({"method.kind": kind, "method.flow.cells_per_face": 80}, height=0.02)
+    loose, strict = decide(scene, 0.2), decide(scene, 0.05)
+    for one in (loose, strict):
+        assert one.scene.method.kind == kind
+        assert one.is_chosen
+        assert not one.is_unchecked
+        assert f"asks for the method {kind}" in one.why
+    cells = [one.scene.method.flow.cells_per_face for one in (loose, strict)]
+    assert cells == [20, 40]
+    assert strict.known.total <= 0.05 < loose.known.total <= 0.2
+    assert decide(scene, None).scene == scene
 
 
 def test_over_a_level_bed_the_flow_is_exact_and_the_grains_are_chosen(

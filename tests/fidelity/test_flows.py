@@ -20,6 +20,7 @@ grain = {{ diameter = 1e-3 }}
 forces = {{ law = "high" }}
 bed = {{ kind = "pile", height = 0.014, slope_deg = 20.0{more} }}
 method.kind = "{kind}"
+method.flow.cells_per_face = 20
 [axes]
 "bed.roughness" = {roughnesses}
 """
