@@ -190,6 +190,27 @@ def percent(part: float) -> str:
     return f"{part:.0%}".replace("%", " %")
 
 
+def signed_percent(change: float) -> str:
+    """Write a relative change in percent.
+
+    Parameters
+    ----------
+    change
+        The change; 1 is as much again.
+
+    Returns
+    -------
+    str
+        Whole percent with its sign.
+
+    Examples
+    --------
+    >>> signed_percent(-0.76), signed_percent(0.4)
+    ('−76 %', '+40 %')
+    """
+    return f"{change:+.0%}".replace("%", " %").replace("-", "−")
+
+
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 """Digits of an exponent."""
 

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 import pandas as pd
 
+from orchestrator.digits import number as number_of
 from orchestrator.digits import percent
 from orchestrator.fidelity import crest
 from orchestrator.grains.pile import Pile
@@ -757,64 +758,111 @@ def by_law(row: pd.Series) -> dict[str, tuple[float, bool]]:
 def _of_laws(results: Results, best: Sequence[theory.Line]) -> Card:
     """The card of a study of many force laws: which is nearest to measurements."""
     first = best[0]
-    factor = first.median_factor
-    numbers = [
-        Number(
-            first.decades,
-            f"of {theory.DECADES:.1f}",
-            "decades of Re* within what was measured",
-            f"{TERMS['re']}; by {first.name}",
-            decimals=1,
-        ),
-        Number(
-            factor,
-            "times",
-            "median misfit, a factor of the measured medians",
-            f"from Re* = {theory.FACTORS_FROM:g} on; "
-            f"at worst {first.worst[0]:.2f} times",
-            decimals=2,
-        ),
-    ]
+    findings = theory.nearest_lines(results)
     grains = sheets.single_grains_sheet(results)
     piles = results.joined("pile_threshold")
-    count = int(grains["usable"].sum()) if len(grains) else 0
-    of = len(grains)
-    if len(piles):
-        count += int(piles["usable"].sum())
-        of += len(piles)
+    count = sum(int(table["usable"].sum()) for table in (grains, piles) if len(table))
+    of = len(grains) + len(piles)
     law = labels.value("force_law", first.law)
-    said = " ".join(each.sentence for each in theory.nearest_lines(results)[1:])
+    said = " ".join(each.sentence for each in findings[1:])
     word = "usable" if count == of else f"usable, with gaps: {count} of {of} thresholds"
     mark: Mark = "good" if count == of else "care"
     return Card(
         "Which force law comes nearest to measured thresholds?",
         f"Nearest of {len(best)} laws: {law}. {_span_of(results.scenes)}",
-        tuple(numbers),
+        tuple(_numbers_of_laws(best, findings)),
         f"{MEASURED_SOURCE[:1].upper()}{MEASURED_SOURCE[1:]}. {said}".strip(),
         Worth(mark, word, f"In water take {law}; in air see the caveats."),
     )
+
+
+def _numbers_of_laws(
+    best: Sequence[theory.Line], findings: Sequence[theory.LineFinding]
+) -> Iterator[Number]:
+    """Over which range the nearest law is as measured, and how far it is off."""
+    first, *others = best
+    second = max(others, key=lambda line: line.decades)
+    law = labels.value("force_law", second.law)
+    yield Number(
+        first.decades,
+        f"of {theory.DECADES:.1f}",
+        "decades of Re* within the flumes’ 10 to 90 %",
+        f"by {first.name}; the next, {law}, over {second.decades:.1f}; {TERMS['re']}",
+        decimals=1,
+    )
+    factors = sorted(line.median_factor for line in others if line.decades)
+    ends = dict.fromkeys(f"{end:.2f}" for end in (*factors[:1], *factors[-1:]))
+    rest = f"; the others {' … '.join(ends)}, each over its own range" if ends else ""
+    yield Number(
+        first.median_factor,
+        "",
+        "median misfit in water, a factor of the flumes’ medians",
+        f"from Re* = {theory.FACTORS_FROM:g} on, at worst {first.worst[0]:.2f}{rest}",
+        decimals=2,
+        is_ratio=True,
+    )
+    for found in findings:
+        if math.isfinite(found.of_first):
+            yield Number(
+                found.of_first,
+                "",
+                "median misfit in air, a factor of the mean of published curves",
+                f"by the same law; the least, {found.factor:.2f}, by {found.name}",
+                decimals=2,
+                is_ratio=True,
+            )
 
 
 def _of_hills(hills: Sequence[tuple[float, pd.DataFrame]]) -> Card:
     """The card of hills that others measured: where reversed flow ends behind each."""
     first = hills[0][1]
     source_ = str(first["measured_source"].iloc[0])
-    source_ = f"Squares: {source_}."
+    source_ = f"{source_[:1].upper()}{source_[1:]}."
     if not all(rows["measured_verified"].all() for _, rows in hills):
         source_ += " Not every number was read in its source."
+    slopes = [f"{rows['alpha_deg'].iloc[0]:.0f}°" for _, rows in hills]
+    steepest = f"steepest slope{'s' if len(slopes) > 1 else ''} {_listed(slopes)}"
     return Card(
         "Does the model reproduce the separation bubble behind a hill?",
-        f"{len(hills)} hills of the wind-tunnel experiment RUSHIL, "
-        f"{len(first)} turbulence models; no grains.",
+        f"{number_of(len(hills), 'hill')} of the wind-tunnel experiment RUSHIL, "
+        f"{length(float(first['h_m'].iloc[0]))} high (h), {steepest}; "
+        f"{number_of(len(first), 'turbulence model')}; no grains.",
         tuple(_behind(aspect, rows) for aspect, rows in hills[:3]),
         source_,
-        Worth(
-            "care",
-            "usable, for flows",
-            "Compare the turbulence models; no threshold is meant.",
-        ),
+        Worth("care", "usable, for flows", _like_the_tunnel(hills)),
         ("What was measured", "Can it be used?"),
     )
+
+
+def _listed(words: Sequence[str]) -> str:
+    """Words in a list, with "and" before the last."""
+    if len(words) < 2:
+        return "".join(words)
+    return f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def _like_the_tunnel(hills: Sequence[tuple[float, pd.DataFrame]]) -> str:
+    """Which turbulence models separate behind the same hills as the wind tunnel."""
+    every = pd.concat([rows for _, rows in hills])
+    measured = every["measured_reattachment_over_h"] > 0
+    is_like = (every["reattachment_over_h"] > 0) == measured
+    by_model = is_like.groupby(every["turbulence_model"], sort=False).all()
+    named = {
+        is_so: [
+            labels.value("turbulence_model", name)
+            for name in by_model.index[by_model == is_so]
+        ]
+        for is_so in (True, False)
+    }
+    like, unlike = named[True], named[False]
+    said = []
+    if like:
+        verb = "separates" if len(like) == 1 else "separate"
+        said.append(f"{_listed(like)} {verb} behind the same hills as the tunnel")
+    if unlike:
+        verb = "does" if len(unlike) == 1 else "do"
+        said.append(f"{_listed(unlike)} {verb} not")
+    return f"{'; '.join(said)}. Compare flows; no threshold is meant."
 
 
 def _behind(aspect: float, rows: pd.DataFrame) -> Number:
@@ -829,25 +877,42 @@ def _behind(aspect: float, rows: pd.DataFrame) -> Number:
     others = [
         labels.value("turbulence_model", name) for name in separated["turbulence_model"]
     ]
-    tunnel = "the tunnel had no separation" if math.isnan(measured) else ""
+    tunnel = "none" if math.isnan(measured) else ""
     if not own > 0:
-        note = f"by all {len(rows)} models"
+        note = f"the same by all {len(rows)} models" if len(rows) > 1 else ""
         if others:
-            note = f"{' and '.join(others)}: reattachment at {ends.min():.1f}"
+            note = f"by {_listed(others)} reattachment at {ends.min():.1f}"
             note += f" … {ends.max():.1f} h" if len(ends) > 1 else " h"
-        note = "; ".join(filter(None, [note, tunnel]))
-        return Number(math.nan, "", f"separation, {hill}", note, word="none")
+        return Number(
+            math.nan,
+            "",
+            f"separation, {hill}",
+            note,
+            word="none",
+            other=measured,
+            other_word=tunnel,
+            decimals=1,
+        )
+    count = f"all {len(rows)}" if len(ends) == len(rows) else f"{len(ends)}"
     return Number(
         own,
         "h",
         f"reattachment behind the crest, {hill}",
-        tunnel,
+        "" if tunnel else _against(own, measured, bool(row["measured_verified"])),
         low=float(ends.min()),
         high=float(ends.max()),
-        interval_of=f"{len(ends)} of {len(rows)} turbulence models, which separate",
+        interval_of=f"{count} turbulence models, which separate",
         other=measured,
+        other_word=tunnel,
         decimals=1,
     )
+
+
+def _against(own: float, measured: float, is_verified: bool) -> str:
+    """By how much a computed length differs from a measured one."""
+    word = "short of" if own < measured else "beyond"
+    note = f"{percent(abs(own / measured - 1))} {word} the measured length"
+    return note if is_verified else f"{note}, which was not read in its source"
 
 
 def is_of_hills(results: Results) -> bool:

@@ -46,12 +46,16 @@ class Number:
         Ends of its one interval in that unit; NaN where one is not known.
     interval_of
         What the interval contains, such as ``the six force laws that hold``.
+    not_in
+        What is known and wider than the interval; empty where that is nothing.
     other
         Another value in that unit to stand beside it; NaN without one.
     other_is
         What that value is called, such as ``model alone``.
     other_low, other_high, other_interval_of
         Its interval, where it stands with equal right.
+    other_word
+        An answer in place of the other value.
     value_is
         What the number itself is called, where it stands with equal right.
     last, other_last
@@ -79,11 +83,13 @@ class Number:
     low: float = math.nan
     high: float = math.nan
     interval_of: str = ""
+    not_in: str = ""
     other: float = math.nan
     other_is: str = "measured"
     other_low: float = math.nan
     other_high: float = math.nan
     other_interval_of: str = ""
+    other_word: str = ""
     value_is: str = ""
     last: float = math.nan
     other_last: float = math.nan
@@ -139,8 +145,8 @@ class Number:
     @property
     def beside(self) -> str:
         """The other value as it is written, without its unit; empty without one."""
-        if math.isnan(self.other):
-            return ""
+        if self.other_word or math.isnan(self.other):
+            return self.other_word
         return self._written(self.other, self.other_last, "–")
 
     @property
@@ -168,7 +174,7 @@ class Number:
         """A number with the digits of this figure."""
         if math.isnan(value):
             return "–"
-        return f"{value:.{self._digits}f}"
+        return f"{value:.{self._digits}f}".replace("-", "−")
 
     @property
     def _digits(self) -> int:
@@ -206,7 +212,7 @@ def apart(low: float, high: float, digits: int, form: str) -> str:
     while texts[0] == texts[1] and low != high and digits < MOST_DIGITS:
         digits += 1
         texts = [f"{end:{flag}.{digits}{kind}}" for end in ends]
-    return " … ".join(texts)
+    return " … ".join(texts).replace("-", "−")
 
 
 def decimals(value: float) -> int:
@@ -292,23 +298,23 @@ def lines(card: Card) -> Iterator[str]:
     str
         Its lines.
     """
-    yield from _wrapped(card.question)
+    yield from in_terminal(card.question)
     if card.scene:
-        yield from _wrapped(card.scene)
+        yield from in_terminal(card.scene)
     yield ""
     yield from _numbers(card.numbers)
     yield ""
     word = card.worth.word
     said = f"{DISCS[card.worth.mark]} {word[:1].upper()}{word[1:]}."
-    yield from _wrapped(f"{said} {card.worth.advice}".strip(), "  ", "    ")
+    yield from in_terminal(f"{said} {card.worth.advice}".strip(), "  ", "    ")
     intervals = [*_intervals(card.numbers)]
     if card.source or intervals:
         yield ""
     for text in intervals:
-        yield from _wrapped(text, "  ", "    ")
+        yield from in_terminal(text, "  ", "    ")
     if card.source:
         head, _ = card.heads
-        yield from _wrapped(f"{head}: {card.source}", "  ", "    ")
+        yield from in_terminal(f"{head}: {card.source}", "  ", "    ")
 
 
 def _numbers(numbers: Sequence[Number]) -> Iterator[str]:
@@ -352,14 +358,28 @@ def _intervals(numbers: Sequence[Number]) -> Iterator[str]:
             is_only = len({*of_what}) == 1
             of = f"{each.figure} {each.unit}".strip()
             head = "Interval" if is_only else f"Interval of {of}"
-            yield f"{head}: {each.interval_of}."
+            beyond = f" Not in it: {each.not_in}." if each.not_in else ""
+            yield f"{head}: {each.interval_of}.{beyond}"
         if each.is_pair and each.other_interval:
             of = f"{each.beside} {each.unit}"
             yield f"Interval of {of}, {each.other_is}: {each.other_interval}."
 
 
-def _wrapped(text: str, first: str = "", later: str = "") -> list[str]:
-    """A text in lines of a terminal, with what stands before each."""
+def in_terminal(text: str, first: str = "", later: str = "") -> list[str]:
+    """Break a text into lines of a terminal.
+
+    Parameters
+    ----------
+    text
+        The text.
+    first, later
+        What stands before its first line, and before the others.
+
+    Returns
+    -------
+    list of str
+        The lines, of at most `WIDTH` letters where no word is longer.
+    """
     return textwrap.wrap(
         text,
         WIDTH,
@@ -404,4 +424,4 @@ def remark_lines(remarks: Iterable[Remark]) -> Iterator[str]:
     if listed:
         yield "Caveats"
     for remark in listed:
-        yield from _wrapped(f"{remark.head} {remark.text}".strip(), "  - ", "    ")
+        yield from in_terminal(f"{remark.head} {remark.text}".strip(), "  - ", "    ")

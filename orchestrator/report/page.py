@@ -2,7 +2,7 @@
 
 import base64
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from hashlib import sha256
@@ -17,7 +17,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from orchestrator import __version__
-from orchestrator.report.card import Card, lines
+from orchestrator.report.card import Card, in_terminal, lines
 from orchestrator.runs.files import Folder
 
 if TYPE_CHECKING:
@@ -275,6 +275,12 @@ class Paragraphs:
     look: str = ""
     fold: str = ""
 
+    @property
+    def lines(self) -> Iterator[str]:
+        """Its paragraphs in lines of a terminal."""
+        for paragraph in filter(None, self.text.split("\n")):
+            yield from in_terminal(paragraph)
+
 
 @dataclass(frozen=True)
 class Text:
@@ -402,7 +408,7 @@ class Section:
             elif isinstance(each, Lines):
                 told += [each.text, ""]
             elif isinstance(each, Paragraphs) and not self.title:
-                told.append(each.text.replace("\n\n", "\n"))
+                told += [*each.lines]
         return "\n".join(told)
 
 

@@ -665,6 +665,10 @@ def theory_sheet(listed: Iterable[Line]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=list(HEAD))
 
 
+NEAREST_IN_AIR = "Nearest to the published curves for air"
+"""To what the line of the last finding is nearest."""
+
+
 class LineFinding(NamedTuple):
     """What measurements say of the lines of a study.
 
@@ -674,10 +678,18 @@ class LineFinding(NamedTuple):
         To what a line is nearest; empty where none is.
     text
         Which line it is, or what no line meets.
+    name, factor
+        In air the line, and its median misfit; empty and NaN of other findings.
+    of_first
+        There the median misfit of the line that is nearest in water; NaN where it has
+        no thresholds.
     """
 
     of: str
     text: str
+    name: str = ""
+    factor: float = np.nan
+    of_first: float = np.nan
 
     @property
     def sentence(self) -> str:
@@ -758,7 +770,7 @@ def _nearest_in_air(results: Results, listed: Sequence[Line]) -> list[LineFindin
         most = f"{max(answered)} of {len(x)}"
         said = caption("none_in_air", count=len(listed), ends=ends, most=most)
         return [LineFinding("", said)]
-    of_first = None if np.isinf(off[0]) else off[0]
+    of_first = np.nan if np.isinf(off[0]) else off[0]
     fit = listed[int(np.argmin(off))]
     said = caption("best_in_air", fit=fit, off=min(off), of_first=of_first, ends=ends)
-    return [LineFinding("Nearest to the published curves for air", said)]
+    return [LineFinding(NEAREST_IN_AIR, said, fit.name, min(off), of_first)]

@@ -1,13 +1,12 @@
 """What a page and a terminal say: the card, its table, remarks, and all other words."""
 
-import textwrap
 from collections.abc import Iterator, Sequence
 
 import pandas as pd
 
 from orchestrator.errors import OrchestratorError
 from orchestrator.report import answers, lines, remarks, sheets, theory
-from orchestrator.report.card import WIDTH, Card, remark_lines
+from orchestrator.report.card import WIDTH, Card, in_terminal, remark_lines
 from orchestrator.report.card import lines as card_lines
 from orchestrator.report.lines import BETWEEN, head_width
 from orchestrator.report.page import Guest
@@ -133,24 +132,19 @@ def sheet_lines(table: Sheet) -> Iterator[str]:
         What its rows share, the rows, the reasons against some, and its terms.
     """
     if table.shared:
-        yield from _wrapped(f"all rows: {', '.join(table.shared)}")
+        yield from in_terminal(f"all rows: {', '.join(table.shared)}")
     frame, most = _narrow(table)
     yield from _as_lines(frame, most)
     left_out = [str(name) for name in table.frame if name not in frame]
     if left_out:
         yield ""
-        yield from _wrapped(f"Not shown: {'; '.join(left_out)}. File: {table.file}.")
+        yield from in_terminal(f"Not shown: {'; '.join(left_out)}. File: {table.file}.")
     if table.notes or table.terms:
         yield ""
     for number, note in enumerate(table.notes, 1):
-        yield from _wrapped(f"({number}) Not usable: {note}.")
+        yield from in_terminal(f"({number}) Not usable: {note}.")
     for term in table.terms:
-        yield from _wrapped(f"{term[:1].upper()}{term[1:]}.")
-
-
-def _wrapped(text: str) -> list[str]:
-    """A text in lines of a terminal."""
-    return textwrap.wrap(text, WIDTH, break_long_words=False, break_on_hyphens=False)
+        yield from in_terminal(f"{term[:1].upper()}{term[1:]}.")
 
 
 def _narrow(table: Sheet) -> tuple[pd.DataFrame, int]:

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from orchestrator import plan
 from orchestrator.bed.line import BedLine
+from orchestrator.digits import signed_percent
 from orchestrator.errors import InputError
 from orchestrator.experiment import (
     Experiment,
@@ -53,6 +54,13 @@ AREAS = pd.read_csv(MEASURED / "ap42_areas.csv", keep_default_na=False)
 """Shares of the surfaces of the four piles of AP-42, by class."""
 MATERIALS = pd.read_csv(MEASURED / "ap42_thresholds.csv", keep_default_na=False)
 """Threshold friction velocities of AP-42."""
+FLOWS = pd.read_csv(MEASURED / "flows.csv")
+"""The heaps of the preset under other turbulence models and first cells: what each
+loses, and the factor on u* of all faces of the default flow that loses as much."""
+PAIRED_FACTORS = FLOWS.pivot_table(
+    "ustar_factor", ["heap", "flow"], "obstacle", sort=False
+)
+"""These factors without an obstacle and behind a fence, a row for each of both."""
 USTAR_T = dict(zip(MATERIALS["material"], MATERIALS["ustar_m_s"], strict=True))
 """The same by material, m/s."""
 MOST_USTAR_T = 10.0
@@ -137,6 +145,21 @@ class PileSurface(NamedTuple):
         excess = np.maximum(ustar - self.threshold, 0)
         lost = 58 * excess**2 + 25 * excess
         return np.asarray(lost @ (share / share.sum()))
+
+    def under(self, factor: float) -> "PileSurface":
+        """Take another flow, by a factor on the friction velocity of all faces.
+
+        Parameters
+        ----------
+        factor
+            The factor.
+
+        Returns
+        -------
+        PileSurface
+            The surface under that flow.
+        """
+        return self._replace(ustar0_over_wind=factor * self.ustar0_over_wind)
 
     @property
     def area(self) -> float:
@@ -477,9 +500,37 @@ def _results(
     sections = [
         Section("", [erosion_card(found, winds, source), figure, in_sentences]),
         Section("Parts", [parts, limits, Table.of(table)]),
-        Section("The tables of AP-42", [sources, *map(Table.of, (AREAS, MATERIALS))]),
+        Section("The tables of AP-42", [sources, *tables_of_epa()]),
     ]
     return ExperimentResults({"erosion": table}, sections)
+
+
+def tables_of_epa() -> list[Table]:
+    """Make the tables of AP-42 for a page, with heads in words.
+
+    Returns
+    -------
+    list of Table
+        The areas of the classes, and the thresholds.
+    """
+    heads = {
+        "us_over_ur": "u_s/u_r",
+        "share": "fraction of the surface, %",
+        "sub_areas": "its parts, %",
+        "share_sure": "source of the fraction",
+        "sub_areas_sure": "source of the parts",
+        "ustar_m_s": "threshold friction velocity, m/s",
+        "z0_m": "roughness length, m",
+        "sure": "source",
+    }
+    sources = {"read": "public code that applies it", "memory": "memory, not read"}
+    tables = []
+    for table in (AREAS, MATERIALS):
+        shown = table.copy()
+        for name in table.columns[table.columns.str.endswith("sure")]:
+            shown[name] = table[name].map(sources)
+        tables.append(Table.of(shown.rename(columns=heads)))
+    return tables
 
 
 def erosion_rows(found: Sequence[Stockpile], winds: ArrayLike) -> pd.DataFrame:
@@ -572,7 +623,7 @@ def erosion_sentences(
             # obstacles are compared with none, not with one another
             change = ""
             if lost and pile.has_bare:
-                change = f" ({left / lost - 1:+.0%})"
+                change = f" ({signed_percent(left / lost - 1)})"
             told += f" With {_named(other)}: {left:.3g} g/m²{change}."
         yield told
 
@@ -580,7 +631,7 @@ def erosion_sentences(
 def erosion_card(
     found: Sequence[Stockpile], winds: Sequence[float], source: str
 ) -> Card:
-    """Make the answer card: what a wind takes from the first pile.
+    """Make the answer card: what the first pile loses, and what an obstacle saves.
 
     Parameters
     ----------
@@ -594,50 +645,99 @@ def erosion_card(
     Returns
     -------
     Card
-        The loss by the solved flow and by AP-42, and the least of all with a fence or
-        from another direction.
+        The change by the obstacle that leaves the least, the loss by the solved flow
+        and by AP-42.
     """
     pile = found[0]
     first, *others = pile.surfaces
-    epa = [surface.total(winds) for surface in pile.by_epa]
-    with_what = "" if pile.has_bare else f", with {_named(first)}"
-    numbers = [
-        Number(
-            first.total(winds),
-            "g/m²",
-            f"of dust by the solved flow{with_what}",
-            f"mean over the surface; the threshold friction velocity is "
-            f"{first.threshold:.3g} m/s{source}",
-        ),
-        Number(
-            min(epa),
-            "g/m²",
-            "of dust by AP-42",
-            "the range of its patterns of the wind over piles",
-            last=max(epa),
-        ),
-    ]
-    if others:
-        least = min(others, key=lambda surface: surface.total(winds))
-        numbers.append(
-            Number(
-                least.total(winds), "g/m²", f"with {_named(least)}, the least of all"
-            )
-        )
     speeds = ", ".join(map("{:g}".format, winds))
-    subject = pile.name
+    best = min(others, key=lambda each: each.total(winds)) if others else None
+    numbers: list[Number | None] = []
+    asked = f"How much dust does a wind of {speeds} m/s take from this pile"
+    if best is not None and pile.has_bare and first.total(winds):
+        numbers.append(_change_by(best, first, winds))
+        asked += f", and what does {_kind_of(best)} save"
+    numbers += [
+        _loss(first, winds, has_obstacle=not pile.has_bare),
+        _by_epa(pile, winds),
+    ]
+    if best is not None and not pile.has_bare:
+        numbers.append(_loss(best, winds, has_obstacle=True))
+    subject = f"{pile.name[:1].upper()}{pile.name[1:]}"
+    subject += f"; threshold friction velocity {first.threshold:.3g} m/s{source}"
     if len(found) > 1:
         subject += f"; {len(found)} piles are compared below"
     return Card(
-        f"How much dust does a wind of {speeds} m/s take from this pile?",
+        f"{asked}?",
         f"{subject}.",
-        tuple(numbers),
+        tuple(each for each in numbers if each is not None),
         TEXTS["measured"],
         Worth(
             "care",
             "usable, to compare",
-            "Compare piles and fences; the loss itself is that of an emission factor.",
+            "Compare piles and obstacles, with the intervals. Do not quote the g/m² as "
+            "an emission.",
         ),
+    )
+
+
+def _kind_of(surface: PileSurface) -> str:
+    """The kind of obstacle of a surface, such as "a fence"."""
+    return f"a {surface.name.partition(' ')[0]}"
+
+
+def _change_by(
+    behind: PileSurface, bare: PileSurface, winds: Sequence[float]
+) -> Number:
+    """What an obstacle changes the loss by, %, with its paired interval."""
+    losses = [bare.total(winds), behind.total(winds)]
+    pairs = PAIRED_FACTORS.to_dict("records")
+    ratios = [losses[1] / losses[0]]
+    for pair in pairs:
+        of_bare = bare.under(pair["none"]).total(winds)
+        if of_bare:
+            ratios.append(behind.under(pair["fence"]).total(winds) / of_bare)
+    return Number(
+        100 * (ratios[0] - 1),
+        "%",
+        f"change of the loss by {_named(behind)}",
+        f"{losses[0]:.2g} → {losses[1]:.2g} g/m²",
+        low=100 * (min(ratios) - 1),
+        high=100 * (max(ratios) - 1),
+        interval_of=f"paired, with and without it: {TEXTS['flows']}",
+        decimals=0,
+    )
+
+
+def _loss(
+    surface: PileSurface, winds: Sequence[float], *, has_obstacle: bool
+) -> Number:
+    """The loss of a surface by the solved flow, with its interval."""
+    factors = PAIRED_FACTORS["fence" if has_obstacle else "none"]
+    ends = [surface.under(factor).total(winds) for factor in (*factors, 1.0)]
+    with_what = f", with {_named(surface)}" if has_obstacle else ", no obstacle"
+    return Number(
+        surface.total(winds),
+        "g/m²",
+        f"loss by the solved flow{with_what}",
+        "mean over the surface",
+        low=min(ends),
+        high=max(ends),
+        interval_of=TEXTS["flows"],
+        not_in=TEXTS["tests"],
+    )
+
+
+def _by_epa(pile: Stockpile, winds: Sequence[float]) -> Number:
+    """The loss by AP-42."""
+    losses = [surface.total(winds) for surface in pile.by_epa]
+    what = "its flat ground" if pile.is_flat else "the range of its four patterns"
+    return Number(
+        min(losses),
+        "g/m²",
+        "loss by AP-42",
+        f"{what}; a law of emission factors, no measurement of this pile",
+        last=max(losses),
     )
 
 

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 
-from orchestrator.digits import number, plain_number
+from orchestrator.digits import number, percent, plain_number, signed_percent
 from orchestrator.experiment import ExperimentResults, page_texts
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.report.card import Card, Number, Worth
@@ -318,11 +318,10 @@ def erosion_sections(
     parts = Paragraphs(texts["rows"], "lead")
     limits = Limits(own["erosion_limits"].split("\n\n"))
     sources = Paragraphs(texts["sources"], "lead")
-    tables = [erosion.AREAS, erosion.MATERIALS]
     return [
         Section("", [heaps_card(found, source), figure, in_sentences]),
         Section("Parts", [parts, limits, Table.of(heaps_rows(found))]),
-        Section("The tables of AP-42", [sources, *map(Table.of, tables)]),
+        Section("The tables of AP-42", [sources, *erosion.tables_of_epa()]),
     ]
 
 
@@ -357,7 +356,7 @@ def heaps_sentences(heaps: Heaps, source: str) -> Iterator[str]:
         )
         for other in others:
             left = other.total(heaps.speeds)
-            change = f" ({left / lost - 1:+.0%})" if lost else ""
+            change = f" ({signed_percent(left / lost - 1)})" if lost else ""
             told += f" With {other.name}: {left:.3g} g/m²{change}."
         yield told
     if heaps.rose is not None:
@@ -371,7 +370,9 @@ def _of_rose(heaps: Heaps) -> str:
         return "No wind of the rose reaches the threshold anywhere on the heaps."
     shares = parts / parts.sum()
     named = [
-        f"{share:.0%} in wind from {at:g}°" for at, share in shares.items() if share
+        f"{percent(share)} in wind from {at:g}°"
+        for at, share in shares.items()
+        if share
     ]
     return (
         f"A disturbance after which the strongest wind is one of the rose costs "
@@ -411,8 +412,7 @@ def heaps_card(found: Sequence[Heaps], source: str) -> Card:
         Worth(
             "care",
             "usable, to compare",
-            "Compare heaps and directions; the loss itself is that of an emission "
-            "factor.",
+            "Compare heaps and directions. Do not quote the g/m² as an emission.",
         ),
     )
 
@@ -436,6 +436,7 @@ def _numbers(heaps: Heaps, source: str) -> Iterator[Number]:
         low=low,
         high=high,
         interval_of=cards.INTERVAL_OF,
+        not_in=erosion.TEXTS["tests"],
     )
     least, most = heaps.by_epa
     yield Number(
@@ -463,7 +464,7 @@ def _by_rose(heaps: Heaps) -> Number:
         return Number(0.0, "kg", meaning, "none of them reaches the threshold")
     most = parts.index[int(parts.argmax())]
     share = parts.max() / parts.sum()
-    note = f"{share:.0%} of it in wind from {most:g}°"
+    note = f"{percent(share)} of it in wind from {most:g}°"
     return Number(float(parts.sum()), "kg", meaning, note)
 
 

@@ -11,7 +11,7 @@ from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import BUFFINGTON_MONTGOMERY
 from orchestrator.physics.onset import of_grains
 from orchestrator.physics.threshold import shields_at
-from orchestrator.report import shields, theory
+from orchestrator.report import answers, shields, theory
 from orchestrator.report.figures import shields as overview
 from orchestrator.report.results import Results
 from orchestrator.report.theory import Line, LineConditions
@@ -96,8 +96,22 @@ def test_laws_that_answer_at_few_re_are_not_compared_with_the_curves_for_air(
     assert "nearest in water has no threshold at half of these Re*" in found.text
     assert "inf" not in found.text
     (found,) = theory._nearest_in_air(results, [bridged(), bridged(0.1, 170.0)])
-    assert "nearest in water is off by" in found.text
+    assert "nearest in water has " in found.text
+    assert found.factor <= found.of_first
     assert "inf" not in found.text
+
+
+def test_the_card_of_many_laws_has_the_range_and_both_misfits(results: Results) -> None:
+    best = [bridged(), bridged(0.1, 170.0), Line("low", BED, 0.1, 3.0)]
+    findings = theory._nearest_in_air(results, best)
+    decades, water, air = answers._numbers_of_laws(best, findings)
+    assert decades.value == best[0].decades >= best[1].decades
+    assert f"over {best[1].decades:.1f}" in decades.note
+    assert (water.figure, water.unit) == (f"× {best[0].median_factor:.2f}", "")
+    assert air.value == findings[0].of_first
+    assert f"{findings[0].factor:.2f}" in air.note
+    # without curves for air there is no such number
+    assert len([*answers._numbers_of_laws(best, [])]) == 2
 
 
 @pytest.fixture

@@ -299,6 +299,30 @@ def test_a_steep_hill_separates_where_it_was_measured_to(hills: Results) -> None
     assert table["ustar_mean"].between(1.2, 1.5).all()
 
 
+def test_the_card_of_a_hill_has_the_bubble_or_that_there_is_none(
+    hills: Results,
+) -> None:
+    card = answers.card(hills)
+    (number,) = card.numbers
+    first = hills.tables["flow"].iloc[0]
+    assert number.value == first["reattachment_over_h"]
+    assert number.low <= number.value <= number.high
+    assert (number.unit, number.beside) == ("h", "6.5")
+    assert "not read in its source" in number.note
+    assert "k-ε and RNG k-ε separate behind the same hills" in card.worth.advice
+    # a hill behind which one model separates and the tunnel did not
+    flows = hills.tables["flow"].copy()
+    flows["measured_reattachment_over_h"] = np.nan
+    flows.loc[flows.index[0], ["separation_over_h", "reattachment_over_h"]] = 0.0
+    changed = replace(hills, tables={**hills.tables, "flow": flows})
+    card = answers.card(changed)
+    (number,) = card.numbers
+    assert (number.figure, number.unit, number.beside) == ("none", "", "none")
+    assert "by RNG k-ε reattachment at" in number.note
+    assert "k-ε separates behind the same hills as the tunnel" in card.worth.advice
+    assert "RNG k-ε does not" in card.worth.advice
+
+
 def test_computed_stands_beside_measured(hills: Results) -> None:
     (figure,) = measured_hills.FIGURE.draw(hills)
     assert figure.canvas

@@ -9,6 +9,7 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.errors import InputError
+from orchestrator.report.card import lines
 from orchestrator.stockpile import erosion
 from orchestrator.study import study
 
@@ -61,10 +62,41 @@ def test_the_preset_is_run(tmp_path: Path) -> None:
     assert by_epa == by_epa_again
     assert max(fenced / flat_top, behind / ridge) < 0.7
     assert min(by_epa) < flat_top < max(by_epa)
-    told = next(line for line in ended.answer.split("\n") if line.startswith("Wind"))
+    told = _sentences(ended.answer)[0]
     assert f"{flat_top:.3g} g/m²" in told in ended.page.read_text()
+    # no line is longer than a terminal
+    lines = ended.answer.splitlines()
+    assert max(map(len, lines)) < 80
     # the card stands before the sentences
     assert ended.answer.startswith("How much dust does a wind of 20 m/s take")
+
+
+def test_the_card_has_what_other_flows_change_and_what_they_do_not(
+    tmp_path: Path,
+) -> None:
+    """The flat top lost 3.25 to 12.5 g/m² by other flows, the fence took 31 to 83 %."""
+    asked = study.load("stockpile")
+    ran = erosion.PileErosion(asked)
+    ran.run(tmp_path, workers=2)
+    found = erosion.grouped([*ran.flows], ran.least, tmp_path / "cases")
+    card = erosion.erosion_card(found, asked.erosion.fastest_mile, "")
+    change, loss, by_epa = card.numbers
+    measured = erosion.FLOWS[erosion.FLOWS["heap"] == "flat top"]
+    by = measured.pivot(index="flow", columns="obstacle", values="loss_g_m2")
+    assert (loss.low, loss.high) == pytest.approx(
+        (by["none"].min(), by["none"].max()), rel=0.01
+    )
+    assert loss.low < loss.value < loss.high
+    assert "38 to 2,000 times" in loss.not_in
+    ratios = 100 * (by["fence"] / by["none"] - 1)
+    assert change.low < ratios.min()
+    assert ratios.max() == pytest.approx(change.high, abs=1.0)
+    assert change.low < change.value < change.high
+    assert change.figure == "−76"
+    assert loss.low < by_epa.value < by_epa.last < loss.high
+    # what is not in the interval stands beside it
+    said = " ".join(" ".join(lines(card)).split())
+    assert "Not in it: wind-tunnel tests lost 38 to 2,000 times" in said
 
 
 def test_what_is_wrong_is_said_in_one_message(tmp_path: Path) -> None:
@@ -100,13 +132,18 @@ method.flow = {{ roughness = 0.005, {flow} }}
 """
 
 
+def _sentences(answer: str) -> list[str]:
+    """The sentences of an answer, one for each pile."""
+    text = " ".join(answer.split()).partition(" The intervals take")[0]
+    return [f"Wind of {part.strip()}" for part in text.split("Wind of ")[1:]]
+
+
 def _run(text: str, folder: Path) -> tuple[list[str], pd.DataFrame]:
     """The sentences of an answer, one for each pile, and the table of parts."""
     asked = study.parse(text, name="", where="")
     ended = erosion.PileErosion(asked).run(folder, workers=2)
     table = pd.read_csv(folder / "tables/erosion.csv")
-    told = [line for line in ended.answer.split("\n") if line.startswith("Wind")]
-    return told, table[table["part"] == "all"].drop(columns="part")
+    return _sentences(ended.answer), table[table["part"] == "all"].drop(columns="part")
 
 
 def _change(sentence: str) -> str:
@@ -141,7 +178,10 @@ def test_piles_are_compared_that_differ_in_the_obstacle_alone(tmp_path: Path) ->
             rows.drop(columns=drop).to_numpy().tolist()
             == own.drop(columns=drop).to_numpy().tolist()
         )
-    left = [float(sentence.rpartition("(")[2].partition("%")[0]) for sentence in told]
+    left = [
+        float(sentence.rpartition("(")[2].partition("%")[0].replace("−", "-"))
+        for sentence in told
+    ]
     fenced, bare = (table.iloc[row]["P, g/m²"] for row in (1, 0))
     assert left[0] == pytest.approx(100 * (fenced / bare - 1), abs=0.5)
 
