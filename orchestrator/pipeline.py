@@ -38,8 +38,8 @@ class Finished(NamedTuple):
         Number of cases that were run.
     failures
         The cases that failed, with why.
-    answer
-        The answer in words and a short table.
+    marked
+        The answer in words and a short table, with the marks of `terminal.bold`.
     undrawn
         A line for each figure that could not be drawn.
     """
@@ -47,8 +47,13 @@ class Finished(NamedTuple):
     page: Path
     started: int
     failures: Failures
-    answer: str = ""
+    marked: str = ""
     undrawn: Sequence[str] = ()
+
+    @property
+    def answer(self) -> str:
+        """The answer without marks."""
+        return terminal.plain(self.marked)
 
     def tell(self) -> int:
         """Print the answer, the failures, and last the page.
@@ -58,13 +63,13 @@ class Finished(NamedTuple):
         int
             The exit code of the command.
         """
-        if self.answer:
-            print(self.answer)
+        if self.marked:
+            print(terminal.shown(self.marked))
         for name, error in self.failures.items():
             say(f"{name} failed: {error}")
         if self.undrawn:
             say("the page lacks a figure; the same command draws it again")
-        print(self.page)
+        print(terminal.page_line(self.page))
         if self.failures:
             return 3
         return 1 if self.undrawn else 0
@@ -361,13 +366,13 @@ def _draw(
     with space.renewed():
         written = tables.write_tables(made, space, "tables")
         tables.write_tables({"timings": times}, space, "timings")
-        answer = report.said(results, cards)
+        answer = report.said(results, cards, marked=True)
         try:
             rooms = guests.figures()
             undrawn = report.write(results, causes, space, cards, every, rooms, written)
         except BaseException:
             # no memory for a picture, or an interrupt: the answer is found
-            print(answer, file=sys.stderr)
+            print(terminal.plain(answer), file=sys.stderr)
             raise
     terminal.check_signals()
     if not failures and not undrawn:

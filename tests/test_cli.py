@@ -81,7 +81,7 @@ def test_a_study_of_single_grains_and_the_same_again(
     assert not (tmp_path / "out").exists()
     first = orchestrator("study", grains, "--out", "out")
     assert first.returncode == 0, first.stderr
-    last = first.stdout.split("\n")[-2]
+    last = first.stdout.split("\n")[-2].removeprefix("page: ")
     assert first.stdout.startswith("At what wind does a grain start to move")
     (shared,) = [line for line in first.stdout.splitlines() if "all rows" in line]
     assert "with a correction" in shared

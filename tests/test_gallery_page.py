@@ -28,9 +28,7 @@ def test_the_page_of_the_gallery_is_made_of_runs(
     red = '<rect width="300" height="200" fill="red"/>'
     svg = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 300 200">{red}</svg>'
     (figures / script.SHOWN["first-look"]).write_text(svg, encoding="utf-8")
-    answer = (
-        "When does it move?\n\n  1 m/s  wind\n\nall rows: α = 15°\n/here/report.html\n"
-    )
+    answer = "When does it move?\n\n  1 m/s  wind\n\nall rows: α = 15°\npage: /here/report.html\n"
     (tmp_path / "runs" / "first-look.txt").write_text(answer, encoding="utf-8")
     monkeypatch.setattr(script, "ROOT", tmp_path)
     monkeypatch.setattr(script, "PICTURES", pictures)

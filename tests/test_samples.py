@@ -31,7 +31,10 @@ def _samples(text: str) -> Iterator[tuple[str, list[str]]]:
         if re.match(r"\$ (python -m )?orchestrator", command):
             shown = [line.rstrip() for line in lines]
             # what is left out, and where the page lies
-            yield command[2:], [line for line in shown if not line.startswith("…")]
+            yield (
+                command[2:],
+                [line for line in shown if not line.startswith(("…", "page: …"))],
+            )
 
 
 @pytest.mark.long

@@ -99,7 +99,7 @@ def shortened(answer: str) -> str:
     """The card of an answer: what stands before its tables, without the name of the page."""
     lines = []
     for line in answer.splitlines():
-        is_table = line.startswith(("all rows", "measured", "  measured", "/"))
+        is_table = line.startswith(("all rows", "measured", "  measured", "page: "))
         if is_table:
             break
         lines.append(line.rstrip())

@@ -19,6 +19,7 @@ from orchestrator.calculator.printed import as_json, as_text, print_csv
 from orchestrator.command import Parser
 from orchestrator.errors import InputError
 from orchestrator.physics.fluids import KINDS, PAPER, STANDARD_DEG_C
+from orchestrator.runs import terminal
 from orchestrator.study.units import meant, number
 
 if TYPE_CHECKING:  # this loads numpy
@@ -188,7 +189,8 @@ def run(options: argparse.Namespace) -> int:
         fluid = options.fluid
         if not OF_FLUID.keys() & axes.keys():
             fluid = fluid or PAPER
-        print("\n".join(as_text(rows, options.law, varied, fluid)))
+        text = "\n".join(as_text(rows, options.law, varied, fluid))
+        print(terminal.shown(text))
     return 0
 
 

@@ -142,7 +142,8 @@ def as_text(
     Yields
     ------
     str
-        Of one point the answer and every law, of many points the rows of the answer.
+        Of one point the answer, with the marks of `terminal.bold`, and every law, of
+        many points the rows of the answer.
     """
     if varied:
         yield from _of_many(rows, asked, varied)
@@ -163,11 +164,11 @@ def _of_one(rows: Sequence["Row"]) -> Iterator[str]:
     from orchestrator.calculator.answer import grain_card, nearest
     from orchestrator.physics.threshold import LAWS_OF
     from orchestrator.report import single
-    from orchestrator.report.card import lines
+    from orchestrator.report.card import marked_lines
     from orchestrator.report.subjects import TERMS
 
     chosen = [row for row in rows if row["answer"]]
-    yield from lines(grain_card(rows))
+    yield from marked_lines(grain_card(rows))
     if "decides" in chosen[0]:
         yield ""
         yield from _criteria(chosen)

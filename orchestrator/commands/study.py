@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from orchestrator import guests
 from orchestrator.command import Command, Parser, add_run_options
+from orchestrator.runs import terminal
 from orchestrator.runs.queues import SYSTEMS, Queue
 from orchestrator.study.units import number
 
@@ -35,7 +36,8 @@ def _run(options: Namespace) -> int:
         answered = answer_finished(options)
         if answered:
             print("it was answered already; no solver was started", file=sys.stderr)
-            print(*answered, sep="\n")
+            answer, page = answered
+            print(terminal.shown(answer), terminal.page_line(page), sep="\n")
             return 0
     study = guests.load_study(options.source, options.tolerance)
     study = study.with_errors(_errors(options))

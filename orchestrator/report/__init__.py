@@ -140,7 +140,9 @@ def drawn_from(results: "Results", packages: Sequence[str] = ()) -> "list[Case]"
     return figures.files(results, packages)
 
 
-def said(results: "Results", guests: Sequence["Guest"] = ()) -> str:
+def said(
+    results: "Results", guests: Sequence["Guest"] = (), *, marked: bool = False
+) -> str:
     """Write the answer of a study for a terminal, see `words.answer_text`.
 
     Parameters
@@ -149,6 +151,8 @@ def said(results: "Results", guests: Sequence["Guest"] = ()) -> str:
         The study with its tables.
     guests
         Others, of which one may have a card.
+    marked
+        Whether its numbers and its verdict have the marks of `terminal.bold`.
 
     Returns
     -------
@@ -157,4 +161,5 @@ def said(results: "Results", guests: Sequence["Guest"] = ()) -> str:
     """
     from orchestrator.report import words
 
-    return words.answer_text(results, guests)
+    text = words.answer_text(results, guests)
+    return text if marked else terminal.plain(text)

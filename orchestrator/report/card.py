@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from orchestrator.report.lines import BETWEEN, head_width, table
+from orchestrator.runs import terminal
 
 Mark = Literal["good", "care", "bad"]
 """What an answer is worth: usable, usable with something, not usable."""
@@ -298,7 +299,18 @@ def lines(card: Card) -> Iterator[str]:
     str
         Its lines.
     """
-    yield from in_terminal(card.question)
+    return map(terminal.plain, marked_lines(card))
+
+
+def marked_lines(card: Card) -> Iterator[str]:
+    """Write a card for a terminal, with the marks of `terminal.bold`.
+
+    Yields
+    ------
+    str
+        Its lines; the question, the numbers and the verdict are marked.
+    """
+    yield from map(terminal.bold, in_terminal(card.question))
     if card.scene:
         yield from in_terminal(card.scene)
     yield ""
@@ -306,7 +318,11 @@ def lines(card: Card) -> Iterator[str]:
     yield ""
     word = card.worth.word
     said = f"{DISCS[card.worth.mark]} {word[:1].upper()}{word[1:]}."
-    yield from in_terminal(f"{said} {card.worth.advice}".strip(), "  ", "    ")
+    first, *others = in_terminal(f"{said} {card.worth.advice}".strip(), "  ", "    ")
+    # a long verdict is marked up to the end of its first line
+    ends = min(len(first), len(INDENT) + len(said))
+    yield f"{INDENT}{terminal.bold(first[len(INDENT) : ends])}{first[ends:]}"
+    yield from others
     intervals = [*_intervals(card.numbers)]
     if card.source or intervals:
         yield ""
@@ -337,15 +353,19 @@ def _numbers(numbers: Sequence[Number]) -> Iterator[str]:
         cells += [beside] if others else []
         told = filter(None, [number.meaning, number.note])
         rows.append([*cells, "; ".join(told)])
-    shown = [[*heads, ""], *rows] if len(heads) > 1 else rows
-    *columns, _ = zip(*shown, strict=True)
+    *columns, _ = zip(*rows, strict=True)
     widths = [
-        max(min(max(map(len, column[-len(rows) :])), MOST_LETTERS), head_width(head))
+        max(min(max(map(len, column)), MOST_LETTERS), head_width(head))
         for head, column in zip(heads, columns, strict=True)
     ]
-    left = WIDTH - len(INDENT) - sum(width + BETWEEN for width in widths)
-    for line in table(shown, widths=[*widths, left]):
-        yield f"{INDENT}{line}".rstrip()
+    widths.append(WIDTH - len(INDENT) - sum(width + BETWEEN for width in widths))
+    if len(heads) > 1:
+        for line in table([[*heads, ""]], widths=widths):
+            yield f"{INDENT}{line}".rstrip()
+    for line in table(rows, widths=widths):
+        figure = line[: widths[0]].rstrip()
+        marked = f"{terminal.bold(figure)}{line[len(figure) :]}"
+        yield f"{INDENT}{marked}".rstrip()
 
 
 def _intervals(numbers: Sequence[Number]) -> Iterator[str]:

@@ -17,7 +17,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from orchestrator import __version__
-from orchestrator.report.card import Card, in_terminal, lines
+from orchestrator.report.card import Card, in_terminal, marked_lines
 from orchestrator.runs.files import Folder
 
 if TYPE_CHECKING:
@@ -400,11 +400,14 @@ class Section:
 
     @property
     def told(self) -> str:
-        """What a terminal says of it: its card, and its text if it has no title."""
+        """What a terminal says of it: its card, and its text if it has no title.
+
+        The card has the marks of `terminal.bold`.
+        """
         told: list[str] = []
         for each in self.content:
             if isinstance(each, Card):
-                told += [*lines(each), ""]
+                told += [*marked_lines(each), ""]
             elif isinstance(each, Lines):
                 told += [each.text, ""]
             elif isinstance(each, Paragraphs) and not self.title:

@@ -6,8 +6,14 @@ import pandas as pd
 
 from orchestrator.errors import OrchestratorError
 from orchestrator.report import answers, lines, remarks, sheets, theory
-from orchestrator.report.card import WIDTH, Card, in_terminal, remark_lines
-from orchestrator.report.card import lines as card_lines
+from orchestrator.report.bed_text import bed_lines
+from orchestrator.report.card import (
+    WIDTH,
+    Card,
+    in_terminal,
+    marked_lines,
+    remark_lines,
+)
 from orchestrator.report.lines import BETWEEN, head_width
 from orchestrator.report.page import Guest
 from orchestrator.report.results import Results
@@ -33,7 +39,7 @@ def answer_text(results: Results, guests: Sequence[Guest] = ()) -> str:
     Returns
     -------
     str
-        The lines.
+        The lines, with the marks of `terminal.bold`.
 
     Raises
     ------
@@ -44,7 +50,10 @@ def answer_text(results: Results, guests: Sequence[Guest] = ()) -> str:
     answered = answer_card(results, guests)
     table = sheet(results, guests)
     caveats = remarks.remarks(results)
-    said = [*card_lines(answered)]
+    said = [*marked_lines(answered)]
+    drawn = [] if any(guest.card for guest in guests) else [*bed_lines(results)]
+    if drawn:
+        said += ["", *drawn]
     if table is not None:
         said += ["", *sheet_lines(table)]
     if caveats:

@@ -6,9 +6,11 @@ The streams may be closed or full.
 import errno
 import io
 import os
+import re
 import signal
 import sys
 import threading
+from pathlib import Path
 from typing import Any, NoReturn, TextIO
 
 ENDING = (
@@ -29,6 +31,25 @@ STDERR = 2
 """Number of the standard error's file descriptor."""
 STREAMS = {1: "stdout", STDERR: "stderr"}
 """Names of the streams that are written, by their file descriptors."""
+BOLD = "\x1b[1m"
+PLAIN = "\x1b[0m"
+_CODES = re.compile(r"\x1b\[[01]m")
+ASCII = str.maketrans(
+    {
+        "●": "[x]",
+        "◐": "[/]",
+        "○": "[ ]",
+        "…": "...",
+        "−": "-",
+        "–": "-",
+        "×": "x",
+        "’": "'",
+        "“": '"',
+        "”": '"',
+        **dict(zip("▁▂▃▄▅▆▇█", "_.-:=+*#", strict=True)),
+    }
+)
+"""What stands for some letters where the output has ASCII alone."""
 _interrupted = threading.Event()
 
 
@@ -69,6 +90,85 @@ def check_signals() -> None:
     """
     if _interrupted.is_set():
         raise KeyboardInterrupt
+
+
+def bold(text: str) -> str:
+    """Mark a text to be bold where it is shown by `shown` on a terminal.
+
+    Parameters
+    ----------
+    text
+        The text; an empty one stays so.
+
+    Returns
+    -------
+    str
+        The text with its marks.
+    """
+    return f"{BOLD}{text}{PLAIN}" if text else text
+
+
+def plain(text: str) -> str:
+    """Take the marks of `bold` from a text.
+
+    Parameters
+    ----------
+    text
+        The text.
+
+    Returns
+    -------
+    str
+        The text without them.
+    """
+    return _CODES.sub("", text)
+
+
+def shown(text: str) -> str:
+    """Write a text as standard output can show it.
+
+    Parameters
+    ----------
+    text
+        The text, with marks of `bold`.
+
+    Returns
+    -------
+    str
+        Bold on a terminal, unless NO_COLOR is set; plain elsewhere, and with other
+        letters where the encoding has none.
+    """
+    if not _takes_codes():
+        text = plain(text)
+    encoding = str(getattr(sys.stdout, "encoding", None) or "utf-8")
+    is_utf = encoding.lower().replace("-", "").startswith("utf")
+    return text if is_utf else text.translate(ASCII)
+
+
+def page_line(page: Path) -> str:
+    """Write where a page is; on a terminal the path is a link.
+
+    Parameters
+    ----------
+    page
+        The file of the page.
+
+    Returns
+    -------
+    str
+        The line.
+    """
+    if not _takes_codes():
+        return f"page: {page}"
+    address = page.absolute().as_uri()
+    return f"page: \x1b]8;;{address}\x1b\\{page}\x1b]8;;\x1b\\"
+
+
+def _takes_codes() -> bool:
+    """Whether standard output is a terminal that may be sent codes."""
+    is_terminal = sys.stdout is not None and sys.stdout.isatty()
+    is_dumb = os.environ.get("TERM") == "dumb"
+    return is_terminal and not is_dumb and not os.environ.get("NO_COLOR")
 
 
 class StandardStream(io.FileIO):

@@ -21,8 +21,9 @@ from orchestrator.calculator.answer import grain_card
 from orchestrator.digits import FORMAT, plain_number
 from orchestrator.errors import InputError
 from orchestrator.report import style
-from orchestrator.report.card import Card, Number, lines
+from orchestrator.report.card import Card, Number, marked_lines
 from orchestrator.report.single import motion_of_grain
+from orchestrator.runs import terminal
 from orchestrator.runs.files import write_durably
 from orchestrator.surface.raster import OpenedRaster, is_empty, opened_raster, rasterio
 from orchestrator.types import FloatArray, Row
@@ -154,7 +155,7 @@ def run_stress_map(options: Namespace) -> int:
     text = pd.DataFrame([said]).to_csv(index=False, float_format=FORMAT)
     write_durably(out / "stress_ratio.csv", text)
     card = _card(path.name, summary, rows, sizes)
-    print("\n".join(lines(card)))
+    print(terminal.shown("\n".join(marked_lines(card))))
     print()
     if not is_told:
         print("The file names no unit: its numbers are taken as Pa (--stress-unit).")

@@ -139,7 +139,7 @@ def test_a_finished_study_is_answered_without_any_library(
         (finished.folder / f"{name}.py").write_text(text)  # python -m looks here first
     ended = orchestrator("study", "small.toml", "--out", "out")
     assert ended.returncode == 0, ended.stderr
-    assert ended.stdout.endswith(f"{finished.out}/report.html\n")
+    assert ended.stdout.endswith(f"\npage: {finished.out}/report.html\n")
     assert "At what wind does a grain start to move" in ended.stdout
     changed = orchestrator("study", "small.toml", "--out", "out", "--tolerance", "0.1")
     assert changed.returncode == 1
@@ -304,7 +304,7 @@ def test_the_command_and_python_answer_an_edited_study_alike(
             assert cli.main(["study", str(file), "--out", str(place)]) == 0
             printed = capsys.readouterr().out
             answers.append(face.run(file, out=place).answer)
-            assert printed == f"{answers[-1]}\n{place / 'report.html'}\n"
+            assert printed == f"{answers[-1]}\npage: {place / 'report.html'}\n"
     assert answers[0] == answers[1] != answers[2] == answers[3]
     file.write_text("")
     assert cli.main(["study", str(file), "--out", str(out)]) == 2
