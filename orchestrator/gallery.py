@@ -1,5 +1,6 @@
 """One page over several studies: a card each, with its answer and its picture."""
 
+import re
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -7,12 +8,17 @@ from urllib.parse import quote
 import pandas as pd
 
 from orchestrator import face
+from orchestrator.digits import number
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.report import LIST, PAGE, page
 from orchestrator.runs.files import Folder
 from orchestrator.runs.workspace import STUDY
 
 NAME = "gallery.html"
+VIEW = re.compile(r'viewBox="\S+ \S+ (\S+) (\S+)"')
+"""Width and height of an SVG."""
+WIDE = 2.5
+"""Width over height from which a picture fills its card; others are shown whole."""
 
 
 def write_gallery(directory: Path) -> Path:
@@ -42,7 +48,11 @@ def write_gallery(directory: Path) -> Path:
         remedy = "name the directory that holds directories of studies, such as results"
         raise InputError(what, where=str(directory), remedy=remedy)
     folder = Folder(directory.absolute())
-    folder.note(NAME, page.fill("gallery.html.j2", title="Studies", cards=cards))
+    counted = number(len(cards), "result page")
+    title = "Studies: what each found"
+    folder.note(
+        NAME, page.fill("gallery.html.j2", title=title, counted=counted, cards=cards)
+    )
     return folder.root / NAME
 
 
@@ -63,8 +73,18 @@ def _card(study: Path) -> dict[str, Any]:
         "link": quote(f"{study.name}/{PAGE}"),
         "says": says,
         "answer": answer,
-        "image": _picture(study / LIST),
+        "image": (image := _picture(study / LIST)),
+        "is_wide": _is_wide(image),
     }
+
+
+def _is_wide(image: bytes) -> bool:
+    """Whether a picture loses little where it is cut to the form of a card."""
+    found = VIEW.search(image.decode("utf-8")[:2000])
+    if found is None:
+        return False
+    width, height = map(float, found.groups())
+    return width > WIDE * height
 
 
 def _picture(listed: Path) -> bytes:

@@ -251,6 +251,15 @@ def test_gallery_of_studies_is_written_anew(studies: Path) -> None:
     assert (studies / "mine.html").read_text() == "mine"
     html = (studies / gallery.NAME).read_text("utf-8")
     assert '<a href="two%20%26%20more/report.html">two &amp; more</a>' in html
+    # the first number of each card with its interval, and the verdict
+    card = orchestrator.open(studies / "one").card
+    number = card.numbers[0]
+    words = " ".join(html.split())
+    assert words.count(f"{number.figure} <small>{number.unit}</small>") == 2
+    assert words.count(f'<span class="ends">{number.interval}</span>') == 2
+    assert words.count(card.worth.word[1:]) == 2
+    assert words.count("data:image/svg+xml") == 2
+    assert "2 result pages" in words
     gallery.write_gallery(studies)
     assert (studies / gallery.NAME).read_text("utf-8") == html
     with pytest.raises(InputError, match="no study with a page"):
