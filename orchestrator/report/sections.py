@@ -7,6 +7,7 @@ from urllib.parse import quote
 import pandas as pd
 
 from orchestrator.report import answers, remarks, sheets, solved, theory, words
+from orchestrator.report.by_place import places_sheet
 from orchestrator.report.page import (
     Element,
     Guest,
@@ -117,6 +118,9 @@ def _thresholds(results: Results) -> Iterator[Section]:
         fold = f"All {len(every)} thresholds with their cases"
         content.append(Table(every, "tables/pile_threshold.csv", fold=fold))
     yield Section(sheet.title, content, "thresholds", "Table")
+    by_place = places_sheet(results)
+    if by_place is not None:
+        yield Section(by_place.title, [by_place])
     short = None if answers.is_of_hills(results) else sheets.short(results)
     if short is not None and not sheet.frame.equals(short.frame):
         yield Section(short.title, [short])

@@ -7,6 +7,7 @@ import pandas as pd
 from orchestrator.errors import OrchestratorError
 from orchestrator.report import answers, lines, remarks, sheets, theory
 from orchestrator.report.bed_text import bed_lines
+from orchestrator.report.by_place import places_sheet
 from orchestrator.report.card import (
     WIDTH,
     Card,
@@ -56,6 +57,9 @@ def answer_text(results: Results, guests: Sequence[Guest] = ()) -> str:
         said += ["", *drawn]
     if table is not None:
         said += ["", *sheet_lines(table)]
+    by_place = None if any(guest.card for guest in guests) else places_sheet(results)
+    if by_place is not None:
+        said += ["", by_place.title, *sheet_lines(by_place)]
     if caveats:
         said += ["", *remark_lines(caveats)]
     return "\n".join(said)

@@ -8,9 +8,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator import cli
-from orchestrator.hours.places import DunePlace, hours_above
+import orchestrator
+from orchestrator import cli, pipeline
+from orchestrator.grains.places import DunePlace
+from orchestrator.hours.places import hours_above
 from orchestrator.physics.velocity import outer_roughness
+from orchestrator.report.by_place import places_sheet
+from orchestrator.report.results import Results
+from orchestrator.runs.workspace import Workspace
 from orchestrator.study.wind import Winds
 
 STUDY = """\
@@ -174,3 +179,32 @@ def test_what_is_no_wind_is_refused(
 ) -> None:
     assert cli.main(hours(directory, *words)) == 2
     assert said in capsys.readouterr().err
+
+
+def test_the_page_has_the_thresholds_of_the_same_places(
+    directory: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    capsys.readouterr()
+    places = table(directory, capsys)
+    opened = orchestrator.open(directory)
+    space = Workspace(directory)
+    study, plan = pipeline.reopen(space)
+    results = Results(study, plan, opened.tables, space.cases)
+    sheet = places_sheet(results)
+    assert sheet is not None
+    told = sheet.frame.set_index("place")
+    assert [*told.index] == [*places.index]
+    for part, column in (("a tenth", "a_tenth"), ("half", "half")):
+        for place, (_, row) in zip(
+            sheet.frame["place"], places.iterrows(), strict=True
+        ):
+            assert float(told[f"{part} at, m/s"][place]) == pytest.approx(
+                row[f"wind_{column}_m_s"], rel=0.01
+            )
+            ends = told[f"interval of {part}, m/s"][place].split(" … ")
+            assert [float(end) for end in ends] == pytest.approx(
+                [row[f"wind_{column}{end}_m_s"] for end in ("_low", "_high")], rel=0.01
+            )
+    html = opened.page.read_text(encoding="utf-8")
+    assert sheet.title in html
+    assert sheet.title in opened.answer
