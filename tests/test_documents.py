@@ -350,7 +350,7 @@ def test_pages_say_what_is_not_answered() -> None:
     """The words that people look for; what stands there is read by a person."""
     for name, words in {
         "questions.md": ["bends", "bank slopes", "turbulence that structures"],
-        "own-profile.md": ["A fence is solid"],
+        "own-profile.md": ["A fence is solid", "porosity"],
         "paper.md": ["Figs. 15 and 16", "Eq. 10", "wall stress"],
     }.items():
         page = (ROOT / "docs" / name).read_text(encoding="utf-8")

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from math import pi, radians, tan
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,6 +37,46 @@ FOOT_STEPS = 50
 converges."""
 
 
+class PorousFence(NamedTuple):
+    """A fence through which the flow goes, and under which the bed goes on.
+
+    Attributes
+    ----------
+    start, end
+        Where it begins and ends along x; it is as thick as a solid one at its top.
+    height
+        Its height over the bed.
+    porosity
+        Open part of it.
+    """
+
+    start: float
+    end: float
+    height: float
+    porosity: float
+
+    @property
+    def thickness(self) -> float:
+        """From one side to the other, in the unit of the line."""
+        return self.end - self.start
+
+    def scaled(self, factor: float) -> "PorousFence":
+        """Write it in another unit of length.
+
+        Parameters
+        ----------
+        factor
+            The old unit over the new one.
+
+        Returns
+        -------
+        PorousFence
+            The same fence.
+        """
+        lengths = (self.start * factor, self.end * factor, self.height * factor)
+        return PorousFence(*lengths, self.porosity)
+
+
 @dataclass(frozen=True)
 class BedLine:
     """A bed line of n corners, which go downstream.
@@ -50,12 +91,15 @@ class BedLine:
         The height of the forms, in which domain, mesh and averaging are measured.
     bare
         The ranges of x of obstacles, which carry no grains.
+    fences
+        The porous fences, whose ranges are among those: they are no part of the line.
     """
 
     x: tuple[float, ...]
     z: tuple[float, ...]
     h: float
     bare: tuple[tuple[float, float], ...] = ()
+    fences: tuple[PorousFence, ...] = ()
 
     @classmethod
     def through(cls, corners: FloatArray, h: float) -> "BedLine":
@@ -92,7 +136,8 @@ class BedLine:
         x = tuple(place * factor for place in self.x)
         z = tuple(height * factor for height in self.z)
         bare = tuple((start * factor, end * factor) for start, end in self.bare)
-        return BedLine(x, z, self.h * factor, bare)
+        fences = tuple(fence.scaled(factor) for fence in self.fences)
+        return BedLine(x, z, self.h * factor, bare, fences)
 
     def with_corners(self, places: Sequence[float]) -> "BedLine":
         """Add corners in which the line does not bend.
@@ -353,7 +398,8 @@ def of_bed(bed: PileBed) -> BedLine:
             corners = np.vstack([corners, [end, corners[-1, 1]]])
     line = between_flats(corners, bed.relief)
     for obstacle in sorted(bed.obstacles, key=lambda obstacle: obstacle.x):
-        line = _with_obstacle(line, obstacle)
+        add = _with_porous if obstacle.is_porous else _with_obstacle
+        line = add(line, obstacle)
     return line
 
 
@@ -428,7 +474,17 @@ def _with_obstacle(line: BedLine, obstacle: Obstacle) -> BedLine:
     behind = corners[corners[:, 0] > end[0]]
     parts = np.vstack([before, start, outline, end, behind])
     bare = (float(start[0]), float(end[0]))
-    return replace(BedLine.through(parts, line.h), bare=(*line.bare, bare))
+    whole = BedLine.through(parts, line.h)
+    return replace(whole, bare=(*line.bare, bare), fences=line.fences)
+
+
+def _with_porous(line: BedLine, fence: Obstacle) -> BedLine:
+    """The line under a porous fence, with a corner at each of its sides."""
+    half = FENCE * fence.height / 2
+    ends = (fence.x - half, fence.x + half)
+    porous = PorousFence(*ends, fence.height, fence.porosity)
+    whole = line.with_corners(ends)
+    return replace(whole, bare=(*line.bare, ends), fences=(*line.fences, porous))
 
 
 def _foot(line: BedLine, top: FloatArray, way: int) -> FloatArray:

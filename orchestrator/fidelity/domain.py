@@ -191,6 +191,10 @@ def _heights(scene: Scene) -> Iterator[float]:
     yield from (each.height / _bed(scene).relief for each in scene.obstacles)
 
 
+def _porosities(scene: Scene) -> Iterator[float]:
+    yield from (each.porosity for each in scene.obstacles if each.kind == "fence")
+
+
 def _lengths(scene: Scene) -> Iterator[float]:
     for each in scene.obstacles:
         if each.kind == "block":
@@ -236,6 +240,7 @@ SIMILAR: tuple[MeasuredQuantity, ...] = (
     MeasuredQuantity("bed.obstacles: x/bed.height", OBSTACLES, _places),
     MeasuredQuantity("bed.obstacles: height/bed.height", OBSTACLES, _heights),
     MeasuredQuantity("bed.obstacles: length/height", OBSTACLES, _lengths),
+    MeasuredQuantity("bed.obstacles: porosity", OBSTACLES, _porosities),
     MeasuredQuantity("grain.sizes", SIZES, _sizes),
     MeasuredQuantity("grain.sizes.sigma_g", SIZES, _sigma),
     MeasuredQuantity("grain.sizes.smallest", SIZES, _smallest),

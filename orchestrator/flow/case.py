@@ -9,8 +9,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from orchestrator import digits
-from orchestrator.bed.line import BedLine, triangle
+from orchestrator.bed.line import BedLine, PorousFence, triangle
 from orchestrator.errors import InputError, SolverError
+from orchestrator.flow.fence import fence_cells, write_fences
 from orchestrator.flow.foam import (
     INTERPOLATED_DIGITS,
     SolvedFlow,
@@ -18,6 +19,7 @@ from orchestrator.flow.foam import (
     patch_types,
     start_from,
     write_poly_mesh,
+    write_zones,
 )
 from orchestrator.flow.mesh import (
     NEAR,
@@ -109,7 +111,10 @@ class FlowCase(OpenFoamCase[WallStress]):
     @property
     def parameters(self) -> dict[str, Any]:
         """The settings, the height and the slope, and a digest of the bed line."""
+        # a flow without a porous fence is called as before there were any
+        fences = self.bed_line.fences
         return {
+            **({"fences": list(map(list, fences))} if fences else {}),
             **self.settings.model_dump(mode="json", exclude={"between"}),
             **self.above.model_dump(mode="json"),
             "height": float(self.height_m),
@@ -166,7 +171,12 @@ class FlowCase(OpenFoamCase[WallStress]):
         x, z = digits.on_grid(whole.corners, self.height_m).T.tolist()
         bare = digits.on_grid(np.reshape(whole.bare, (-1, 2)), self.height_m).tolist()
         ranges = tuple((start, end) for start, end in bare)
-        return replace(whole, x=tuple(x), z=tuple(z), bare=ranges)
+        fences = []
+        for fence in whole.fences:
+            lengths = digits.on_grid(fence[:3], self.height_m).tolist()
+            start, end, height = lengths
+            fences.append(PorousFence(start, end, height, fence.porosity))
+        return replace(whole, x=tuple(x), z=tuple(z), bare=ranges, fences=tuple(fences))
 
     @cached_property
     def grid(self) -> Grid:
@@ -297,11 +307,26 @@ class FlowCase(OpenFoamCase[WallStress]):
         for name, rows in mesh.cell_sets_dict.items():
             patches[name] = mesh.cells_dict["quad"][rows["quad"]]
         write_poly_mesh(directory, mesh.points, cells, patches, types)
+        self._write_fences(directory, mesh.points[cells], middles)
         if coarser:
             self._start_from_flow(directory / "0", middles, coarser)
         else:
             heights = np.abs(middles[..., 2].ravel())
             self.approach.start(directory / "0", heights)
+
+    def _write_fences(
+        self, directory: Path, corners: FloatArray, middles: FloatArray
+    ) -> None:
+        """Write the porous fences, if there are any: their cells and their losses."""
+        line = self.bed_line
+        if not line.fences:
+            return
+        uppermost = np.argsort(corners[..., 2], axis=1)[:, -4:, None]
+        upper = np.take_along_axis(corners, uppermost, axis=1).mean(axis=1)
+        tops = (upper[:, 2] - line.height(upper[:, 0])).reshape(middles.shape[:2])
+        fences = fence_cells(line, middles, tops)
+        write_zones(directory, {one.name: one.cells for one in fences})
+        write_fences(directory, fences)
 
     def _solver_values(self) -> dict[str, object]:
         """Values of the template's ``parameters``."""

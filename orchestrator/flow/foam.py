@@ -173,6 +173,24 @@ def write_poly_mesh(
     _write(folder / "boundary", "polyBoundaryMesh", patch_list)
 
 
+def write_zones(directory: Path, zones: Mapping[str, IntArray]) -> None:
+    """Write zones of cells into the ``constant/polyMesh`` of a case.
+
+    Parameters
+    ----------
+    directory
+        The case.
+    zones
+        The numbers of the cells of each.
+    """
+    listing = [
+        f"{name} {{ type cellZone; cellLabels List<label> {listed(cells, '%d')}; }}\n"
+        for name, cells in zones.items()
+    ]
+    text = f"{len(listing)}\n(\n{''.join(listing)})\n"
+    _write(directory / "constant/polyMesh/cellZones", "regIOobject", text)
+
+
 def patch_types(offset: float) -> dict[str, str]:
     """Types of the patches of a flow whose approach develops before the inlet.
 

@@ -27,6 +27,8 @@ CORNER_DEG = 8.0
 """Least bend of the bed, degrees, that is a corner and not a part of a curve."""
 CELLS_ON_OBSTACLE = 8
 """Cells in the height of an obstacle, along the bed beside it."""
+CELLS_IN_FENCE = 2
+"""Cells from one side of a porous fence to the other, at least."""
 TOP = 0.35
 """Length of the cells at sharp tops over the mean of a face: the stress of a grain is
 averaged over h/40 there."""
@@ -309,9 +311,13 @@ def _sizes(line: BedLine, cell: float, foot: float, growth: float) -> FloatArray
     inside_level = (np.abs(bends[1:-1]) < NO_BEND_DEG) & level[1:] & level[:-1]
     sizes[1:-1][inside_level] = inf
     sizes[[0, -1]] = inf
+    porous = {(fence.start, fence.end): fence for fence in line.fences}
     for start, end in line.bare:
         on_it = (x >= start - 1e-12) & (x <= end + 1e-12)
-        sizes[on_it] = np.minimum(sizes[on_it], np.ptp(z[on_it]) / CELLS_ON_OBSTACLE)
+        own = np.ptp(z[on_it]) / CELLS_ON_OBSTACLE
+        if (start, end) in porous:
+            own = porous[start, end].thickness / CELLS_IN_FENCE
+        sizes[on_it] = np.minimum(sizes[on_it], own)
     shorter_piece = np.minimum(lengths[:-1], lengths[1:])
     sizes[1:-1] = np.minimum(sizes[1:-1], shorter_piece)
     for i in range(1, len(sizes)):

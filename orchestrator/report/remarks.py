@@ -1,6 +1,6 @@
 """Caveats of the answer of a study: four to six remarks with their numbers."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import lru_cache
 
 import numpy as np
@@ -23,7 +23,7 @@ from orchestrator.report.page import caption
 from orchestrator.report.results import Results
 from orchestrator.report.subjects import WIND, length, place_of_file
 from orchestrator.runs.case import said_of
-from orchestrator.study.parts import PileBed
+from orchestrator.study.parts import Obstacle, PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.sieve import Cut
 from orchestrator.tables.facts import packs_grains
@@ -48,7 +48,13 @@ DRY_GRAINS = Remark(
 SOLID_FENCE = Remark(
     "A fence is solid.",
     "Nothing flows through it. Fences that collect sand or dust are about half porous "
-    "and shelter the bed behind them otherwise, which is not computed.",
+    "and shelter the bed behind them otherwise: `porosity` of the fence.",
+)
+POROUS_FENCE = Remark(
+    "A porous fence is a loss of pressure.",
+    "The loss is that of slats or holes with sharp edges, by the porosity of the fence "
+    "(Idelchik). Nets of round threads let more wind through. The wakes of single "
+    "slats are not resolved, and the flow was compared with no measurement.",
 )
 SHARP_CREST = Remark(
     "The first grains depend on the mesh at the crest.",
@@ -279,9 +285,11 @@ def _of_piles(results: Results, piles: pd.DataFrame) -> Iterator[Remark]:
         yield from _model(row, results)
     if any(map(crest.has_sharp_crest, results.study.scenes)):
         yield SHARP_CREST
-    fences = [scene for scene in results.study.scenes if _has_fence(scene)]
-    if fences:
+    fences = _fences(results.study.scenes)
+    if not all(fence.is_porous for fence in fences):
         yield SOLID_FENCE
+    if any(fence.is_porous for fence in fences):
+        yield POROUS_FENCE
     beyond = piles[piles["frozen_bed"] > FROZEN_BED]
     if len(beyond):
         text = caption("frozen", beyond=beyond, count=len(piles), limit=FROZEN_BED)
@@ -347,9 +355,10 @@ def _jumps(row: pd.Series, piles: pd.DataFrame) -> Iterator[Remark]:
         yield Remark("The width of the interval changes with Re*.", text)
 
 
-def _has_fence(scene: Scene) -> bool:
-    """Whether a fence stands on the bed of a scene."""
-    return any(obstacle.kind == "fence" for obstacle in scene.obstacles)
+def _fences(scenes: Iterable[Scene]) -> list[Obstacle]:
+    """The fences on the beds of some scenes."""
+    obstacles = [each for scene in scenes for each in scene.obstacles]
+    return [each for each in obstacles if each.kind == "fence"]
 
 
 def _smoothing(row: pd.Series, bed: PileBed) -> Iterator[Remark]:

@@ -75,6 +75,9 @@ class Waves(FlowModel):
             what = "linear theory has no top"
             remedy = f'choose "{SOLVE.name}" or "{FLAT.name}"'
             return UnfitError("method.flow.model", what, remedy)
+        if any(each.is_porous for each in question.bed.obstacles):
+            what = "linear theory knows no flow through a fence"
+            return UnfitError("method.flow.model", what, f'choose "{SOLVE.name}"')
         return None
 
 

@@ -7,7 +7,7 @@ Every part is frozen and validated. How the question is answered is in `method`.
 
 from functools import partial
 from math import log, radians, tan
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import numpy as np
 import pydantic
@@ -25,6 +25,7 @@ from orchestrator.study.declare import (
     List,
     Part,
     Roughness,
+    UnfitError,
     Viscosity,
     field,
 )
@@ -53,6 +54,11 @@ Wind = Annotated[float, Field(gt=0, le=150)]
 File = Annotated[
     InstanceOf[Profile], PlainSerializer(lambda profile: profile and profile.digest)
 ]
+
+
+MOST_POROUS = 0.9
+"""Most open part of a fence: one of 0.99 on level ground changes so little that the
+residuals, which are over the change, do not fall."""
 
 
 class LogNormal(Part):
@@ -294,6 +300,22 @@ class Obstacle(Part):
     """height over the bed"""
     length: Length | None = None
     """length of a block; by default its height"""
+    porosity: float = field(0.0, ge=0, le=MOST_POROUS)
+    """open part of a fence; of 0 it is solid"""
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if self.porosity and self.kind != "fence":
+            what = f"a {self.kind} of porosity {self.porosity:g}"
+            raise UnfitError(
+                "bed.obstacles", what, "a fence alone is porous: leave it out"
+            )
+        return self
+
+    @property
+    def is_porous(self) -> bool:
+        """Whether the flow goes through it, too."""
+        return self.porosity > 0
 
     @property
     def reach(self) -> float:
@@ -305,8 +327,12 @@ class Obstacle(Part):
         return reach
 
     def __str__(self) -> str:
-        length = f", {metres(self.length)} long" if self.length else ""
-        return f"{self.kind} {metres(self.height)} high at x = {metres(self.x)}{length}"
+        what = f"{self.kind} {metres(self.height)} high at x = {metres(self.x)}"
+        if self.length:
+            what += f", {metres(self.length)} long"
+        if self.is_porous:
+            return f"{what}, porosity {100 * self.porosity:.3g} %"
+        return f"{what}, solid" if self.kind == "fence" else what
 
 
 class Bed(Part):
@@ -381,7 +407,8 @@ class PileBed(Bed):
     """length over which a noisy profile is smoothed"""
     obstacles: Annotated[tuple[Obstacle, ...], List] = _pile((), read="obstacles")
     """fences, blocks and half-cylinders, which carry no grains: tables with `kind`,
-    `x`, `height` and, of a block, `length`"""
+    `x`, `height`, of a block `length`, and of a fence `porosity`, its open part, of
+    which 0 is solid"""
     counted: Literal["windward", "all"] | Range | None = _pile(
         None, label="counted grains", read="counts"
     )

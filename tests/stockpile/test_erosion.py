@@ -170,7 +170,7 @@ def test_piles_are_compared_that_differ_in_the_obstacle_alone(tmp_path: Path) ->
         rows = table[table["pile"].str.endswith(name)]
         assert rows["surface"].tolist()[:2] == [
             "no obstacle",
-            "fence 4 m high at x = −4 m",
+            "fence 4 m high at x = −4 m, solid",
         ]
         assert len(rows) == 6  # and the four piles of AP-42
         drop = ["pile"]
@@ -189,11 +189,11 @@ def test_piles_are_compared_that_differ_in_the_obstacle_alone(tmp_path: Path) ->
 def test_obstacles_are_not_compared_with_one_another(tmp_path: Path) -> None:
     """Without a bare pile no part is told that an obstacle takes away."""
     (told,), table = _run(_text(f'"bed.obstacles" = [{FENCE}, {BLOCK}]'), tmp_path)
-    assert "; with a fence 4 m high at x = −4 m)" in told
+    assert "; with a fence 4 m high at x = −4 m, solid)" in told
     assert " With a block 3 m high at x = −6 m: " in told
     assert "%" not in told
     assert table["surface"].tolist()[:2] == [
-        "fence 4 m high at x = −4 m",
+        "fence 4 m high at x = −4 m, solid",
         "block 3 m high at x = −6 m",
     ]
 
