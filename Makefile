@@ -42,6 +42,8 @@ calibration: setup  ## measure numerical errors, maps and intervals anew, for th
 	mv tested.csv orchestrator/physics/tested.csv
 	$(PYTHON) tools/tested.py results/validate/tables/measured.csv > tested.csv
 	mv tested.csv orchestrator/physics/tested_strips.csv
+	$(PYTHON) tools/usable.py results/usable > usable.csv
+	mv usable.csv docs/measured/usable.csv
 	$(PYTHON) tools/errors.py
 	$(PYTHON) tools/maps.py
 	$(PYTHON) tools/budget.py results/budget/tables/shares.csv

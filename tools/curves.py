@@ -3,7 +3,7 @@
 python tools/curves.py [PICTURE]
 
 It draws docs/figures/curves.svg, or another picture, and prints the largest factor between two points that
-follow each other on each curve, with the place.
+follow each other on each curve, with the place, and what it is for 1 % of the size or the ratio of densities.
 """
 
 import sys
@@ -115,15 +115,25 @@ def largest_steps(rows: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        A row for each curve, with the number where the factor is.
+        A row for each curve, with the number where the factor is; `of_1_percent` is the
+        largest factor of points 1 % apart, NaN over the slope.
     """
     made = []
     for (what, fluid), part in rows.groupby(["over", "fluid"], sort=False):
         logs = np.abs(np.diff(np.log(part["shields"])))
         place = int(logs.argmax())
-        at = float(part["x"].iloc[place])
+        x = part["x"].to_numpy()
+        one = np.nan
+        if what != "slope":
+            one = float(np.exp((logs / np.diff(np.log(x))).max() * np.log(1.01)))
         made.append(
-            {"over": what, "fluid": fluid, "factor": np.exp(logs[place]), "at": at}
+            {
+                "over": what,
+                "fluid": fluid,
+                "factor": np.exp(logs[place]),
+                "at": float(x[place]),
+                "of_1_percent": one,
+            }
         )
     return pd.DataFrame(made)
 

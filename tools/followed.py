@@ -3,7 +3,8 @@
 python tools/followed.py results/strips > followed.csv
 
 The study is docs/strips.toml. A row is a load step; the table of the program,
-orchestrator/lab/measured/followed.csv, has those of the strips that were run.
+orchestrator/lab/measured/followed.csv, has those of the strips that were run. A strip
+of an older version is listed only if the present one writes the same inputs for it.
 """
 
 import sys
@@ -14,7 +15,8 @@ import pandas as pd
 
 from orchestrator.bed import deck
 from orchestrator.grains.followed import STEPS, FollowedCase
-from orchestrator.runs.case import marker_of
+from orchestrator.runs import reuse
+from orchestrator.runs.case import Case
 from orchestrator.study import study
 from orchestrator.study.closed_form import single_grain
 from orchestrator.tables import csv
@@ -25,10 +27,18 @@ STUDY = Path(__file__).parents[1] / "docs" / "strips.toml"
 
 def rows(cases: Path) -> Iterator[Row]:
     """List the load steps of the strips of the study that are done."""
-    for group in study.load(str(STUDY)).groups:
+    groups = study.load(str(STUDY)).groups
+    strips = {
+        scene.id: FollowedCase(scene) for group in groups for scene in group.scenes
+    }
+    asked: dict[str, Case] = {
+        case.name: case for strip in strips.values() for case in (*strip.needs, strip)
+    }
+    done = reuse.done(asked, cases, holds=False)
+    for group in groups:
         for scene in group.scenes:
-            case = FollowedCase(scene)
-            if not marker_of(cases / case.name, case.id):
+            case = strips[scene.id]
+            if case.name not in done:
                 continue
             grain = single_grain(scene)
             d = scene.grain.diameter

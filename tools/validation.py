@@ -496,6 +496,28 @@ def steps() -> str:
     )
 
 
+def usable() -> str:
+    """How many answers are usable by default, and what is against the others."""
+    found = pd.read_csv(STORED / "usable.csv")
+    rows = []
+    for (bed, fluid), part in found.groupby(["bed", "fluid"]):
+        others = part[~part["usable"]]
+        told = []
+        for why, of_why in others.groupby("reason", sort=False):
+            sizes = "all" if len(of_why) == len(part) else _sizes(of_why["d_m"])
+            told.append(f"{sizes}: {str(why).replace('; ', ' and ')}")
+        count = f"{part['usable'].sum()} of {len(part)}"
+        rows.append([str(bed), str(fluid), count, "; ".join(told) or "–"])
+    total = f"{found['usable'].sum()} of {len(found)}"
+    rows.append(["**all**", "", f"**{total}**", ""])
+    return table(["bed", "fluid", "usable", "others, and what is against them"], rows)
+
+
+def _sizes(diameters: "pd.Series[float]") -> str:
+    """Some diameters in millimetres."""
+    return f"{', '.join(f'{1e3 * d:g}' for d in diameters)} mm"
+
+
 OF_HIDING = (("air", 2.5e-4), ("water", 1e-3), ("water", 5e-3))
 """Grains of the beds on which hiding is told, m."""
 
@@ -550,6 +572,7 @@ BLOCKS: Mapping[str, Mapping[str, Callable[[], str]]] = {
         "ceases": ceases,
         "asked": asked,
         "own interval": own_interval,
+        "usable": usable,
         "sizes": sizes,
     },
     "how-sure": {"short": short, "factors": factors, "single": in_words},

@@ -26,13 +26,15 @@ from orchestrator.runs.case import said_of
 from orchestrator.study.parts import Obstacle, PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.sieve import Cut
-from orchestrator.tables.facts import packs_grains
+from orchestrator.tables.facts import are_followed, packs_grains
 from orchestrator.tables.kinds import INTERLOCKED
 
 MOST = 6
 """Remarks up to which those are added that are true of every study of a kind."""
 JUMP = 0.05
 """Relative change of the ratio of the ends of an interval from which it is told."""
+NEAR_ONE = 1.1
+"""Factor of a correction below which it is told with three digits."""
 PAPER_FLUID = Remark(
     "The gas is not quite air.",
     "The gas is that of the paper, of 1 kg/m³, in which a grain has moved when it has "
@@ -177,17 +179,35 @@ def _correction(results: Results, table: pd.DataFrame) -> Iterator[Remark]:
     who = "flumes found"
     if single.is_by_formula(row):
         who = f"the formula of {single.formula_of(row)} gives"
+    of_one = _of_one(row, rows)
     size = length(float(row["d_m"]))
     law = labels.value("force_law", row["force_law"])
-    over = "over" if ratio > 1 else "under"
+    found = f"{who} {measured:#.3g} m/s"
+    if are_followed(rows).iloc[0]:
+        model = "The closed form of one grain"
+        text = (
+            f"On a level bed one grain of {size} has a friction velocity of "
+            f"{computed:#.3g} m/s by the force law {law}; {found}. Grains that DEM "
+            "follows have no force law: the drag on each is that of its velocity "
+            f"relative to the fluid.{of_one}"
+        )
+    else:
+        model = "The model"
+        text = (
+            f"On a level bed of grains of {size} the force law {law} asks for a "
+            f"friction velocity of {computed:#.3g} m/s; {found}. The table has "
+            f"both.{of_one}"
+        )
+    yield Remark(f"{model} {_off(ratio, flow)}", text)
+
+
+def _off(ratio: float, flow: str) -> str:
+    """By which factor a threshold flow is too high or too low, in words."""
     factor = max(ratio, 1 / ratio)
-    head = f"The model {over}predicts the threshold {flow} by a factor of {factor:.2g}."
-    text = (
-        f"On a level bed of grains of {size} the force law {law} asks for a friction "
-        f"velocity of {computed:#.3g} m/s; {who} {measured:#.3g} m/s. The table "
-        f"has both.{_of_one(row, rows)}"
-    )
-    yield Remark(head, text)
+    over = "over" if ratio > 1 else "under"
+    # two digits say nothing of a factor near 1
+    by = f"{factor:.{3 if factor < NEAR_ONE else 2}g}"
+    return f"{over}predicts the threshold {flow} by a factor of {by}."
 
 
 def _of_one(row: pd.Series, rows: pd.DataFrame) -> str:

@@ -31,7 +31,7 @@ from orchestrator.report.subjects import (
     has_wind,
 )
 from orchestrator.study import fields
-from orchestrator.tables.facts import needs_run
+from orchestrator.tables.facts import are_followed, needs_run
 
 HEADS = {WIND: "wind at 10 m", MEAN: "mean velocity", STRESS: "bed shear stress"}
 """Quantities of flows in the heads of columns."""
@@ -304,6 +304,8 @@ def _sheet(rows: pd.DataFrame, keys: Sequence[str], name: str) -> Sheet:
             continue
         if head in frame and frame[head].nunique() == 1:
             frame = frame.drop(columns=head)
+            if column == "force_law" and are_followed(rows).all():
+                continue
             if column != "fraction":  # it is told in words below
                 shared += labels.told(rows.iloc[0], [column])
     frame, notes = _noted(frame)

@@ -21,7 +21,7 @@ from orchestrator.report.style import Look
 from orchestrator.report.theory import BINS, Going, Line
 from orchestrator.study import fields
 from orchestrator.study.criterion import SUSTAINED
-from orchestrator.tables.facts import needs_run
+from orchestrator.tables.facts import are_followed, needs_run
 from orchestrator.types import BoolArray, FloatArray
 
 SHAPES = "os^DvP<X>p8hd*"
@@ -257,6 +257,7 @@ def about(rows: pd.DataFrame) -> dict[str, Any]:
     is_sloped = bool((rows["alpha_deg"] > 0).any())
     of_the_points = {
         "laws": "; ".join(labels.value("force_law", name) for name in drawn),
+        "is_followed": bool(are_followed(rows).all()),
         "pair": theory.PAIR[0] in drawn,
         "is_open": not valid(rows).all(),
         "viscosities": rows["nu_m2_s"].nunique(),

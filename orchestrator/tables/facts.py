@@ -55,3 +55,20 @@ def packs_grains(row: Any) -> bool:
         Whether it is.
     """
     return METHODS[row["method"]].packs_grains
+
+
+def are_followed(rows: pd.DataFrame) -> "pd.Series[bool]":
+    """Tell on which beds DEM follows the grains, whose drag is of no force law.
+
+    Parameters
+    ----------
+    rows
+        Rows with the columns of their scenes.
+
+    Returns
+    -------
+    Series
+        Truth values.
+    """
+    # the field has an effect on such beds alone, and its cell is blank on others
+    return rows["dropped_grains"].notna()

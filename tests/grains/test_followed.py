@@ -1,7 +1,9 @@
 """Strips whose grains DEM follows: drag and zero level of the deck, dropped grains, thresholds of a study."""
 
+import json
 import math
 import re
+import runpy
 import shutil
 import subprocess
 from pathlib import Path
@@ -30,6 +32,7 @@ from orchestrator.types import FloatArray
 from tests.waiting import HANGS_S
 
 TEMPLATE = templates() / "liggghts/followed"
+TOOL = Path(__file__).parents[2] / "tools" / "followed.py"
 
 
 D, GRAIN, FLUID, NU, GRAVITY = 1e-3, 2650.0, 1000.0, 1e-6, 9.81
@@ -314,18 +317,55 @@ def test_a_grain_counts_from_the_first_load_step_that_keeps_it_moving(
         followed.read_kept(tmp_path, grains)
 
 
+@pytest.fixture(scope="module")
+def strip(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The directory of the cases of a strip on which two grains are dropped."""
+    directory = tmp_path_factory.mktemp("strip")
+    for case in Pile(_scene(**{"bed.dropped_grains": 2}), directory).runs:
+        engine.execute(case, directory, HANGS_S)
+    return directory
+
+
 @pytest.mark.long
-def test_motion_on_a_strip_is_sustained_near_the_closed_form(tmp_path: Path) -> None:
+def test_motion_on_a_strip_is_sustained_near_the_closed_form(strip: Path) -> None:
     scene = _scene(**{"bed.dropped_grains": 2})
-    pile = Pile(scene, tmp_path)
-    for case in pile.runs:
-        engine.execute(case, tmp_path, HANGS_S)
-    first, last = pile.thresholds(tmp_path, (0.05, 0.3))
+    pile = Pile(scene, strip)
+    first, last = pile.thresholds(strip, (0.05, 0.3))
     alone = float(sustaining(scene, 0.0, 1.0)[0])
     unit = float(single_grain(scene).unit_ustar)
     # within the load steps, and a factor of four of one grain in closed form
     assert 0.4 < (first.ustar0 / unit) ** 2 / alone < 4.0
     assert first.ustar0 <= last.ustar0
-    assert pile.sustained_decides(tmp_path).all()
-    steps = deck.read_table(tmp_path / pile.case.name / "steps.csv")
+    assert pile.sustained_decides(strip).all()
+    steps = deck.read_table(strip / pile.case.name / "steps.csv")
     assert (steps["sustained"] <= steps["moved"]).all()
+
+
+@pytest.mark.long
+def test_a_strip_of_another_version_counts_where_its_inputs_are_the_same(
+    strip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "strip.toml"
+    file.write_text(
+        STRIP.replace("width = 4.0", "width = 4.0\ndropped_grains = 2")
+        + "[[group]]\nname = 'water'\n",
+        encoding="utf-8",
+    )
+    rows = runpy.run_path(str(TOOL))["rows"]
+    monkeypatch.setitem(rows.__globals__, "STUDY", file)
+    cases = shutil.copytree(strip, tmp_path / "cases")
+    (case,) = cases.glob("followed-*")
+    found = [*rows(cases)]
+    assert len(found) == len(deck.read_table(case / "steps.csv")) > 0
+    assert {row["dropped_grains"] for row in found} == {2}
+
+    state = json.loads((case / "done.json").read_text(encoding="utf-8"))
+    state["code_sha256"] = "of another version"
+    (case / "done.json").write_text(json.dumps(state), encoding="utf-8")
+    assert [*rows(cases)] == found
+
+    about = json.loads((case / "case.json").read_text(encoding="utf-8"))
+    about["inputs_sha256"]["load_steps.txt"] = "of another flow"
+    (case / "case.json").write_text(json.dumps(about), encoding="utf-8")
+    with pytest.warns(UserWarning, match="1 case made by other code"):
+        assert [*rows(cases)] == []

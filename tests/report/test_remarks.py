@@ -5,7 +5,7 @@ from pathlib import Path
 import pandas as pd
 
 from orchestrator.fidelity import crest
-from orchestrator.report import answers, remarks, sheets
+from orchestrator.report import answers, labels, remarks, sheets
 from orchestrator.report.results import Results
 from tests import small_study
 from tests.report.conftest import changed, copies, only
@@ -119,3 +119,33 @@ def test_a_pile_with_an_edge_is_told_what_its_mesh_is_worth(
     poured = small_study.run(tmp_path, SEEDS_IN_WATER)
     assert remarks.SHARP_CREST not in remarks.remarks(poured)
     assert not [one for one in answers.card(poured).numbers if moved in one.note]
+
+
+def test_grains_that_dem_follows_are_answered_by_no_force_law(results: Results) -> None:
+    heap = only(results, "pile")
+    scenes = heap.tables["scenes"]
+    table = heap.tables["pile_threshold"].assign(level_ustar_m_s=0.309)
+    table = table.assign(compared_level_ustar_m_s=0.3)
+    law = labels.value("force_law", scenes["force_law"].iloc[0])
+    told = {}
+    for dropped in (None, 0):
+        of = changed(
+            heap, scenes=scenes.assign(dropped_grains=dropped), pile_threshold=table
+        )
+        (said,) = [
+            each
+            for each in remarks.remarks(of)
+            if "predicts the threshold" in each.head
+        ]
+        sheet = sheets.short(of)
+        assert sheet is not None
+        told[dropped] = said.head, said.text, " ".join(sheet.shared)
+    head, text, shared = told[None]
+    assert head.startswith("The model overpredicts")
+    assert f"the force law {law} asks for" in text
+    assert law in shared
+    head, text, shared = told[0]
+    assert head.startswith("The closed form of one grain overpredicts")
+    assert head.endswith(" by a factor of 1.03.")
+    assert "Grains that DEM follows have no force law" in text
+    assert law not in shared

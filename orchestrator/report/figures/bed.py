@@ -360,6 +360,8 @@ def bed_caption(results: Results, pile: Pile) -> str:
     displacement = pile.scene.threshold.displacement
     columns = ["z0_over_d", "packing", "force_law"]
     columns += labels.varying(results.beds("pile"), "alpha_deg", "d_m", *columns)
+    if pile.scene.is_followed:
+        columns.remove("force_law")
     properties = []
     for column in columns:
         used = fields.COLUMNS[column].used(pile.scene)

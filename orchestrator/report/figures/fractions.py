@@ -77,9 +77,10 @@ CAPTION = """\
 paper. Each marker is a flow: the fraction of the N(d) exposed grains that had moved,
 against {{ {"shields": "τ", "reynolds": "Re*"}[along] }} of the mean {{ about.stress
 }} over these grains, as in the paper. The mean falls where the next grains to move feel
-less stress. Above n/N = 90 % a curve may leave the frame. Forces: {{ laws(about,
-"Between the two") }}. {{ protocol(about) }} {{ is_open(about) }} {{ low_regime(about)
-}}"""
+less stress. Above n/N = 90 % a curve may leave the frame. Forces: {% if
+about.is_followed %}the drag of a grain's velocity relative to the fluid{% else %}{{
+laws(about, "Between the two") }}{% endif %}. {{ protocol(about) }} {{ is_open(about) }}
+{{ low_regime(about) }}"""
 
 
 def draw(results: Results) -> Iterator[Figure]:
