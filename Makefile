@@ -32,8 +32,12 @@ calibration: setup  ## measure numerical errors, maps and intervals anew, for th
 	$(PYTHON) -m orchestrator validate
 	cp results/stability/tables/maps.csv orchestrator/fidelity/calibration/
 	$(PYTHON) -m orchestrator study paper
-	$(PYTHON) tools/beside_dem.py results/paper > beside.csv
-	$(PYTHON) tools/calibration.py results/ladder/tables/scene_errors.csv beside.csv
+	$(PYTHON) tools/random_piles.py dem > results/random.toml
+	$(PYTHON) -m orchestrator study results/random.toml
+	$(PYTHON) tools/random_piles.py peeling > results/meshes.toml
+	$(PYTHON) -m orchestrator ladder results/meshes.toml --out results/meshes
+	$(PYTHON) tools/beside_dem.py results/paper results/random > beside.csv
+	$(PYTHON) tools/calibration.py results/ladder/tables/scene_errors.csv results/meshes/tables/scene_errors.csv beside.csv
 	rm beside.csv
 	$(PYTHON) tools/domain.py > domain.csv
 	mv domain.csv orchestrator/fidelity/calibration/

@@ -1,18 +1,20 @@
-"""Errors of pivots and peeling beside DEM, on piles of a finished study by DEM.
+"""Errors of pivots and peeling beside DEM, on piles of finished studies by DEM.
 
-python tools/beside_dem.py results/paper > beside.csv
+python tools/beside_dem.py results/paper results/random > beside.csv
 
 The reference of the preset `ladder`, with load steps of 0.4 %, takes an hour on a pile
-of 700 grains. Of piles of the preset `paper` the errors are those from DEM as the study
-has it, whose load steps are 3 % apart: they contain its own. `PILES` are the diameters
-from which the calibration is made; those of other diameters are left for its test.
+of 700 grains. Of piles of the preset `paper`, and of random ones (`random_piles.py`),
+the errors are those from DEM as the study has it, whose load steps are 3 % and 1 %
+apart: they contain its own. `PILES` are the diameters of `paper` from which the
+calibration is made; those of other diameters are left for its test.
 """
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pandas as pd
+import random_piles
 
 from orchestrator.fidelity.classes import GRAINS, LIFTED, scene_class
 from orchestrator.fidelity.fidelities import PAIRS
@@ -35,13 +37,22 @@ QUASI_STATIC = ("quick", "static")
 
 
 def scenes() -> Iterator[Scene]:
-    """The piles of the preset `paper` of which the calibration is made.
+    """All piles beside whose DEM the calibration is made.
 
     Yields
     ------
     Scene
-        A pile. Grains that lift carries off are not among them, whose law does not
-        hold; nor are level rows, whose chains go as round-off decides.
+        A pile.
+    """
+    yield from _of_paper()
+    yield from _random()
+
+
+def _of_paper() -> Iterator[Scene]:
+    """The piles of the preset `paper` of which the calibration is made.
+
+    Grains that lift carries off are not among them, whose law does not hold; nor are
+    level rows, whose chains go as round-off decides.
     """
     for scene in study.load("paper").scenes:
         bed = scene.bed
@@ -54,20 +65,29 @@ def scenes() -> Iterator[Scene]:
             yield scene
 
 
-def rows(cases: Path) -> Iterator[Row]:
+def _random() -> Iterator[Scene]:
+    """The random piles of the calibration, but for grains that lift carries off."""
+    for scene in random_piles.load(random_piles.CALIBRATION, "dem").scenes:
+        if not scene_class(GRAINS, scene).endswith(LIFTED):
+            yield scene
+
+
+def rows(cases: Path, piles: Iterable[Scene]) -> Iterator[Row]:
     """Compare pivots and peeling with DEM, on the same flow, where DEM is done.
 
     Parameters
     ----------
     cases
-        The finished cases of the study.
+        The finished cases of a study.
+    piles
+        The piles of it that are compared.
 
     Yields
     ------
     dict
         A row for each rung, pile and fraction, as `ladder.scene_errors` has it.
     """
-    for scene in scenes():
+    for scene in piles:
         assert isinstance(scene.bed, PileBed)
         fractions = scene.threshold.fractions
         by_dem_pile = Pile(scene)
@@ -91,4 +111,6 @@ def rows(cases: Path) -> Iterator[Row]:
 
 
 if __name__ == "__main__":
-    sys.stdout.write(csv(pd.DataFrame(rows(Path(sys.argv[1]) / "cases"))))
+    paper, random = (Path(folder) / "cases" for folder in sys.argv[1:])
+    found = [*rows(paper, _of_paper()), *rows(random, _random())]
+    sys.stdout.write(csv(pd.DataFrame(found)))

@@ -3,7 +3,7 @@
 python tools/calibration.py
 python tools/calibration.py results/ladder/tables/scene_errors.csv beside.csv
 
-The second form first puts the errors of a run of the ladder and those of
+The second form first puts the errors of runs of the ladder and those of
 `tools/beside_dem.py` together, as docs/measured/scene_errors.csv.
 """
 
@@ -12,12 +12,18 @@ from pathlib import Path
 
 import pandas as pd
 
+from orchestrator.fidelity.classes import FLOW
 from orchestrator.fidelity.measured import FOLDER
 from orchestrator.lab import calibration
-from orchestrator.lab.ladder import AGAIN_OF
+from orchestrator.lab.ladder import AGAIN_OF, RUNGS
+from orchestrator.study.models import SOLVE
 from orchestrator.tables import csv
 
 STORED = Path(__file__).parents[1] / "docs" / "measured" / "scene_errors.csv"
+UNSOLVED = [
+    rung.name for rung in RUNGS[FLOW] if rung.sets["method.flow.model"] != SOLVE.name
+]
+"""Rungs of the flow that no fidelity has: the ladder alone compares them."""
 ABOUT = ["part", "rung", "scene_class", "pile", "geometry", "cost_core_s"]
 
 
@@ -64,7 +70,9 @@ def main() -> None:
     """Write the half widths, and before them what they are made of."""
     if sys.argv[1:]:
         rows = pd.concat(map(pd.read_csv, sys.argv[1:]), ignore_index=True)
-        STORED.write_text(csv(wide(rows)), encoding="utf-8")
+        STORED.write_text(
+            csv(wide(rows[~rows["rung"].isin(UNSOLVED)])), encoding="utf-8"
+        )
     table = calibration.half_widths(long(pd.read_csv(STORED)), AGAIN_OF)
     (FOLDER / "errors.csv").write_text(csv(table), encoding="utf-8")
 

@@ -4,6 +4,7 @@ import runpy
 from collections import Counter
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
@@ -64,18 +65,27 @@ def table() -> pd.DataFrame:
     return pd.read_csv(domain.FILE, keep_default_na=False, na_values=[""])
 
 
-def test_the_stored_domain_is_that_of_the_scenes_that_were_measured() -> None:
+@pytest.fixture
+def tools(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """What the tools of the domain know: the piles beside DEM, and the pairs of rungs."""
+    monkeypatch.syspath_prepend(TOOLS)
+    return runpy.run_path(str(TOOLS / "domain.py"))
+
+
+def test_the_stored_domain_is_that_of_the_scenes_that_were_measured(tools: Any) -> None:
     """A field that is new has its values here: `python tools/domain.py` writes it anew."""
-    pairs = ladder.decisions(study.load("ladder"))
-    beside = runpy.run_path(str(TOOLS / "beside_dem.py"))["scenes"]()
-    made = csv(ladder.measured_domain(pairs.values(), beside))
+    beside = tools["beside_dem"].scenes()
+    made = csv(ladder.measured_domain(tools["pairs"](), beside))
     assert made == domain.FILE.read_text(encoding="utf-8")
 
 
-def test_the_scenes_of_the_domain_are_those_of_the_errors() -> None:
-    """Else scenes would count as measured that the preset has and nobody has run."""
+def test_the_scenes_of_the_domain_are_those_of_the_errors(tools: Any) -> None:
+    """Else scenes would count as measured that nobody has run."""
     counted: dict[str, set[tuple[str, str]]] = {FLOW: set(), GRAINS: set()}
-    for scene, bed in piles(study.load("ladder")).items():
+    random_piles = tools["random_piles"]
+    random = random_piles.load(random_piles.CALIBRATION, "peeling")
+    measured = {**piles(study.load("ladder")), **piles(random)}
+    for scene, bed in measured.items():
         # a pile of both criteria of motion is one
         pile = changed(scene, {"threshold.criterion": ENTRAINED}).id
         if not bed.is_level:
@@ -86,7 +96,7 @@ def test_the_scenes_of_the_domain_are_those_of_the_errors() -> None:
     for part, rows in stored.groupby("part"):
         found = Counter(rows["scene_class"])
         assert found == Counter(name for name, _ in counted[str(part)])
-    beside = runpy.run_path(str(TOOLS / "beside_dem.py"))["scenes"]()
+    beside = tools["beside_dem"].scenes()
     piles_ = Counter(scene_class(GRAINS, scene) for scene in beside)
     rows = pd.read_csv(SCENE_ERRORS).query("part == 'grains' and rung == 'static'")
     more = Counter(rows["scene_class"]) - Counter(

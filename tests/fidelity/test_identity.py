@@ -152,7 +152,7 @@ def test_a_method_that_is_asked_for_answers_whatever_other_groups_leave_open() -
     )
     assert (first, second) == (fourth, third)
     assert first[2] == "standard"
-    assert second[2] == "static flow, paper grains"
+    assert second[2] == "quick flow, paper grains"
     assert first[0] != second[0]
 
 
