@@ -3,13 +3,13 @@
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from orchestrator.bed.line import BedLine, of_bed
 from orchestrator.flow import between, theory
 from orchestrator.flow.case import FlowCase
 from orchestrator.flow.run import SPEED_HEIGHT, WALL_STRESS
-from orchestrator.flow.stress import WallStress
+from orchestrator.flow.stress import Measure, WallStress
 from orchestrator.physics.velocity import log_law_speed
 from orchestrator.runs.files import state_of
 from orchestrator.study import models
@@ -118,25 +118,24 @@ class Solve(FlowModel):
 
     def stress(self, cases: Path) -> WallStress:
         """The stress that the finished run left, or that between those of some."""
-        solved = self._solved(cases)
-        if len(solved) == 1:
-            return next(iter(solved.values()))
-        return between.stress(self.scene.solve_roughness, solved)
+        runs = self._finished(cases)
+        if len(runs) == 1:
+            return _read(*runs[0][1:])
+        return _stress_between(self.scene.solve_roughness, runs)
 
     def error(self, cases: Path) -> float:
         """Measure how far the stress between solved flows is off; 0 if it is solved."""
-        solved = self._solved(cases)
-        if len(solved) == 1:
+        runs = self._finished(cases)
+        if len(runs) == 1:
             return 0.0
-        return between.error(solved, self.scene.forces.stress)
+        return _error_between(self.scene.forces.stress, runs)
 
-    def _solved(self, cases: Path) -> dict[float, WallStress]:
-        """The stress that each finished run left, by its roughness length, m."""
-        found = {}
-        for run in self.cases:
-            path = cases / run.name / WALL_STRESS
-            found[run.roughness_m] = _read(path, state_of(path))
-        return found
+    def _finished(self, cases: Path) -> "tuple[_Finished, ...]":
+        """The files of the finished runs as they are now."""
+        paths = [(run, cases / run.name / WALL_STRESS) for run in self.cases]
+        return tuple(
+            _Finished(run.roughness_m, path, state_of(path)) for run, path in paths
+        )
 
 
 class Waves(FlowModel):
@@ -193,10 +192,38 @@ def of_scene(scene: Scene) -> FlowModel:
     return MODELS[scene.method.flow.facts](scene)
 
 
+class _Finished(NamedTuple):
+    """A finished run: its roughness length, m, and the file that it left.
+
+    `state` says which file that is: another has another one.
+    """
+
+    roughness_m: float
+    path: Path
+    state: tuple[int, ...]
+
+
 @lru_cache(maxsize=256)
 def _read(path: Path, state: tuple[int, ...]) -> WallStress:
     """The stress in a file as it is now: hundreds of piles share a flow."""
     return WallStress.from_csv(path)
+
+
+def _solved(runs: tuple[_Finished, ...]) -> dict[float, WallStress]:
+    """The stress that each finished run left, by its roughness length, m."""
+    return {run.roughness_m: _read(run.path, run.state) for run in runs}
+
+
+@lru_cache(maxsize=256)
+def _stress_between(roughness: float, runs: tuple[_Finished, ...]) -> WallStress:
+    """The stress that lies between those of some runs: piles share it, too."""
+    return between.stress(roughness, _solved(runs))
+
+
+@lru_cache(maxsize=256)
+def _error_between(measure: Measure, runs: tuple[_Finished, ...]) -> float:
+    """How far the stress between those of some runs is off."""
+    return between.error(_solved(runs), measure)
 
 
 def _case(scene: Scene, roughness: float) -> FlowCase:

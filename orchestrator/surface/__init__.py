@@ -37,6 +37,11 @@ def take_over(study: "Study[Any]", options: Namespace) -> int | None:
     InputError
         If an option is given that such beds do not have.
     """
+    from orchestrator.study.study import PLANE
+
+    if study.kind is PLANE:
+        # the most common answer needs nothing of this package
+        return None
     from orchestrator.surface.study import SURFACES
 
     if study.kind is not SURFACES:

@@ -6,12 +6,13 @@ in `timings`.
 """
 
 import re
-from collections.abc import Callable, Container, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from csv import writer
 from fnmatch import fnmatchcase
-from functools import cache
+from functools import cache, partial
 from io import BytesIO, StringIO
 from itertools import chain
+from math import ceil
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -24,6 +25,7 @@ from orchestrator.grains.pile import Pile
 from orchestrator.physics import beside, verdict
 from orchestrator.physics.reported import OF_CHANNELS, REPORTED
 from orchestrator.plan import Plan
+from orchestrator.runs import second
 from orchestrator.runs.files import Folder, digest_text
 from orchestrator.study import fields
 from orchestrator.study.study import Study
@@ -36,6 +38,9 @@ from orchestrator.types import Row
 
 Tables = Mapping[str, pd.DataFrame]
 """Tables by their names."""
+PART = 4
+"""Piles whose rows are made by one process in one go: neighbours in a study share
+packings, and the flows that theirs lie between."""
 
 
 TIMINGS: Mapping[str, str] = {
@@ -159,27 +164,27 @@ def make_tables(study: Study, plan: Plan, cases: Path, done: Container[str]) -> 
         The tables that have rows, in the study's order.
     """
     flows: dict[str, Pile] = {}
-    answers = []
+    answered = {}
     for scene_id, pile in plan.piles.items():
         for name, solve in pile.solves.items():
             if name in done:
                 flows[name] = solve
         if pile.is_run(done):
-            smoothed = _smoothed(plan, scene_id, done)
-            decision = plan.decisions[scene_id]
-            answers.append(rows.Answer(decision, pile, cases, smoothed))
+            answered[scene_id] = pile
+    answer_of = partial(_answer, plan, cases, done)
+    told = _of_piles([*answered], answer_of)
     scenes = pd.DataFrame(rows.scenes(study, plan))
     methods = pd.DataFrame(rows.methods(plan))
     asked = with_methods(scenes, methods)
     grains = _single_grains(plan, cases, done)
-    thresholds = with_scatter(_listed(rows.pile_threshold, answers), asked)
+    thresholds = with_scatter(_listed(each.thresholds for each in told), asked)
     checks = with_agreement(
         pd.DataFrame(rows.check_rows(plan, cases, done)), thresholds
     )
-    against = contradictions(checks)
-    beds = with_usable(thresholds, asked, study.tolerance, against)
+    beds = with_usable(thresholds, asked, study.tolerance, contradictions(checks))
     lone = with_usable(grains, asked, study.tolerance)
-    curves = _stacked(map(rows.pile_curve, answers))
+    curves = _stacked(each.curve for each in told)
+    classes = _listed(each.classes for each in told)
     made = {
         "scenes": scenes,
         "methods": methods,
@@ -188,17 +193,38 @@ def make_tables(study: Study, plan: Plan, cases: Path, done: Container[str]) -> 
             rows.wall_stress(pile, cases) for pile in flows.values()
         ),
         "flow": pd.DataFrame([rows.flow(pile, cases) for pile in flows.values()]),
-        "pile_grain": _stacked(map(rows.pile_grain, answers)),
+        "pile_grain": _stacked(each.grains for each in told),
         "pile_curve": curves,
         "pile_threshold": beds.table,
         "reason": pd.concat([beds.reasons, lone.reasons], ignore_index=True),
-        "size_class": of_classes(_listed(rows.size_class, answers), beds.table),
-        "bed_change": _stacked(rows.bed_changes(answers)),
-        "form": _listed(rows.forms, answers),
+        "size_class": of_classes(classes, beds.table),
+        "bed_change": _stacked(rows.bed_changes(answered, answer_of)),
+        "form": _listed(each.forms for each in told),
         "paired": paired.paired(beds.table, curves, asked),
         "check": checks,
     }
     return {name: table for name, table in made.items() if not table.empty}
+
+
+def _answer(
+    plan: Plan, cases: Path, done: Container[str], scene_id: str
+) -> rows.Answer:
+    """The answer to the scene of a pile whose runs are done."""
+    smoothed = _smoothed(plan, scene_id, done)
+    return rows.Answer(plan.decisions[scene_id], plan.piles[scene_id], cases, smoothed)
+
+
+def _of_piles(
+    answered: Sequence[str], answer_of: Callable[[str], rows.Answer]
+) -> list[rows.OfPile]:
+    """The rows of each pile, in which grains without a run move, by two processes."""
+
+    def of_part(part: int) -> list[rows.OfPile]:
+        chosen = answered[PART * part : PART * (part + 1)]
+        return [rows.of_pile(answer_of(scene_id)) for scene_id in chosen]
+
+    parts = second.shared(of_part, ceil(len(answered) / PART))
+    return [*chain.from_iterable(parts)]
 
 
 def _single_grains(plan: Plan, cases: Path, done: Container[str]) -> pd.DataFrame:
@@ -286,11 +312,9 @@ def _smoothed(plan: Plan, scene_id: str, done: Container[str]) -> dict[float, Pi
     return {factor: pile for factor, pile in piles.items() if pile.is_run(done)}
 
 
-def _listed(
-    rows_of: Callable[[rows.Answer], Iterable[Row]], answers: Iterable[rows.Answer]
-) -> pd.DataFrame:
-    """The rows of all answers below each other."""
-    return pd.DataFrame(chain.from_iterable(map(rows_of, answers)))
+def _listed(parts: Iterable[Iterable[Row]]) -> pd.DataFrame:
+    """The rows of all parts below each other."""
+    return pd.DataFrame(chain.from_iterable(parts))
 
 
 def _stacked(parts: Iterable[Row]) -> pd.DataFrame:

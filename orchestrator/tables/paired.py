@@ -76,12 +76,14 @@ def paired(
     DataFrame
         A row for each threshold and each first motion that has such a bed.
     """
-    if thresholds.empty or not _has_shelter(scenes):
+    if thresholds.empty:
         return pd.DataFrame()
     lacking = scenes.columns.difference(thresholds.columns, sort=False)
     rows = thresholds.merge(
         scenes[["scene_id", *lacking]], on="scene_id", validate="many_to_one"
     )
+    if not _has_shelter(rows):
+        return pd.DataFrame()
     of_scene = {str(name): part for name, part in curves.groupby("scene_id")}
     found = pd.DataFrame(_pairs(rows, of_scene))
     if found.empty:
@@ -90,9 +92,9 @@ def paired(
     return _of_seeds(found.drop_duplicates(["scene_id", "without_id", "fraction"]))
 
 
-def _has_shelter(scenes: pd.DataFrame) -> bool:
-    """Whether beds differ in what shelters them."""
-    return any(scenes[name].nunique(dropna=False) > 1 for name in SHELTER)
+def _has_shelter(beds: pd.DataFrame) -> bool:
+    """Whether beds differ in what shelters them; single grains have none."""
+    return any(beds[name].nunique(dropna=False) > 1 for name in SHELTER)
 
 
 def _pairs(rows: pd.DataFrame, curves: Mapping[str, pd.DataFrame]) -> Iterator[Row]:

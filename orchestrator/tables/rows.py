@@ -1,6 +1,6 @@
 """The rows of the tables: scenes, single grains, flows, and piles with their grains."""
 
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from contextlib import suppress
 from functools import cached_property
 from math import ceil, hypot, isfinite, log, nan
@@ -1281,29 +1281,35 @@ BED_CHANGE: Mapping[str, str] = {
 """Columns of `bed_changes`."""
 
 
-def bed_changes(answers: Sequence[Answer]) -> Iterator[Row]:
+def bed_changes(
+    piles: Mapping[str, Pile], answer_of: Callable[[str], Answer]
+) -> Iterator[Row]:
     """Compare piles on a bed that changes with the same on a frozen bed.
 
     The two are answered alike in all else, by one method on one mesh.
 
     Parameters
     ----------
-    answers
-        The piles with their results.
+    piles
+        The piles whose runs are done, by the ids of the asked scenes.
+    answer_of
+        Gives the answer to such a scene.
 
     Yields
     ------
     dict
         Numbers, and columns of shape (n,): thresholds for the first to the n-th grain.
     """
-    frozen = {each.pile.scene.id: each for each in answers}
-    for answer in answers:
-        scene = answer.pile.scene
-        if not scene.threshold.update:
+    changing = [one for one in piles if piles[one].scene.threshold.update]
+    if not changing:
+        return
+    frozen = {pile.scene.id: asked for asked, pile in piles.items()}
+    for asked in changing:
+        scene = piles[asked].scene
+        found = frozen.get(changed(scene, {"threshold.update": 0.0}).id)
+        if found is None:
             continue
-        twin = frozen.get(changed(scene, {"threshold.update": 0.0}).id)
-        if twin is None:
-            continue
+        answer, twin = answer_of(asked), answer_of(found)
         count = answer.motion.count
         moved = np.arange(1, _needed(max(scene.threshold.fractions), count) + 1)
         tau, ustar = _thresholds_of(answer, moved / count)
@@ -1386,3 +1392,43 @@ def check_rows(plan: Plan, cases: Path, done: Container[str]) -> Iterator[Row]:
                 "difference": ours.tau / theirs.tau - 1,
                 "case": dem.case.name,
             }
+
+
+class OfPile(NamedTuple):
+    """The rows of one pile, in the tables that its own results alone make.
+
+    Attributes
+    ----------
+    thresholds, classes, forms
+        Those of `pile_threshold`, `size_class` and `forms`.
+    curve, grains
+        Those of `pile_curve` and `pile_grain`.
+    """
+
+    thresholds: list[Row]
+    classes: list[Row]
+    forms: list[Row]
+    curve: Row
+    grains: Row
+
+
+def of_pile(answer: Answer) -> OfPile:
+    """Make the rows of one pile.
+
+    Parameters
+    ----------
+    answer
+        The pile with its results.
+
+    Returns
+    -------
+    OfPile
+        The rows.
+    """
+    return OfPile(
+        [*pile_threshold(answer)],
+        [*size_class(answer)],
+        [*forms(answer)],
+        pile_curve(answer),
+        pile_grain(answer),
+    )

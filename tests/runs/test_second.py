@@ -58,6 +58,22 @@ def test_pieces_of_a_process_that_dies_are_done(tmp_path: Path) -> None:
     assert second.shared(work, 5) == [*range(5)]
 
 
+def test_a_piece_that_fails_there_is_done_here_without_a_word(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    first = os.getpid()
+
+    def work(number: int) -> int:
+        if os.getpid() != first:
+            (tmp_path / "failed").touch()
+            raise MemoryError
+        until((tmp_path / "failed").exists)
+        return number
+
+    assert second.shared(work, 5) == [*range(5)]
+    assert capfd.readouterr() == ("", "")
+
+
 def test_a_failure_here_ends_the_second_process(tmp_path: Path) -> None:
     first = os.getpid()
 
