@@ -20,6 +20,7 @@ from orchestrator.plan import Plan
 from orchestrator.report import page, style
 from orchestrator.report.page import Section
 from orchestrator.runs import case, reuse, workspace
+from orchestrator.runs.engine import Display
 from orchestrator.runs.files import Folder
 from orchestrator.runs.workspace import EXPERIMENT, Workspace, claimed
 from orchestrator.study.parts import PileBed
@@ -228,14 +229,13 @@ class Experiment(ABC):
                 what = f"{number(taken, 'case')} of other results taken"
                 print(f"{what}; no solver was started for them", file=sys.stderr)
             todo = self._todo(space.cases)
-            failed = pipeline.complete(
-                todo,
-                space,
-                workers=workers,
-                limit_s=self.limit_s,
-                failing=self.failing,
-            )
-            sections = self._write(folder, space, failed)
+            after_s = self.planned.drawing_s
+            shown = Display(space.cases, workers, after_s, self.failing)
+            with shown as display:
+                failed = pipeline.complete(todo, space, display, limit_s=self.limit_s)
+                display.drawing(0.0, "tables and page")
+                sections = self._write(folder, space, failed)
+                display.end()
         failures = {}
         for name, error in failed.items():
             if self.failing is None or name in self.failing:

@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -15,6 +15,7 @@ from orchestrator.plan import Plan
 from orchestrator.report.results import Results
 from orchestrator.runs import case, cluster, engine, reuse, terminal, workspace
 from orchestrator.runs.case import Case
+from orchestrator.runs.engine import Display
 from orchestrator.runs.queues import Queue
 from orchestrator.runs.workspace import EXPERIMENT, STATE, STUDY, Workspace, claimed
 from orchestrator.study.own_errors import noted
@@ -25,6 +26,8 @@ Failures = Mapping[str, OrchestratorError]
 States = Mapping[str, Any]
 COMMANDS = {"surface": "study", "surfaces": "validate --surfaces PART"}
 """Commands of the experiments whose names are other ones."""
+OF_TABLES = 0.5
+"""Share of the time after the last case that tables take, nearly."""
 
 
 class Finished(NamedTuple):
@@ -108,10 +111,11 @@ def run(
     space = Workspace(out.absolute())
     # what cannot be answered is refused before anything is written
     planned = plan.make(study, cases=space.cases)
-    with claimed(space.root, STUDY, study.name):
+    shown = Display(space.cases, workers, planned.drawing_s)
+    with claimed(space.root, STUDY, study.name), shown as display:
         changed = _describe(study, planned, space)
         planned, states, failures, started = _completed(
-            study, planned, space, workers, queue
+            study, planned, space, queue, display
         )
         if not started and planned.cases:
             print("every case was done already; no solver was started", file=sys.stderr)
@@ -120,8 +124,9 @@ def run(
         answer = space.answer(planned.ids)
         undrawn: Sequence[str] = ()
         if started or answer is None:
-            print("drawing tables, figures and page", file=sys.stderr)
-            answer, undrawn = _draw(study, planned, space, states, failures, False)
+            answer, undrawn = _draw(
+                study, planned, space, states, failures, display, every=False
+            )
         left = space.left(planned.cases) if changed else []
         if left:
             what = f"{len(left)} cases are not asked for any more"
@@ -134,7 +139,11 @@ def run(
 
 
 def _completed(
-    study: Study, planned: Plan, space: Workspace, workers: int, queue: Queue | None
+    study: Study,
+    planned: Plan,
+    space: Workspace,
+    queue: Queue | None,
+    display: Display,
 ) -> tuple[Plan, dict[str, Any], Failures, int]:
     """Run what is missing, and what the finished flows show to be missing.
 
@@ -147,14 +156,7 @@ def _completed(
         states = reuse.done(planned.cases, space.cases)
         missing = planned.missing(space.cases, states)
         todo = {name: case for name, case in missing.items() if name not in failed}
-        found = complete(
-            todo,
-            space,
-            workers=workers,
-            limit_s=study.time_limit_s,
-            queue=queue,
-            after_s=planned.drawing_s,
-        )
+        found = complete(todo, space, display, limit_s=study.time_limit_s, queue=queue)
         failed |= found
         started += len(todo)
         if todo:
@@ -195,12 +197,10 @@ def _with_advice(failures: Failures, planned: Plan) -> Failures:
 def complete(
     todo: dict[str, Case],
     space: Workspace,
+    display: Display,
     *,
-    workers: int,
     limit_s: float,
     queue: Queue | None = None,
-    after_s: float = 0.0,
-    failing: Container[str] | None = None,
 ) -> Failures:
     """Run cases, and show their progress.
 
@@ -210,16 +210,12 @@ def complete(
         The cases by their names.
     space
         The directory of results.
-    workers
-        Number of cases at a time.
+    display
+        Shows the progress of the command.
     limit_s
         Most time of a case, s.
     queue
         The queue of a cluster, which runs the cases in place of this machine.
-    after_s
-        Time that is expected after the runs, s.
-    failing
-        Names of the cases of which it is told why they failed; None for all.
 
     Returns
     -------
@@ -228,10 +224,9 @@ def complete(
     """
     if not todo:
         return {}
+    display.add(todo.values())
     pools = partial(cluster.pool, queue) if queue else engine.local
-    opened = pools(space.cases, workers=workers, limit_s=limit_s)
-    shown = engine.Display(todo.values(), space.cases, workers, after_s, failing)
-    with opened as pool, shown as display:
+    with pools(space.cases, workers=display.workers, limit_s=limit_s) as pool:
         return engine.run(todo, pool, display, display.watch)
 
 
@@ -299,6 +294,10 @@ def redraw(out: Path, *, every: bool = False) -> Finished:
     study, planned = reopen(space)
     with claimed(space.root, STUDY, study.name, new=False):
         states = reuse.done(planned.cases, space.cases)
+        # flows that another version has read say only now whether others are needed
+        while (refined := plan.refined(planned, space.cases)) is not planned:
+            planned = refined
+            states = reuse.done(planned.cases, space.cases)
         space.check_cases_of_tables(states)
         failed = {}
         for name in planned.cases:
@@ -306,7 +305,10 @@ def redraw(out: Path, *, every: bool = False) -> Finished:
             if why:
                 failed[name] = OrchestratorError(why)
         failures = _with_advice(failed, planned)
-        answer, undrawn = _draw(study, planned, space, states, failures, every)
+        with Display(space.cases, 1, planned.drawing_s) as display:
+            answer, undrawn = _draw(
+                study, planned, space, states, failures, display, every=every
+            )
         return Finished(space.page, 0, failures, answer, undrawn)
 
 
@@ -348,6 +350,8 @@ def _draw(
     space: Workspace,
     done: States,
     failures: Failures,
+    display: Display,
+    *,
     every: bool,
 ) -> tuple[str, Sequence[str]]:
     """Write tables, figures and page, and last the marker of what they are made of.
@@ -358,11 +362,13 @@ def _draw(
     """
     space.drop(STATE)
     states = {name: done[name] for name in planned.cases if name in done}
+    display.drawing(0.0, "tables")
     made = tables.make_tables(study, planned, space.cases, states)
     results = Results(study, planned, made, space.cases)
     times = tables.timings(planned, states)
     causes = {name: str(error) for name, error in failures.items()}
     cards = guests.cards(study, made)
+    display.drawing(OF_TABLES, "figures and page")
     with space.renewed():
         written = tables.write_tables(made, space, "tables")
         tables.write_tables({"timings": times}, space, "timings")
@@ -377,4 +383,6 @@ def _draw(
     terminal.check_signals()
     if not failures and not undrawn:
         space.note_answer(planned.ids, answer)
+    if not undrawn:
+        display.end()
     return answer, undrawn

@@ -408,14 +408,14 @@ def _lost(error: BaseException, where: str) -> SolverError:
 
 
 class Display:
-    """Shows how far a study is.
+    """Shows how far a command is, from its first case to its page.
 
-    On a terminal it is a bar, elsewhere a line for each case that ends.
+    On a terminal it is one bar, elsewhere a line for each case that ends and for each
+    part of the drawing. Cases that are found to be missing on the way are added: the
+    share that is done stays, and the rest takes longer.
 
     Parameters
     ----------
-    todo
-        The cases that are not done.
     cases
         Directory of the cases.
     workers
@@ -427,6 +427,8 @@ class Display:
 
     Attributes
     ----------
+    workers
+        Number of cores that the cases share.
     done
         Share of the work that is done, 0 to 1.
     left_s
@@ -438,7 +440,6 @@ class Display:
 
     def __init__(
         self,
-        todo: Collection[Case],
         cases: Path,
         workers: int,
         after_s: float,
@@ -448,43 +449,63 @@ class Display:
         from rich.progress import BarColumn, Progress, TextColumn
 
         self._cases = cases
-        self._workers = workers
+        self.workers = workers
         self._after_s = after_s
         self._failing = failing
-        # costs of all cases, and of those that have not ended
-        self._whole_s = sum(case.cost_s for case in todo)
-        self._left_s = self._whole_s
+        # costs of the cases that have not ended
+        self._left_s = 0.0
         # costs and times of the cases that have ended
         self._expected_s = 0.0
         self._took_s = 0.0
         # parts of the costs of running cases that are done, by name
         self._going_s: dict[str, float] = {}
-        self._count = len(todo)
+        # share of the drawing that is done
+        self._drawn = 0.0
+        # share that was done when cases were last added, and time of the rest, s
+        self._before = 0.0
+        self._rest_s = after_s
+        self._count = 0
         self._ended = 0
         self._looked = -math.inf
+        self.done = 0.0
         self._console = Console(
             stderr=True,
             highlight=False,
             markup=False,
             soft_wrap=True,
         )
+        # without a thread of its own: a second process draws, see `runs.second`
         self._bar = Progress(
             TextColumn("{task.fields[ended]} cases"),
             BarColumn(),
             TextColumn("{task.description}"),
             console=self._console,
+            auto_refresh=False,
         )
         self._task = self._bar.add_task("", total=1.0, ended="")
         self._show()
 
     def __enter__(self) -> Self:
-        if sys.stderr.isatty():
-            self._bar.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         if self._bar.live.is_started:
             self._bar.stop()
+
+    def add(self, todo: Collection[Case]) -> None:
+        """Take note of cases that are to be run.
+
+        Parameters
+        ----------
+        todo
+            The cases.
+        """
+        self._before = self.done
+        self._count += len(todo)
+        self._left_s += sum(case.cost_s for case in todo)
+        self._rest_s = self._left_s / self.workers + self._after_s
+        self._start()
+        self._show()
 
     def __call__(
         self,
@@ -528,22 +549,49 @@ class Display:
             self._going_s[case.name] = share * case.cost_s
         self._show()
 
+    def drawing(self, part: float, what: str) -> None:
+        """Say what is made of the cases, now that all have ended.
+
+        Parameters
+        ----------
+        part
+            Share of the time after the last case that is over.
+        what
+            What is made next, in words.
+        """
+        self._drawn = part
+        self._start()
+        text = self._show()
+        self._console.print(f"drawing {what}  {text}")
+
+    def end(self) -> None:
+        """Say that all is done."""
+        self._drawn = 1.0
+        self._console.print(f"all is drawn  {self._show()}")
+
+    def _start(self) -> None:
+        """Show the bar, on a terminal."""
+        if sys.stderr.isatty() and not self._bar.live.is_started:
+            self._bar.start()
+
     def _show(self) -> str:
-        """Show on the bar how far the study is; the same in words."""
-        whole_s = self._whole_s / self._workers + self._after_s
+        """Show on the bar how far the command is; the same in words."""
         waiting_s = max(0.0, self._left_s - sum(self._going_s.values()))
-        cases_s = waiting_s / self._workers
+        cases_s = waiting_s / self.workers
+        after_s = (1 - self._drawn) * self._after_s
         pace = self._took_s / self._expected_s if self._took_s else 1.0
-        self.left_s = pace * cases_s + self._after_s
-        self.done = 1.0
-        if whole_s:
-            self.done = 1 - (cases_s + self._after_s) / whole_s
-        text = f"{self.done:.0%} of the work, about {human(self.left_s)} left"
+        self.left_s = pace * cases_s + after_s
+        share = (cases_s + after_s) / self._rest_s if self._rest_s else 0.0
+        self.done = 1 - (1 - self._before) * share
+        text = f"{self.done:.0%} of the work"
+        if self.left_s:
+            text += f", about {human(self.left_s)} left"
         self._bar.update(
             self._task,
             completed=self.done,
             ended=f"{self._ended}/{self._count}",
             description=text,
+            refresh=self._bar.live.is_started,
         )
         return text
 

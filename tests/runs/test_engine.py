@@ -177,7 +177,8 @@ class Sleeps(Step):
 
 def test_the_time_left_follows_the_pace_of_the_cases_so_far(tmp_path: Path) -> None:
     first, second, third = Step(10.0), Step(20.0), Step(400.0)
-    display = Display([first, second, third], tmp_path, workers=2, after_s=20.0)
+    display = Display(tmp_path, workers=2, after_s=20.0)
+    display.add([first, second, third])
     assert display.left_s == pytest.approx(430 / 2 + 20)
     display(first, 5.0, None)
     assert display.left_s == pytest.approx(0.5 * 420 / 2 + 20)
@@ -188,11 +189,45 @@ def test_the_time_left_follows_the_pace_of_the_cases_so_far(tmp_path: Path) -> N
     assert display.done == pytest.approx(1 - 20 / 235)
 
 
+def test_one_bar_goes_from_the_first_case_to_the_last_figure(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Also where cases are found to be missing when all others have ended."""
+    first, found = Step(60.0), Step(30.0)
+    display = Display(tmp_path, workers=1, after_s=40.0)
+    display.add([first])
+    shares = [display.done]
+    display(first, 60.0, None)
+    shares.append(display.done)
+    assert shares == pytest.approx([0.0, 0.6])
+    display.add([found])
+    # what is left is 70 s now, and was 40 s
+    assert (display.done, display.left_s) == pytest.approx((0.6, 70.0))
+    display(found, 30.0, None)
+    assert display.done == pytest.approx(1 - 0.4 * 40 / 70)
+    display.drawing(0.0, "tables")
+    assert display.left_s == pytest.approx(40.0)
+    display.drawing(0.75, "figures")
+    assert display.done == pytest.approx(1 - 0.4 * 10 / 70)
+    display.end()
+    assert (display.done, display.left_s) == (1.0, 0.0)
+    said = capsys.readouterr().err.splitlines()
+    assert [line.split("  ")[0] for line in said] == [
+        "[1/1] done",
+        "[2/2] done",
+        "drawing tables",
+        "drawing figures",
+        "all is drawn",
+    ]
+    assert said[-1] == "all is drawn  100% of the work"
+
+
 def test_failures_that_are_an_answer_are_counted_and_not_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     sought, other = Step(1.0), Step(2.0)
-    display = Display([sought, other], tmp_path, 2, 0.0, failing={other.name})
+    display = Display(tmp_path, 2, 0.0, failing={other.name})
+    display.add([sought, other])
     for step in (sought, other):
         display(step, 1.0, SolverError(f"{step.name} died"))
     said = capsys.readouterr().err
