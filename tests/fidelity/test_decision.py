@@ -5,9 +5,9 @@ import math
 import pytest
 
 from orchestrator.errors import InputError
-from orchestrator.fidelity import choice
+from orchestrator.fidelity import choice, decision
 from orchestrator.fidelity.classes import FLOW, LEVEL_BED, scene_class
-from orchestrator.fidelity.decision import checks, decide, written
+from orchestrator.fidelity.decision import CHECKS, checks, decide, written
 from orchestrator.fidelity.fidelities import PAIRS
 from orchestrator.fidelity.known import known
 from orchestrator.fidelity.spread import floors, model_class
@@ -290,6 +290,33 @@ def test_a_pile_whose_flow_is_that_of_dem_is_not_checked_alone(pile: MakePile) -
     assert answer.is_unchecked
     assert answer.scene.method.flow == answer.asked.method.flow
     assert not checks([answer])
+
+
+def test_of_many_groups_no_more_are_checked_than_the_share_needs(
+    pile: MakePile, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each class of numerical errors by one at least, whatever the order."""
+    assert CHECKS / (CHECKS + 1) >= 0.95 > (CHECKS - 1) / CHECKS
+    asked: list[dict[str, object]] = []
+    asked += [{"bed.slope_deg": slope} for slope in (15.0, 18.0, 19.0, 20.0)]
+    asked.append({"forces.stress": "eq10", "forces.law": "high"})
+    numbers = {"method.grains.load_increment": 0.05, "method.grains.stiffness": 1e3}
+    every = []
+    for fields in asked:
+        for height in (0.013, 0.016):
+            scene = pile({**fields, **numbers}, height=height)
+            every.append(decide(scene, 0.2))
+    groups = [checks(every[at : at + 2]) for at in range(0, len(every), 2)]
+    assert [len(group) for group in groups] == [1] * len(asked)
+    one_by_one = {name: check for group in groups for name, check in group.items()}
+    assert checks(every) == one_by_one
+    for most in (1, 2, 3):
+        monkeypatch.setattr(decision, "CHECKS", most)
+        made = checks(every)
+        assert len(made) == max(most, 2)
+        assert made.items() <= one_by_one.items()
+        assert groups[-1].keys() <= made.keys()
+        assert made == checks(every[::-1])
 
 
 def test_one_pile_of_each_kind_is_checked_by_dem(pile: MakePile) -> None:
