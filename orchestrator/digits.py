@@ -169,25 +169,27 @@ def number(count: int, noun: str) -> str:
     return f"{count} {noun}s"
 
 
-def percent(part: float) -> str:
+def percent(part: float, decimals: int = 0) -> str:
     """Write a part of a whole in percent.
 
     Parameters
     ----------
     part
         The part; 1 is the whole.
+    decimals
+        Digits behind the point.
 
     Returns
     -------
     str
-        Whole percent.
+        Percent, whole by default.
 
     Examples
     --------
-    >>> percent(0.3)
-    '30 %'
+    >>> percent(0.3), percent(0.057, 1)
+    ('30 %', '5.7 %')
     """
-    return f"{part:.0%}".replace("%", " %")
+    return f"{100 * part:.{decimals}f} %"
 
 
 def signed_percent(change: float) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.digits import number
+from orchestrator.digits import number, percent
 from orchestrator.errors import InputError
 from orchestrator.fidelity import decision, few, flows, limits, measured, smoothing
 from orchestrator.fidelity.decision import Decision, as_written, decide
@@ -355,7 +355,7 @@ def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
     if put:
         between = "lie between solved ones of other roughness"
         more_s = pace() * BESIDE / workers * sum(flow.cost_s for flow in put)
-        most = f"solved too if that is off by more than {MOST_ERROR:.1%}"
+        most = f"solved too if that differs by more than {percent(MOST_ERROR, 1)}"
         yield f"  {number(len(put), 'flow')} {between}; {most}: {human(more_s)} more"
     if plan.smoothings:
         noisy = number(len(plan.smoothings), "noisy profile")
@@ -431,7 +431,7 @@ def _not_usable(plan: Plan, tolerance: float | None) -> Iterator[str]:
             if is_plane and scene.grain.sizes is None:
                 yield "equal spheres in one plane settle into a crystal"
             elif error is None:
-                what = "the error of their fidelity on such beds is not known"
+                what = "their numerical error on such beds was not measured"
                 yield f"{what}; `orchestrator convergence` estimates it"
             elif tolerance is not None and error > tolerance * (1 + 1e-9):
                 yield "no fidelity is known to be within the tolerance"

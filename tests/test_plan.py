@@ -27,8 +27,8 @@ bed = {{ kind = "pile", slope_deg = 15.0{} }}
         (
             "",
             'method.flow.model = "waves"\nmethod.kind = "pivot"',
-            "4 thresholds of piles will not be usable: the error of their fidelity on such "
-            "beds is not known; `orchestrator convergence` estimates it",
+            "4 thresholds of piles will not be usable: their numerical error on such "
+            "beds was not measured; `orchestrator convergence` estimates it",
         ),
         (
             "",

@@ -15,6 +15,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from orchestrator.digits import percent
 from orchestrator.fidelity.fidelities import Fidelity
 from orchestrator.fidelity.known import Known
 from orchestrator.grains.pile import Pile
@@ -197,6 +198,7 @@ def _help(way: Way, ways: Sequence[Way], missed: Sequence[float], most: float) -
     uncertainties = [way.known.at(at).uncertainty or 0.0 for at in missed]
     if min(uncertainties) > most:
         least = min(uncertainties)
-        return f"the reference itself is known to {least:.1%} there: no DEM is better"
+        known = percent(least, 1)
+        return f"the reference itself is known to {known} there: no DEM is better"
     least = math.ceil(1e3 * max(way.known.at(at).total for at in missed)) / 1e3
     return f"tolerance = {least:g} is met everywhere"

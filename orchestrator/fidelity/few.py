@@ -15,7 +15,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from orchestrator.digits import number, rounded
+from orchestrator.digits import number, percent, rounded
 from orchestrator.fidelity import measured
 from orchestrator.fidelity.classes import GRAINS, scene_class
 from orchestrator.fidelity.decision import NUMBERS, Decision, Decisions
@@ -71,7 +71,7 @@ class FewRuns:
         method = self.plain.sets["method.kind"]
         held = len(self.kept) / (len(self.kept) + 1)
         of = number(len(self.design), "pile")
-        kept = f"their error is that of {len(self.kept)} kept apart ({held:.0%})"
+        kept = f"their error is that of {len(self.kept)} kept apart ({percent(held)})"
         return f"the method {method}, with factors of {of} by DEM; {kept}"
 
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from orchestrator.bed.line import BedLine, of_bed
+from orchestrator.digits import percent
 from orchestrator.errors import InputError
 from orchestrator.fidelity.decision import is_along, written
 from orchestrator.flow.model import of_scene
@@ -405,7 +406,9 @@ def _dem(scene: Scene) -> Iterator[Limit]:
     step = rules.load_increment
     if step > COARSE_STEP:
         field = "method.grains.load_increment"
-        what = f"load steps {step:.0%} apart leave the threshold that wide an interval"
+        what = (
+            f"load steps {percent(step)} apart leave the threshold so wide an interval"
+        )
         yield Limit("quiet-step", field, what, "lower it", refused=False)
 
 
@@ -414,7 +417,7 @@ def _ramp(rules: GrainMethod) -> Iterator[Limit]:
     rise = rules.load_increment / rules.waiting_time
     if rules.waiting_time >= HELD_FROM or rise <= RAMP * (1 + 1e-9):
         return
-    what = f"on a ramp of more than {RAMP:.1%} per sqrt(d/g') a grain leaves late"
+    what = f"on a ramp of more than {percent(RAMP, 1)} per √(d/g′) a grain leaves late"
     what += ": from 1 % on its threshold is 8 % and more too high"
     remedy = f"a waiting time of {HELD_FROM:g}, unless a ramp is what you want"
     field = "method.grains.load_increment"

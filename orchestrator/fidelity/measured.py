@@ -35,6 +35,8 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from orchestrator.digits import percent
+
 FOLDER = Path(__file__).with_name("calibration")
 """What was measured for the package."""
 LEAST_SCENES = 10
@@ -98,11 +100,11 @@ class Error(NamedTuple):
 
     def __str__(self) -> str:
         if self.scenes is None or math.isnan(self.coverage):
-            return f"within {self.total:.1%}"
-        held = f"{self.coverage:.0%} of {self.scenes}"
+            return f"within {percent(self.total, 1)}"
+        held = f"{percent(self.coverage)} of {self.scenes}"
         if self.confidence < 0.95:
-            held += f", for {self.confidence:.0%} since these are few"
-        return f"within {self.total:.1%}: {held}"
+            held += f", for {percent(self.confidence)} since these are few"
+        return f"within {percent(self.total, 1)}: {held}"
 
 
 NOTHING = Error(math.inf, math.inf)

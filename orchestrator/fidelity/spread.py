@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from orchestrator.digits import number
+from orchestrator.digits import number, percent
 from orchestrator.fidelity.measured import FOLDER, LEAST_SCENES
 from orchestrator.study.closed_form import closed_form
 from orchestrator.study.parts import PileBed
@@ -157,7 +157,7 @@ class Floor(NamedTuple):
     scenes: int
 
     def __str__(self) -> str:
-        return f"{self.error:.0%}, measured on {number(self.scenes, 'bed')}"
+        return f"{percent(self.error)}, measured on {number(self.scenes, 'bed')}"
 
 
 @cache

@@ -617,7 +617,7 @@ def _in_words(
     ustar0: _Interval,
 ) -> str:
     """The same in a sentence."""
-    go = f"{name}: {fraction:.0%} of the exposed grains go at θ = {theta.number}"
+    go = f"{name}: {percent(fraction)} of the exposed grains go at θ = {theta.number}"
     together = f"{theta.ends} with all choices together, most by {theta.most}"
     return f"{go} ({together}), u*₀ = {ustar0.number} m/s ({ustar0.ends})."
 

@@ -16,7 +16,7 @@ import pandas as pd
 
 from orchestrator import plan
 from orchestrator.bed.line import of_bed
-from orchestrator.digits import number
+from orchestrator.digits import number, percent
 from orchestrator.experiment import (
     Experiment,
     ExperimentResults,
@@ -463,7 +463,7 @@ def _tables_of_rungs(known: pd.DataFrame) -> list[pd.DataFrame]:
     order = {name: place for place, name in enumerate(meanings["rung"])}
     index = ["part", "scene_class", "rung", "scenes", "cost_core_s"]
     errors = 100 * known.set_index([*index, "fraction"])["error"]
-    table = errors.unstack("fraction").rename(columns="{:.0%}".format)
+    table = errors.unstack("fraction").rename(columns=percent)
     table = table.sort_index(
         level=index[:3],
         key=lambda keys: keys.map(order) if keys.name == "rung" else keys,

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.patches import Patch, Rectangle
 
 from orchestrator import plan
+from orchestrator.digits import percent
 from orchestrator.experiment import Experiment, ExperimentResults, Runs
 from orchestrator.fidelity.decision import as_written
 from orchestrator.grains import threshold
@@ -135,7 +136,7 @@ def _card(table: pd.DataFrame) -> Card:
     good = int(counts.get("good", 0))
     noticed = int(table["caught"].sum())
     silent = of - good - noticed
-    within = f"within {WRONG:.0%} of their references"
+    within = f"within {percent(WRONG)} of their references"
     kinds = "noisy, exploded or stalled"
     numbers = (
         Number.counted(good, of, "runs are good", within, "good"),

@@ -124,9 +124,9 @@ class Comparison:
             return f"{self.title}: {count}"
         limits = []
         if np.isfinite(self.above):
-            limits.append(f"above {self.above:{self.form}}")
+            limits.append(f"above {self._written(self.above)}")
         if np.isfinite(self.below):
-            limits.append(f"at most {self.below:{self.form}}")
+            limits.append(f"at most {self._written(self.below)}")
         text = f"{self.title}: {self._spread()}"
         if limits:
             text += f", {' and '.join(limits)} {count}"
@@ -135,10 +135,14 @@ class Comparison:
             text += f"; {missing} without a value"
         return text
 
+    def _written(self, number: float) -> str:
+        """A number in its format."""
+        return format(number, self.form).replace("%", " %").replace("-", "−")
+
     def _spread(self) -> str:
         """The median of the values, the least and the largest one."""
         ends = np.quantile(self.numbers, [0.5, 0.0, 1.0]).tolist()
-        middle, least, most = (format(end, self.form) for end in ends)
+        middle, least, most = map(self._written, ends)
         if least == most:
             return middle
         return f"{middle} in the median ({least} … {most})"

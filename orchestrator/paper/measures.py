@@ -11,6 +11,7 @@ import pandas as pd
 
 from orchestrator.calculator import ENTRAINED
 from orchestrator.calculator.table import thresholds
+from orchestrator.digits import percent
 from orchestrator.fidelity.limits import FROZEN_BED
 from orchestrator.paper.evidence import (
     BRIDGED,
@@ -198,7 +199,7 @@ def constant(evidence: Evidence) -> Comparisons:
     lift = np.array(lifts, float)
     end = law.reynolds[1]
     reach = NEARLY / (1 - NEARLY) / lift
-    limit = f"Re* up to which τ is within {NEARLY:.0%} of its limit for Re* → 0"
+    limit = f"Re* up to which τ is within {percent(NEARLY)} of its limit for Re* → 0"
     yield Comparison(f"{limit}, by the closed form, for each β and z₀", reach, end)
     yield Comparison("the same beside a tenth of that range", reach, SMALL_RE)
     name = "closed form: change of τ from Re* → 0 to 3"
@@ -385,7 +386,7 @@ def above_single(evidence: Evidence, flow: str) -> Comparisons:
         table.loc[rows.index, "single"] = exact["shields"][exact["answer"]]
     table = table.assign(ratio=table["shields"] / table["single"])
     for fraction, rows in parts(table, "fraction"):
-        name = f"τ over that of one grain by the closed form, n/N = {fraction:.0%}"
+        name = f"τ over that of one grain by the closed form, n/N = {percent(fraction)}"
         yield from by_regime(rows, "ratio", name, 1.0)
 
 
@@ -702,6 +703,8 @@ def coupling(evidence: Evidence) -> Comparisons:
     table = table[table["frozen_bed"].notna() & (table["stress"] == "wall")]
     table = table[table["force_law"] == table["regime"]]
     for part, rows in parts(table, "fraction"):
-        name = f"n/N = {part:.0%}: known change of τ where the bed line is drawn anew"
+        name = (
+            f"n/N = {percent(part)}: known change of τ where the bed line is drawn anew"
+        )
         values = rows["frozen_bed"]
         yield Comparison(name, values, below=FROZEN_BED, form=".0%", flow="wall")

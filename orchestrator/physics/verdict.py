@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
+from orchestrator.digits import percent
 from orchestrator.physics.beside import (
     COMPARED_WITH,
     ENTRAINED,
@@ -113,7 +114,7 @@ def of_grain(row: Mapping[Any, Any], of_law: Iterable[Reason]) -> Iterator[Reaso
     if standing_out <= 0:
         yield Reason("hidden", "hidden grain: it lies below the tops of its neighbours")
     elif standing_out < EXPOSED_FROM:
-        part = f"{standing_out:.0%} of it stands out of its neighbours"
+        part = f"{percent(standing_out)} of it stands out of its neighbours"
         yield Reason("hidden", f"hidden grain: {part}")
     if row["flow_reynolds"] < LAMINAR_BELOW:
         yield Reason("laminar", laminar(row["flow_reynolds"]))

@@ -37,8 +37,8 @@ NEAR_ONE = 1.1
 """Factor of a correction below which it is told with three digits."""
 PAPER_FLUID = Remark(
     "The gas is not quite air.",
-    "The gas is that of the paper, of 1 kg/m³, in which a grain has moved when it has "
-    'left its pocket. For real air write `fluid.kind = "air"`.',
+    "The gas is that of the article, of 1 kg/m³, in which a grain counts as entrained "
+    'when it leaves its pocket. For real air write `fluid.kind = "air"`.',
 )
 ROUGHER_M = (1e-4, 1e-3)
 """Roughness lengths of ground over which the wind is told, too, m: of rippled sand, and
@@ -176,7 +176,7 @@ def _correction(results: Results, table: pd.DataFrame) -> Iterator[Remark]:
         return
     ratio = computed / measured
     flow = "wind" if is_gas(float(row["rho_f_kg_m3"])) else "flow"
-    who = "flumes found"
+    who = "the flumes’ median is"
     if single.is_by_formula(row):
         who = f"the formula of {single.formula_of(row)} gives"
     of_one = _of_one(row, rows)
@@ -194,9 +194,9 @@ def _correction(results: Results, table: pd.DataFrame) -> Iterator[Remark]:
     else:
         model = "The model"
         text = (
-            f"On a level bed of grains of {size} the force law {law} asks for a "
-            f"friction velocity of {computed:#.3g} m/s; {found}. The table has "
-            f"both.{of_one}"
+            f"On a level bed of grains of {size} the force law {law} has a "
+            f"threshold friction velocity of {computed:#.3g} m/s; {found}. The table "
+            f"has both.{of_one}"
         )
     yield Remark(f"{model} {_off(ratio, flow)}", text)
 
@@ -217,7 +217,7 @@ def _of_one(row: pd.Series, rows: pd.DataFrame) -> str:
     if not telling:
         return ""
     told = ", ".join(labels.told(row, telling))
-    return f" This is told of one of them as an example: {told}."
+    return f" Example: {told}."
 
 
 def _questions(results: Results) -> Iterator[Remark]:
@@ -264,7 +264,7 @@ def _cut(results: Results, scene: Scene, cut: Cut) -> Remark:
             own = row["shields_own"] / row["hiding"]
             stress = factor * float(own) * float(Grain.of_table(row).layer_weight)
             part = percent(float(row["fraction"]))
-            text += f", {stress:.3g} Pa where {part} of each size have moved"
+            text += f", {stress:.3g} Pa where {part} of each size is entrained"
     return Remark("Sizes were cut.", f"{text}.")
 
 

@@ -501,7 +501,7 @@ def interval_of(row: Row, numerical: str) -> str:
     if row.get("of_seeds", 1) > 1:
         beds = f"{row['of_seeds']} replicates"
     if of_what == SEEDS:
-        return f"the range of {beds}; the numerical error is not known"
+        return f"the range of {beds}; the numerical error was not measured"
     said = numerical
     if of_what in (MEASURED, IN_GAS):
         said = tested_on(row)
@@ -536,7 +536,7 @@ def corrected_interval_of(
         rows = ", and the ends of what was measured"
     if all(map(math.isnan, own[1:])):
         first = " of the first grain" if is_first else ""
-        return f"both numbers{rows}; the numerical error{first} is not known"
+        return f"both numbers{rows}; the numerical error{first} was not measured"
     said = interval_of(row, numerical)
     if row["interval_of"] in (MEASURED, IN_GAS):
         return f"{said}, and widened to contain this number{rows}"
@@ -595,22 +595,24 @@ def source(row: Row) -> str:
         rows = f"{row['measured_rows']:.0f} flume experiments"
         ends = f"{row['measured_low']:.3f} … {row['measured_high']:.3f}"
         said = (
-            f"“{WITH_MEASURED}”: {same} with θ_c = {theta}, the median of {rows} at "
-            "this grain Reynolds number (level beds, visual criterion; Buffington and "
-            f"Montgomery 1997); 80 % of them have {ends}."
+            f"Numbers {WITH_MEASURED} are those of {same} with θ_c = {theta}, the "
+            f"median of {rows} at this grain Reynolds number (level beds, visual "
+            f"criterion; Buffington and Montgomery 1997); 80 % of them have {ends}."
         )
     elif is_gas(float(row["rho_f_kg_m3"])):
         least, most = (1e3 * end for end in OF_TUNNELS)
         said = (
-            f"“{with_threshold(row)}”: {same} with θ_c = {theta}, by the formula of "
-            f"{formula_of(row)} for grains of {size}, which was fitted to wind tunnels "
+            f"Numbers {with_threshold(row)} are those of {same} with θ_c = {theta}, "
+            f"by the formula of {formula_of(row)} for grains of {size}, which was "
+            "fitted to wind tunnels "
             f"(level beds, dry grains of {least:g} to {most:.2g} mm in air). "
             f"{_field(row)}"
         )
     else:
         said = (
-            f"“{with_threshold(row)}”: {same} with θ_c = {theta}, by the formula of "
-            f"{formula_of(row)}, which was fitted to flumes; no flume experiment of "
+            f"Numbers {with_threshold(row)} are those of {same} with θ_c = {theta}, "
+            f"by the formula of {formula_of(row)}, which was fitted to flumes; no "
+            "flume experiment of "
             f"the compilation is at grain Reynolds number {row['reynolds']:.3g}."
         )
     return said

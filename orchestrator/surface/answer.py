@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from orchestrator.digits import percent
 from orchestrator.physics.beside import ENTRAINED as ENTRAINMENT
 from orchestrator.physics.beside import SUSTAINED as SUSTAINED_MOTION
 from orchestrator.physics.beside import beside
@@ -512,4 +513,4 @@ class LeftOut(NamedTuple):
 
 def _of(share: float) -> str:
     """The column of the wind in which a share of the surface moves."""
-    return f"{share:.0%}, m/s"
+    return f"{percent(share)}, m/s"

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from orchestrator.digits import number, plain_number
+from orchestrator.digits import number, percent, plain_number
 from orchestrator.report.card import Card, Number, Worth
 from orchestrator.report.subjects import length
 from orchestrator.surface import onset
@@ -387,6 +387,6 @@ def surface_sentences(answer: SurfaceAnswer, source: str) -> Iterator[str]:
     if loose > LITTLE:
         angle = 90 - answer.ground.grain.entrainment_angle_deg
         yield (
-            f"{loose:.0%} of it is steeper than {angle:g}° of the pockets of its "
+            f"{percent(loose)} of it is steeper than {angle:g}° of the pockets of its "
             "grains, which lie loose there: it is left out."
         )

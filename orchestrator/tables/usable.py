@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from orchestrator.digits import percent
 from orchestrator.flow.run import SPEED_HEIGHT
 from orchestrator.grains.threshold import within
 from orchestrator.physics import verdict
@@ -294,16 +295,18 @@ def _reasons_of_pile(
 ) -> Iterator[Reason]:
     """Reasons against the threshold of a pile, beside those that a grain has, too."""
     if row["share_carried_off"] > CARRIED_OFF:
-        share = f"{row['share_carried_off']:.0%} of the moved grains"
-        yield Reason("carried off", f"lift carried off {share}")
+        share = percent(row["share_carried_off"])
+        what = f"{share} of the entrained grains were lifted off"
+        yield Reason("carried off", what)
     yield from _reasons_of_bed(row)
     error = row["numerical_error"]
     if pd.isna(error):
-        what = "the error of its fidelity on such a bed is not known"
+        what = "its numerical error on such a bed was not measured"
         remedy = "run `orchestrator convergence` on the study file, which estimates it"
         yield Reason("error not known", what, remedy)
     elif tolerance and error > tolerance * (1 + 1e-9):
-        what = f"numerical error {error:.1%} is above the tolerance of {tolerance:.3g}"
+        what = f"numerical error {percent(error, 1)} is above the tolerance of "
+        what += f"{100 * tolerance:.3g} %"
         yield Reason(ABOVE_TOLERANCE, what)
     if row["fraction"] * row["count"] < 1 - 1e-9:
         what = f"{row['fraction']:.3g} of {row['count']:.0f} grains is less than one"
@@ -351,7 +354,7 @@ def _reasons_of_bed(row: Mapping[Any, Any]) -> Iterator[Reason]:
 def _reached(row: Mapping[Any, Any]) -> tuple[str, str]:
     """How many grains of a pile have moved by the end of its run, and what helps."""
     highest = row.get("highest_fraction", 0.0)
-    said = f"at most {highest:.0%} of {row['count']} grains moved"
+    said = f"at most {percent(highest)} of {row['count']} grains moved"
     last = row.get("final_fraction")
     if last is not None and highest >= last - 1e-9:
         end = f"method.grains.final_fraction = {last:g}"
@@ -369,9 +372,9 @@ def _open_ends(row: Mapping[Any, Any]) -> Iterator[Reason]:
         return
     remedy = ""
     if row["numerical_error"] >= 1:
-        why = f"the numerical error is {row['numerical_error']:.0%}"
+        why = f"the numerical error is {percent(row['numerical_error'])}"
     elif row.get("scatter", 0.0) >= 1:
-        why = f"the scatter over seeds is {row['scatter']:.0%}"
+        why = f"the scatter over seeds is {percent(row['scatter'])}"
     else:
         why, remedy = _reached(row)
     yield Reason("open", f"interval open above: {why}", remedy)

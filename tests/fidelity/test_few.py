@@ -183,7 +183,7 @@ def test_the_laws_of_a_tolerance_hold_for_studies_of_many_piles(
 def test_the_plan_says_what_runs_by_dem_and_what_it_spares() -> None:
     told = [*plan.forecast(asked(), Path("none"), 1)]
     (line,) = [
-        each for each in told if "kept apart (95%)" in each and "7 piles" in each
+        each for each in told if "kept apart (95 %)" in each and "7 piles" in each
     ]
     assert "the method pivot, with factors of 6 piles by DEM" in line
     at = told.index(line)

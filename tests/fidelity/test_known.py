@@ -160,9 +160,9 @@ def test_what_was_not_run_is_empty_and_counts_as_nothing() -> None:
 
 
 def test_an_error_is_printed_with_the_share_that_it_held_and_of_how_many() -> None:
-    assert str(Error(0.03, 0.04, 0.95, 0.97, 552)) == "within 5.0%: 97% of 552"
+    assert str(Error(0.03, 0.04, 0.95, 0.97, 552)) == "within 5.0 %: 97 % of 552"
     few = str(Error(0.03, None, 0.9, 0.91, 11))
-    assert few == "within 3.0%: 91% of 11, for 90% since these are few"
+    assert few == "within 3.0 %: 91 % of 11, for 90 % since these are few"
 
 
 def test_every_measured_class_has_its_reference_and_every_fidelity() -> None:

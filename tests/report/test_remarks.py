@@ -11,7 +11,7 @@ from tests import small_study
 from tests.report.conftest import changed, copies, only
 from tests.tables.test_quoted import SEEDS_IN_WATER, TWO_BEDS
 
-EXAMPLE = "This is told of one of them as an example: "
+EXAMPLE = "Example: "
 
 
 def test_a_remark_that_is_told_of_one_of_several_names_it(results: Results) -> None:

@@ -101,7 +101,7 @@ def cases(ran: Path, tmp_path: Path) -> Path:
 
 
 EVERYTHING = ["flow", "pile", "pile"]
-pytestmark = pytest.mark.filterwarnings("ignore:.*load steps 10%")
+pytestmark = pytest.mark.filterwarnings("ignore:.*load steps 10 %")
 
 
 def test_cases_are_read_again_under_other_code_that_writes_the_same_inputs(

@@ -187,7 +187,7 @@ def test_card_table_figure_and_csv_have_one_interval(tmp_path: Path, text: str) 
     ends = {float(end) for end in np.concatenate(bars) if np.isfinite(end)}
     assert {theta_low, theta_high} <= ends
     said = [text[1] for group in figure.data.values() for text in group]
-    here = [one for one in said if "n/N = 30%" in one]
+    here = [one for one in said if "n/N = 30 %" in one]
     bare = labels.interval(theta_low, theta_high, 4, "g")
     assert len(here) == len(rows)
     assert all(f"({bare})" in one for one in here)

@@ -74,11 +74,11 @@ UNREACHED = {"reynolds": NAN, "shields": NAN, "share_carried_off": NAN}
         (
             None,
             {"share_carried_off": 0.76},
-            ["lift carried off 76% of the moved grains"],
+            ["76 % of the entrained grains were lifted off"],
         ),
         (None, {"numerical_error": NAN}, ["is not known"]),
-        (0.02, {}, ["numerical error 3.0% is above the tolerance of 0.02"]),
-        (None, UNREACHED, ["not reached: at most 80% of 65 grains moved"]),
+        (0.02, {}, ["numerical error 3.0 % is above the tolerance of 2 %"]),
+        (None, UNREACHED, ["not reached: at most 80 % of 65 grains moved"]),
         (
             None,
             {**UNREACHED, **STOPPED},
@@ -87,7 +87,7 @@ UNREACHED = {"reynolds": NAN, "shields": NAN, "share_carried_off": NAN}
         (
             None,
             {"shields_numerical_high": NAN},
-            ["interval open above: at most 80% of 65 grains moved"],
+            ["interval open above: at most 80 % of 65 grains moved"],
         ),
         (
             None,
@@ -97,12 +97,12 @@ UNREACHED = {"reynolds": NAN, "shields": NAN, "share_carried_off": NAN}
         (
             None,
             {"shields_numerical_high": NAN, "numerical_error": 3.75},
-            ["above: the numerical error is 375%"],
+            ["above: the numerical error is 375 %"],
         ),
         (
             None,
             {"shields_numerical_high": NAN, "scatter": 1.2},
-            ["above: the scatter over seeds is 120%"],
+            ["above: the scatter over seeds is 120 %"],
         ),
     ],
 )

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure as Canvas
 
+from orchestrator.digits import percent
 from orchestrator.report import labels, shields, style
 from orchestrator.report.figures import FigureKind
 from orchestrator.report.page import filled
@@ -68,9 +69,9 @@ def _deviations(rows: pd.DataFrame) -> str:
     holds = valid(rows)
     found = []
     if holds.any():
-        found.append(f"{far[holds].max():.2%} where its law holds")
+        found.append(f"{percent(far[holds].max(), 2)} where its law holds")
     if not holds.all():
-        found.append(f"{far[~holds].max():.2%} where it does not")
+        found.append(f"{percent(far[~holds].max(), 2)} where it does not")
     return ", ".join(found)
 
 

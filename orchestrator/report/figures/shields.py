@@ -9,6 +9,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
+from orchestrator.digits import percent
 from orchestrator.report import labels, shields, style, theory
 from orchestrator.report.figures import FigureKind
 from orchestrator.report.page import filled
@@ -64,7 +65,7 @@ def draw(results: Results) -> Iterator[Figure]:
         CAPTION,
         piles=shields.about(piles),
         grains=shields.about(grains),
-        fractions=", ".join(f"{fraction:.0%}" for fraction in _fractions(piles)),
+        fractions=", ".join(map(percent, _fractions(piles))),
         names="; ".join(curve.label for curve in curves),
         about={**shields.about(results.scenes), "sloped": ""},
     )
@@ -246,7 +247,7 @@ def _texts(row: pd.Series, columns: Sequence[str], telling: Sequence[str]) -> li
     if pd.notna(low) or pd.notna(high):
         threshold += f" ({labels.interval(low, high, 4, 'g')})"
     if "fraction" in row:
-        threshold += f" at n/N = {row['fraction']:.0%}"
+        threshold += f" at n/N = {percent(row['fraction'])}"
     ustar = row["ustar0_m_s"] if "ustar0_m_s" in row else row["ustar_m_s"]
     threshold += f", u*₀ = {ustar:.3g} m/s"
     case = row["case"] if isinstance(row["case"], str) else ""

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
+from orchestrator.digits import signed_percent
 from orchestrator.grains.pile import Pile
 from orchestrator.report import labels, solved, style
 from orchestrator.report.figures import FigureKind
@@ -61,8 +62,8 @@ def draw(results: Results) -> Iterator[Figure]:
     averaged = ", ".join(dict.fromkeys(lengths))
     text = filled(
         CAPTION,
-        mean=f"{mean:+.0%}",
-        crest=f"{crest:+.0%}",
+        mean=signed_percent(mean),
+        crest=signed_percent(crest),
         averaged=f"max(d, {averaged})",
     )
     title = "Friction velocity over the pile"

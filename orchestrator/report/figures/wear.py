@@ -18,7 +18,7 @@ CAPTION = (
     "the flow of the whole pile acts until the last grain has gone, as in the paper. "
     "Solid: the bed line is drawn anew through the grains that remain after each "
     "share of the grains that threshold.update gives, and the flow is solved over it. "
-    "Dot: the place from which the two differ by more than 5 % (column holds_until). "
+    "Dot: the place from which the two differ by more than 5 %. "
     "By DEM one load step changes θ by twice the load increment."
 )
 
