@@ -314,7 +314,7 @@ def compared_range(
     Each contains the flow, the computed one, the ends of what was measured, and the
     interval of the computed one: as it is where it is of measured thresholds or of
     force laws, else in proportion, since such an error is relative. Of a computed flow
-    that is not usable nothing is left but what was measured.
+    that is not usable nothing is left but what was measured and the other flow.
 
     Parameters
     ----------
@@ -355,6 +355,9 @@ def compared_range(
         # an end that is open stays open
         at = np.where(is_known & ~np.isfinite(end), beyond, end)
         held = np.where(usable, outer(outer(at, own), there), np.nan)
-        held = outer(held, of_rows)
+        # of a formula the other flow may lie outside what was measured
+        held = outer(
+            held, np.where(np.isfinite(of_rows), outer(of_rows, there), np.nan)
+        )
         found.append(np.where(np.isfinite(held) & np.isfinite(there), held, np.nan))
     return found[0], found[1]

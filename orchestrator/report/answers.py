@@ -360,9 +360,9 @@ def _of_several(rows: pd.DataFrame, results: Results) -> Card:
         numbers.append(first)
     advice = f"{worth.advice} {_no_difference(shown, told)}".strip()
     return Card(
-        f"At what {told.flow} does {_common_shape(results.at_fraction)} start to move, "
-        f"by {_axes(telling)}?",
-        _span_of(results.at_fraction),
+        f"At what {told.flow} does {_common_shape(results.at_fraction)} start to move"
+        f"{', and where' if first is not None else ''}, by {_axes(telling)}?",
+        _scene_of_several(results),
         tuple(numbers),
         single.source(shown.iloc[0]),
         replace(worth, advice=advice),
@@ -488,7 +488,7 @@ def _of_unlike(
     left = len(shown) - MOST_NUMBERS
     source = single.source(rows.iloc[0])
     if left > 0:
-        source += f" The table has {left} more: fluids, methods and mixtures each."
+        source += f" The table has {number_of(left, 'more bed')}."
     what = "these beds"
     if any(name in telling for name in MIXTURE):
         what = "these mixtures"
@@ -536,10 +536,28 @@ def _first_of_several(
     pile = results.plan.piles[str(row["scene_id"])]
     number = _first_motion(row, pile, told)
     what = ", ".join(labels.told(row, list(telling)[:3]))
-    where = counted.spot(float(row["first_x_m"]), pile.bed)
     meaning = f"lowest {single.threshold_name(told)}, first motion: {what}"
+    where = _where_of_several(starts, results)
     note = "; ".join(filter(None, [f"it starts {where}", number.note]))
     return replace(number, meaning=meaning, note=note)
+
+
+def _where_of_several(starts: pd.DataFrame, results: Results) -> str:
+    """Where motion starts on several beds: at the crest of all, or of the first."""
+    piles = [results.plan.piles[str(scene)] for scene in starts["scene_id"]]
+    x = starts["first_x_m"].to_numpy(float)
+    near = starts["d_m"].to_numpy(float)
+    tops = np.array([float(pile.model.line.crest[0]) for pile in piles])
+    if not any(pile.bed.profile for pile in piles):
+        ends = dict.fromkeys(length(float(end)) for end in (x.min(), x.max()))
+        places = f"{' to '.join(ends)} from the toe"
+        if (np.abs(x - tops) <= near).all():
+            return f"at the crest{' of each bed' if len(piles) > 1 else ''}, {places}"
+        crests = dict.fromkeys(length(float(end)) for end in (tops.min(), tops.max()))
+        return f"{places}, the crest at {' to '.join(crests)}"
+    row = starts.sort_values("first_ustar0_m_s", kind="stable").iloc[0]
+    bed = results.plan.piles[str(row["scene_id"])].bed
+    return counted.spot(float(row["first_x_m"]), bed)
 
 
 def _no_difference(shown: pd.DataFrame, told: ReportedQuantity) -> str:
@@ -560,6 +578,23 @@ def _no_difference(shown: pd.DataFrame, told: ReportedQuantity) -> str:
     )
 
 
+def _scene_of_several(results: Results) -> str:
+    """One line on the form of several beds, where it is one, and on what varies."""
+    rows = results.at_fraction
+    piles = [results.plan.piles[str(scene)] for scene in rows["scene_id"]]
+    beds = [pile.bed for pile in piles]
+    forms = {(bed.shape, bed.height, bed.slope_deg, bed.forms) for bed in beds}
+    bed = beds[0]
+    is_one = len(forms) == 1 and not any(each.profile for each in beds)
+    if not is_one or single.is_level(rows.iloc[0]):
+        return _span_of(rows)
+    word = bed.form.word
+    if bed.forms > 1:
+        word = f"train of {bed.forms} {bed.form.words}"
+    shape = f"{word} {length(bed.height)} high, windward face {bed.slope_deg:g}°"
+    return f"{shape[:1].upper()}{shape[1:]}. {_span_of(rows, with_slopes=False)}"
+
+
 def _common_shape(rows: pd.DataFrame) -> str:
     """What several beds are, in the singular."""
     shapes = set(rows["bed_shape"])
@@ -568,14 +603,14 @@ def _common_shape(rows: pd.DataFrame) -> str:
     return f"a {SHAPES[str(shapes.pop())].word}"
 
 
-def _span_of(rows: pd.DataFrame) -> str:
+def _span_of(rows: pd.DataFrame, *, with_slopes: bool = True) -> str:
     """One line on the grains, the slopes and the fluids of several beds or grains."""
     least = float(rows["d_m"].min())
     most = float(rows["d_m"].max())
     sizes = " to ".join(dict.fromkeys([length(least), length(most)]))
     parts = [f"grains of {sizes}"]
     slopes = sorted(set(rows["alpha_deg"]))
-    if slopes != [0.0]:
+    if with_slopes and slopes != [0.0]:
         ends = _ends(slopes)
         word = "slopes" if len(ends) > 1 else "a slope"
         parts.append(f"{word} of {' to '.join(ends)}°")
@@ -891,6 +926,7 @@ def _behind(aspect: float, rows: pd.DataFrame) -> Number:
             word="none",
             other=measured,
             other_word=tunnel,
+            is_other_measured=True,
             decimals=1,
         )
     count = f"all {len(rows)}" if len(ends) == len(rows) else f"{len(ends)}"
@@ -904,6 +940,7 @@ def _behind(aspect: float, rows: pd.DataFrame) -> Number:
         interval_of=f"{count} turbulence models, which separate",
         other=measured,
         other_word=tunnel,
+        is_other_measured=True,
         decimals=1,
     )
 

@@ -61,8 +61,8 @@ class Number:
         What the number itself is called, where it stands with equal right.
     last, other_last
         The other end of a range of numbers, NaN of one number.
-    is_of_model
-        Whether the other value is the model's; else it is measured or of a formula.
+    is_other_measured
+        Whether the other value is what was measured; else it is of a model or formula.
     is_grey
         Whether the number is not usable.
     is_measured
@@ -94,7 +94,7 @@ class Number:
     value_is: str = ""
     last: float = math.nan
     other_last: float = math.nan
-    is_of_model: bool = False
+    is_other_measured: bool = False
     is_grey: bool = False
     is_measured: bool = False
     is_ratio: bool = False

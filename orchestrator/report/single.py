@@ -290,7 +290,13 @@ def reported_number(
     if row["verdict"] == verdict.UNUSABLE:
         return replace(of_model, is_grey=True)
     if advised == verdict.MODEL:
-        return replace(of_model, other=other[0], other_is=with_threshold(row))
+        is_lone = row["bed"] == "grain" and not row["alpha_deg"] > LEVEL_DEG
+        return replace(
+            of_model,
+            other=other[0],
+            other_is=with_threshold(row),
+            is_other_measured=(is_lone or is_level(row)) and not is_by_formula(row),
+        )
     is_pair = advised == verdict.BOTH
     of_what = corrected_interval_of(row, numerical, bool(which), own)
     return Number(
@@ -306,7 +312,6 @@ def reported_number(
         other_low=own[1],
         other_high=own[2],
         value_is=with_threshold(row) if is_pair else "",
-        is_of_model=True,
     )
 
 
@@ -338,6 +343,9 @@ def take_this(row: Row, told: ReportedQuantity) -> Number | None:
     of_what = f"80 % of {rows:.0f} flume experiments (visual criterion)"
     if is_gas(float(row["rho_f_kg_m3"])):
         of_what = f"{rows:.0f} field sites"
+    if not (math.isnan(low) or low <= value <= high):
+        low, high = min(low, value), max(high, value)
+        of_what += ", and this number"
     where = f"grains of {length(float(row['d_m']))}, level bed"
     by = f"by {formula_of(row)}" if is_by_formula(row) else "flumes"
     return Number(

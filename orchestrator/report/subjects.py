@@ -77,7 +77,7 @@ WIND = ReportedQuantity("wind_10m", "m/s", "wind", "wind", "10 m above the groun
 MEAN = ReportedQuantity(
     "mean_velocity", "m/s", "flow", "mean velocity", "over the depth"
 )
-STRESS = ReportedQuantity("stress", "Pa", "flow", "stress", "of the flow on the bed")
+STRESS = ReportedQuantity("stress", "Pa", "flow", "stress", "of the undisturbed flow")
 DEPTH = ReportedQuantity("depth", "m", "flow", "depth", "of the flow")
 USTAR = ReportedQuantity(
     "ustar0", "m/s", "flow", "friction velocity", "of the flow upstream"

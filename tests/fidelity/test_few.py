@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from orchestrator import pipeline, plan
+from orchestrator.digits import percent
 from orchestrator.fidelity import choice, decision, few
 from orchestrator.fidelity.decision import Decision, as_written
 from orchestrator.fidelity.few import Corrected
@@ -110,7 +111,7 @@ def test_fewer_piles_keep_fewer_apart(heights: tuple[float, ...], kept: int) -> 
     assert bool(spared) == bool(kept)
     for one in spared.values():
         assert len(one.few.kept) == kept
-        assert f"{kept} kept apart ({kept / (kept + 1):.0%})" in one.why
+        assert f"{kept} kept apart ({percent(kept / (kept + 1))})" in one.why
 
 
 @pytest.mark.parametrize("tolerance", [0.05, 0.2])

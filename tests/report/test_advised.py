@@ -9,10 +9,18 @@ import pytest
 from orchestrator.calculator.answer import grain_card
 from orchestrator.calculator.table import thresholds
 from orchestrator.physics import verdict
-from orchestrator.physics.reported import MEASURED, NUMERICAL, compared_range
-from orchestrator.report import answers, labels, sheets, single
+from orchestrator.physics.reported import (
+    MEASURED,
+    NUMERICAL,
+    REPORTED,
+    compared_range,
+)
+from orchestrator.report import answers, labels, sheets, single, words
 from orchestrator.report.card import Card, Number, lines
+from orchestrator.report.figures import fractions
 from orchestrator.report.results import Results
+from orchestrator.report.style import Figure
+from orchestrator.runs import terminal
 from tests import small_study
 from tests.report.conftest import changed, only
 
@@ -159,8 +167,9 @@ def test_the_band_of_a_corrected_flow_holds_all_that_is_known(
         least[is_known & np.isfinite(least)] <= rows[is_known & np.isfinite(least)]
     ).all()
     if not usable:
-        # nothing of a computed flow that is not usable is left
-        np.testing.assert_array_equal(least, rows)
+        # nothing of a computed flow that is not usable is left, but the other one is
+        np.testing.assert_array_equal(least, np.fmin(rows, rows * 0 + other))
+        assert (most[is_known] >= other[is_known]).all()
         return
     is_open = np.isnan(low) & np.isfinite(high)
     assert np.isnan(least[is_open]).all()
@@ -187,3 +196,107 @@ group = [
     assert len(numbers) == 2
     assert all(math.isnan(number.last) for number in numbers)
     assert ["lowest" in number.meaning for number in numbers] == [False, False]
+
+
+GRAINS = """
+grain.density = 2650.0
+bed = { kind = "grain" }
+axes = { "grain.diameter" = [1e-4, 3e-4, 1e-3, 4e-3], "bed.slope_deg" = [0.0, 15.0] }
+"""
+PILE = """
+grain = { diameter = 1e-3, density = 2650.0 }
+method.kind = "pivot"
+method.flow.model = "flat"
+[bed]
+kind = "pile"
+slope_deg = 15.0
+height = 0.01
+"""
+STUDIES = {
+    "grains in air": f'fluid.kind = "air"\n{GRAINS}',
+    "grains in water": f'fluid.kind = "water"\n{GRAINS}',
+    "grains in the article's gas": f'fluid.kind = "paper"\n{GRAINS}',
+    "grains by many laws": f'fluid.kind = "water"\n{GRAINS}'.replace(
+        '"bed.slope_deg" = [0.0, 15.0]', '"forces.law" = ["bridged", "profile", "high"]'
+    ),
+    "a pile in air": f'fluid.kind = "air"\n{PILE}',
+    "a pile in water": f'fluid.kind = "water"\n{PILE}',
+    "a pile in the article's gas": f'fluid.kind = "paper"\n{PILE}',
+    "a level bed": f'fluid.kind = "water"\n{PILE}'.replace(
+        "slope_deg = 15.0\nheight = 0.01", 'shape = "flat"\nlength = 0.02'
+    ),
+}
+"""Studies that need no solver."""
+
+
+def _check_tables(results: Results) -> int:
+    """How many numbers of the tables have an interval; each lies in its own."""
+    bands = 0
+    for name in ("pile_threshold", "single_grain"):
+        table = results.joined(name)
+        for before in ("", "first_", "compared_", "compared_first_"):
+            for stem, unit in REPORTED.items():
+                columns = [
+                    f"{before}{stem}{end}{unit}" for end in ("", "_low", "_high")
+                ]
+                if not {*columns} <= {*table}:
+                    continue
+                for value, low, high in table[columns].astype(float).to_numpy():
+                    if np.isfinite(value):
+                        assert _is_within(value, low, high), columns[0]
+                        bands += bool(np.isfinite([low, high]).any())
+    return bands
+
+
+def _check_sheet(sheet: sheets.Sheet) -> int:
+    """How many cells of the advised column stand before an interval that holds them."""
+    heads = [*sheet.frame]
+    if sheet.main not in heads:
+        return 0
+    band = heads[heads.index(sheet.main) + 1]
+    if not band.startswith("interval"):
+        return 0
+    found = 0
+    for cell, ends in sheet.frame[[sheet.main, band]].itertuples(index=False):
+        low, _, high = ends.partition(" … ")
+        if high and cell != "—":
+            # all three are rounded to three digits
+            assert float(low) * 0.995 <= float(cell) <= float(high) * 1.005, cell
+            found += 1
+    return found
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_what_is_advised_lies_in_its_band_on_card_in_tables_figures_and_terminal(
+    name: str, tmp_path: Path
+) -> None:
+    results = small_study.run(tmp_path, STUDIES[name])
+    card = answers.card(results)
+    sheet = sheets.short(results)
+    assert sheet is not None
+    bands = [_check(card), _check_tables(results), _check_sheet(sheet)]
+    # what is not usable may have none
+    assert all(bands) or card.worth.mark == "bad"
+    said = " ".join(terminal.plain(words.answer_text(results)).split())
+    for number in card.numbers:
+        assert number.interval in said
+    bars = 0
+    if all(needed in results.tables for needed in fractions.FIGURE.needs):
+        for figure in fractions.FIGURE.draw(results):
+            bars += _check_bars(figure)
+    assert bars or card.worth.mark == "bad" or name.startswith(("grains", "a level"))
+
+
+def _check_bars(figure: Figure) -> int:
+    """How many bars of a figure stand beside a disc of the card, which lies in them."""
+    if figure.canvas is None:
+        return 0
+    found = 0
+    for axes in figure.canvas.axes:
+        drawn = [(line.get_gid(), np.asarray(line.get_xdata())) for line in axes.lines]
+        bars = [x for gid, x in drawn if gid == "interval"]
+        for disc in (x for gid, x in drawn if gid == "card"):
+            for bar in bars:
+                assert _is_within(float(disc[0]), float(bar.min()), float(bar.max()))
+                found += 1
+    return found

@@ -247,7 +247,10 @@ def test_two_beds_of_which_one_does_not_reach_the_fraction_stay_two(
         both.study, both.plan, {**both.tables, "pile_threshold": table}, both.cases
     )
     card = answers.card(results)
-    assert card.question == "At what flow does a pile start to move, by diameter?"
+    assert (
+        card.question
+        == "At what flow does a pile start to move, and where, by diameter?"
+    )
     said = " ".join(" ".join(lines(card)).split())
     # the one that reached it is named by what tells it from the other
     told, other = (subjects.length([1e-3, 7e-4][place]) for place in (lost, 1 - lost))

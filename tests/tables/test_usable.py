@@ -76,7 +76,7 @@ UNREACHED = {"reynolds": NAN, "shields": NAN, "share_carried_off": NAN}
             {"share_carried_off": 0.76},
             ["76 % of the entrained grains were lifted off"],
         ),
-        (None, {"numerical_error": NAN}, ["is not known"]),
+        (None, {"numerical_error": NAN}, ["was not measured"]),
         (0.02, {}, ["numerical error 3.0 % is above the tolerance of 2 %"]),
         (None, UNREACHED, ["not reached: at most 80 % of 65 grains moved"]),
         (
