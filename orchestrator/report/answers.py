@@ -992,10 +992,11 @@ def _worth_of_many(every: pd.DataFrame, shown: pd.DataFrame) -> Worth:
         return Worth("care", word, advice)
     outside = int((every["verdict"] != USABLE).sum())
     if not outside:
-        within = "within what was measured"
+        advice = f"All {of} thresholds are within what was measured."
         if any(single.is_by_formula(row) for _, row in shown.iterrows()):
-            within = "such that their interval contains what was measured or a formula"
-        return Worth("good", "usable", f"All {of} thresholds are {within}.")
+            advice = f"The intervals of all {of} thresholds contain what was measured "
+            advice += "or a formula gives."
+        return Worth("good", "usable", advice)
     advice = (
         f"Take all {of} thresholds as shown, {with_what}. At {outside} of them the "
         "model alone lies outside what was measured on level beds."
