@@ -21,7 +21,7 @@ from orchestrator.report import answers, counted, labels, sheets, single, theory
 from orchestrator.report.card import Remark
 from orchestrator.report.page import caption
 from orchestrator.report.results import Results
-from orchestrator.report.subjects import WIND, length, place_of_file
+from orchestrator.report.subjects import USTAR, WIND, length, place_of_file
 from orchestrator.runs.case import said_of
 from orchestrator.study.parts import Obstacle, PileBed
 from orchestrator.study.scene import Scene
@@ -140,8 +140,9 @@ def over_ground(rows: pd.DataFrame) -> Remark:
     if known.empty:
         return Remark(head, f"{weaker}. {unknown}")
     row = known.iloc[0]
-    ustar = float(row["ustar0_m_s"])
-    here = float(row[WIND.column()])
+    # on the basis of the card
+    ustar = float(row[single.advised_column(row, USTAR)])
+    here = float(row[single.advised_column(row, WIND)])
     winds = []
     for z0 in ROUGHER_M:
         wind = float(log_law_speed(ustar, 10, z0))

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from orchestrator.physics import verdict
 from orchestrator.report import answers, labels, lines, remarks, sheets, shields
 from orchestrator.report.figures import bed
 from orchestrator.report.figures import shields as overview
@@ -218,15 +219,18 @@ def test_over_rougher_ground_a_weaker_wind_has_the_same_friction_velocity(
     heap = only(results, "pile")
     said = remarks.over_ground(heap.exemplars).text
     row = heap.exemplars.iloc[0]
-    ustar = row["ustar0_m_s"]
-    winds = [ustar / 0.41 * np.log(10 / z0) for z0 in (row["z0_m"], 1e-4, 1e-3)]
+    # of the number that the card advises
+    ustar = row["compared_ustar0_m_s"]
+    winds = [ustar / 0.41 * np.log(10 / z0) for z0 in (1e-4, 1e-3)]
+    winds.insert(0, float(row["compared_wind_10m_m_s"]))
     assert winds == sorted(winds, reverse=True)
     for speed in (ustar, *winds):
         assert f"{speed:#.3g} m/s" in said
     # over grains that are as rough as such ground the wind is no weaker
-    said = remarks.over_ground(reported(heap.exemplars.assign(z0_m=2e-4))).text
+    rough = heap.exemplars.assign(z0_m=2e-4, advised=verdict.MODEL)
+    said = remarks.over_ground(reported(rough)).text
     assert "0.1 mm" not in said
-    assert f"{winds[2]:#.3g} m/s" in said
+    assert f"{row['ustar0_m_s'] / 0.41 * np.log(10 / 1e-3):#.3g} m/s" in said
 
 
 def test_a_study_in_wind_says_what_rougher_ground_changes(tmp_path: Path) -> None:
