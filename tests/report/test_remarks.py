@@ -142,7 +142,7 @@ def test_grains_that_dem_follows_are_answered_by_no_force_law(results: Results) 
         told[dropped] = said.head, said.text, " ".join(sheet.shared)
     head, text, shared = told[None]
     assert head.startswith("The model overpredicts")
-    assert f"the force law {law} asks for" in text
+    assert f"the force law {law} has a" in text
     assert law in shared
     head, text, shared = told[0]
     assert head.startswith("The closed form of one grain overpredicts")
