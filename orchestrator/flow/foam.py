@@ -70,7 +70,9 @@ def listed(values: FloatArray | IntArray, item: str) -> str:
     return f"{len(values)}\n(\n{text})\n"
 
 
-def read_list(path: Path, after: str = "", kind: type = float) -> NDArray[Any]:
+def read_list(
+    path: Path, after: str = "", then: str = "", kind: type = float
+) -> NDArray[Any]:
     """Read the first list of a file, or the first behind some text.
 
     Parameters
@@ -79,6 +81,8 @@ def read_list(path: Path, after: str = "", kind: type = float) -> NDArray[Any]:
         The file.
     after
         The text.
+    then
+        A second one behind it, after which the list comes.
     kind
         Type of the numbers; whole numbers are read seven times as fast as others.
 
@@ -96,8 +100,10 @@ def read_list(path: Path, after: str = "", kind: type = float) -> NDArray[Any]:
     if path.is_file():
         text = path.read_text(encoding="utf-8", errors="replace")
     start = -1
-    if after in text:
-        start = text.find("\n(\n", text.find(after))
+    place = text.find(after)
+    place = text.find(then, place) if place >= 0 else place
+    if place >= 0:
+        start = text.find("\n(\n", place)
     if start < 0 or _END not in text[-100:]:
         what = f"the results are not whole: {path.name}"
         remedy = "is the disk full? Run the case again"
@@ -280,6 +286,28 @@ def start_from(path: Path, values: FloatArray, digits: int = DIGITS) -> None:
     path.write_text(text, encoding="utf-8")
 
 
+def set_roughness(path: Path, lengths: FloatArray, digits: int = DIGITS) -> None:
+    """Give each face of the bed a roughness length of its own, in the file ``0/nut``.
+
+    Parameters
+    ----------
+    path
+        The file, in which the patch of the bed has one length.
+    lengths
+        The lengths that the wall function takes, m, in the order of the faces.
+    digits
+        Digits of each.
+    """
+    text = path.read_text(encoding="utf-8")
+    start = text.index("\n    bed\n")
+    entry = f"z0 nonuniform List<scalar>\n{listed(lengths, f'%.{digits}g')};"
+    bed, count = re.subn(
+        r"z0 +uniform #eval\{[^}]*\};", lambda _: entry, text[start:], count=1
+    )
+    assert count == 1, "the template has one length for the bed"
+    path.write_text(text[:start] + bed, encoding="utf-8")
+
+
 class BedMesh(NamedTuple):
     """The mesh of a case.
 
@@ -378,8 +406,11 @@ class SolvedFlow:
         FloatArray
             The values, shape (n, components).
         """
-        after = f"\n    {patch}\n" if patch else "internalField   nonuniform"
-        return read_list(self.last_iteration / name, after)
+        path = self.last_iteration / name
+        if not patch:
+            return read_list(path, "internalField   nonuniform")
+        # a rough wall has a list of lengths before that of its values
+        return read_list(path, f"\n    {patch}\n", "\n        value ")
 
     @cached_property
     def mesh(self) -> BedMesh:

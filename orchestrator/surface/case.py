@@ -10,10 +10,11 @@ import numpy as np
 from orchestrator.bed.deck import read_texts
 from orchestrator.digits import rounded
 from orchestrator.errors import SolverError, Stalled
-from orchestrator.flow.foam import BED_FLOW, SolvedFlow
+from orchestrator.flow.foam import BED_FLOW, SolvedFlow, set_roughness
 from orchestrator.flow.run import Approach, OpenFoamCase
 from orchestrator.flow.stress import Diagnostic
 from orchestrator.surface import mesh
+from orchestrator.surface.ground import RoughnessMap
 from orchestrator.surface.heights import Surface
 from orchestrator.surface.mesh import COARSE, Columns, Level, Sizes
 from orchestrator.surface.stress import SurfaceStress
@@ -129,6 +130,8 @@ class SurfaceFlowCase(OpenFoamCase[SurfaceStress]):
         OpenFOAM's scheme for the convection of U.
     first_cell_m
         Height of the cells on the bed, normal to it, m; by default h/40.
+    roughness_map
+        Roughness lengths of the ground by place; None where all of it has z0.
     """
 
     surface: Surface
@@ -140,6 +143,7 @@ class SurfaceFlowCase(OpenFoamCase[SurfaceStress]):
     turbulence_model: str = "kEpsilon"
     convection_scheme: str = "linearUpwind"
     first_cell_m: float | None = None
+    roughness_map: RoughnessMap | None = None
 
     kind: ClassVar[str] = "surface"
     mesher: ClassVar[str] = "numpy"
@@ -148,7 +152,11 @@ class SurfaceFlowCase(OpenFoamCase[SurfaceStress]):
     @property
     def parameters(self) -> dict[str, Any]:
         """All that the flow depends on."""
+        # a flow without a map is called as before there were maps
+        ground = self.roughness_map
+        of_map = {"roughness_map": ground.digest} if ground else {}
         return {
+            **of_map,
             "surface": self.surface.digest,
             "height": rounded(self.height_m),
             "from_deg": float(self.from_deg),
@@ -242,6 +250,37 @@ class SurfaceFlowCase(OpenFoamCase[SurfaceStress]):
         self.write_parameters(directory, values)
         self.mesh.write(directory)
         self.approach.start(directory / "0", self.mesh.over_bed.ravel())
+        if self.roughness_map:
+            set_roughness(directory / "0" / "nut", self._lengths_at_wall())
+
+    def ground_roughness(self) -> FloatArray:
+        """Find the roughness length of each face of the bed, m.
+
+        Returns
+        -------
+        FloatArray
+            The lengths, of the shape of the mesh's columns; those of the slab ahead of
+            the inlet are of the approaching flow.
+        """
+        along, across, _ = self.mesh.shape
+        if self.roughness_map is None:
+            return np.full((along, across), self.roughness_m)
+        turned = self.mesh.middles[:, :, 0, :2] @ self.axes
+        east, north = np.moveaxis(turned + np.array(self.surface.centre), -1, 0)
+        found = self.roughness_map.at(east, north, self.roughness_m)
+        found[0] = self.roughness_m
+        return found
+
+    def _lengths_at_wall(self) -> FloatArray:
+        """What the wall function takes for the roughness lengths, as its template says.
+
+        Its kappa is one for all faces, that of the approaching flow; with it the
+        friction velocity of the log law is that of each length.
+        """
+        centre = self.first_cell / 2
+        over = (centre + self.roughness_m) / centre
+        lengths = self.ground_roughness().ravel()
+        return np.asarray(centre / ((1 + centre / lengths) ** over - 1))
 
     def collect(self, directory: Path) -> None:
         """Check the run and write its tables, or say why it failed."""

@@ -5,8 +5,9 @@ pocket.
 """
 
 from functools import cached_property
-from typing import Annotated, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
+import numpy as np
 from pydantic import Field, InstanceOf, model_validator
 
 from orchestrator.physics.grain import Grain
@@ -16,6 +17,7 @@ from orchestrator.study.declare import Height, Part, Roughness, UnfitError, Visc
 from orchestrator.study.declare import field as declared
 from orchestrator.study.method import Turbulence
 from orchestrator.study.parts import LAW_LABELS, Drag, Erosion, Fluid, Sphere
+from orchestrator.surface.ground import RoughnessMap
 from orchestrator.surface.heights import Surface, barchan, cone, oval
 from orchestrator.surface.rose import Rose
 
@@ -140,6 +142,9 @@ class SurfaceFlowMethod(Part):
     """how fine the mesh is"""
     roughness: Roughness | None = declared(None, symbol="z_0", unit="m")
     """roughness length at which the flow is solved; by default the bed's"""
+    roughness_map: InstanceOf[RoughnessMap] | None = None
+    """raster of roughness lengths of the ground, .tif or .asc, m; its empty cells, what
+    lies outside and the approaching wind have `roughness`"""
     speed: float = declared(10.0, symbol="U_e", unit="m/s", ge=1e-6, le=1e3)
     """speed ten heights above the ground at which the flow is solved"""
     viscosity: Viscosity | None = declared(None, symbol="ν", unit="m²/s")
@@ -195,13 +200,39 @@ class SurfaceScene(Part):
             what = f"{self.solve_roughness:g} m on a form {relief:.3g} m high"
             remedy = "lower it: its elements would stand out of the cells"
             raise UnfitError("method.flow.roughness", what, remedy)
+        self._check_map()
         return self
+
+    def _check_map(self) -> None:
+        """Refuse a map of roughness that does not belong to the bed."""
+        ground = self.method.flow.roughness_map
+        if ground is None:
+            return
+        field = "method.flow.roughness_map"
+        largest = float(np.nanmax(ground.z0))
+        if largest > ROUGHEST * self.heights.relief:
+            what = f"{largest:g} m on a form {self.heights.relief:.3g} m high"
+            raise UnfitError(field, what, "its elements would stand out of the cells")
+        system = self.heights.system
+        if ground.system and system and ground.system != system:
+            what = "its coordinate system is not that of the surface"
+            raise UnfitError(field, what, "bring it there, with gdalwarp -t_srs")
+        x, y = np.meshgrid(self.heights.x, self.heights.y)
+        known = ground.at(x, y, np.nan)[self.heights.is_form]
+        if np.isnan(known).all():
+            what = "it has no cell on the form"
+            remedy = "both rasters have their places in one coordinate system"
+            raise UnfitError(field, what, remedy)
 
     @property
     def id(self) -> str:
         """What tells it from every other scene: its fields, and its heights."""
-        fields = self.model_dump(mode="json", exclude={"bed": {"surface"}})
-        return digest_text(canonical_json([fields, self.heights.digest]))[:12]
+        rasters: Any = {"bed": {"surface"}, "method": {"flow": {"roughness_map"}}}
+        parts = [self.model_dump(mode="json", exclude=rasters), self.heights.digest]
+        ground = self.method.flow.roughness_map
+        if ground:
+            parts.append(ground.digest)
+        return digest_text(canonical_json(parts))[:12]
 
     @property
     def heights(self) -> Surface:
@@ -252,4 +283,6 @@ class SurfaceScene(Part):
         if self.bed.slope_deg is not None:
             words.append(f"{self.bed.slope_deg:g}°")
         words.append(f"z₀ {1e3 * self.solve_roughness:.3g} mm")
+        if self.method.flow.roughness_map:
+            words.append(f"z₀ by place of {self.method.flow.roughness_map.name}")
         return ", ".join(words)

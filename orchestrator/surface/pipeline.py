@@ -18,6 +18,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure as Canvas
 
 from orchestrator import plan
+from orchestrator.errors import InputError
 from orchestrator.experiment import Experiment, ExperimentResults, Runs, page_texts
 from orchestrator.flow.run import SPEED_HEIGHT, WALL_STRESS
 from orchestrator.physics.constants import KARMAN
@@ -129,6 +130,10 @@ class SurfaceMotion(OverSurfaces):
         )
 
 
+INLET_OFF = 1.1
+"""Factor by which the ground at the inlet may be other than that of the approach."""
+
+
 def flow_of(scene: SurfaceScene) -> SurfaceFlowCase:
     """The run of a scene.
 
@@ -136,6 +141,11 @@ def flow_of(scene: SurfaceScene) -> SurfaceFlowCase:
     -------
     SurfaceFlowCase
         The run of its flow.
+
+    Raises
+    ------
+    InputError
+        If a map of roughness has other ground at the inlet than the approaching wind.
     """
     roughness = scene.solve_roughness
     relief = scene.heights.relief
@@ -143,10 +153,13 @@ def flow_of(scene: SurfaceScene) -> SurfaceFlowCase:
     eddy = KARMAN * float(log_law_ustar(asked.speed, SPEED_HEIGHT * relief, roughness))
     viscous = (asked.viscosity or 0.0) / eddy
     cell = asked.first_cell_height
-    cell = cell or default_first_cell_height(relief, roughness, viscous)
+    roughest = roughness
+    if asked.roughness_map:
+        roughest = max(roughness, float(np.nanmax(asked.roughness_map.z0)))
+    cell = cell or default_first_cell_height(relief, roughest, viscous)
     most = eddy * cell / VISCOUS_CELLS
     viscosity = asked.viscosity or min(SOLVE_VISCOSITY, float(f"{most:.3g}"))
-    return SurfaceFlowCase(
+    made = SurfaceFlowCase(
         scene.heights,
         scene.flow.from_deg,
         asked.speed,
@@ -155,7 +168,25 @@ def flow_of(scene: SurfaceScene) -> SurfaceFlowCase:
         LEVELS[asked.level],
         turbulence_model=asked.turbulence_model,
         first_cell_m=cell,
+        roughness_map=asked.roughness_map,
     )
+    _check_inlet(made)
+    return made
+
+
+def _check_inlet(flow: SurfaceFlowCase) -> None:
+    """Refuse a map of roughness in which the wind enters over other ground."""
+    if flow.roughness_map is None:
+        return
+    at_inlet = float(np.exp(np.log(flow.ground_roughness()[1]).mean()))
+    if abs(np.log(at_inlet / flow.roughness_m)) <= np.log(INLET_OFF):
+        return
+    what = (
+        f"at the upwind edge, of wind from {flow.from_deg:g}°, the ground has "
+        f"{at_inlet:.3g} m, and the approaching wind {flow.roughness_m:.3g} m"
+    )
+    remedy = f"method.flow.roughness = {at_inlet:.3g}, or a map that ends before it"
+    raise InputError(what, "method.flow.roughness_map", remedy)
 
 
 def alike(

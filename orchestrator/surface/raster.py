@@ -276,6 +276,33 @@ class OpenedRaster(NamedTuple):
     said: tuple[str, ...] = ()
 
 
+def read_raster(path: Path, where: str) -> Raster:
+    """Read a raster of one quantity in m, whatever it is.
+
+    Parameters
+    ----------
+    path
+        A GeoTIFF or an ESRI grid.
+    where
+        The file and the field that names it, for messages.
+
+    Returns
+    -------
+    Raster
+        Its cells, NaN where these are empty.
+
+    Raises
+    ------
+    InputError
+        If it is no such raster, or its axes are not in m.
+    """
+    with opened_raster(path, where) as opened:
+        _check_band(opened.dataset, where)
+        _check_system(opened.system, where)
+        of_file = (opened.dataset, path.name, opened.system, opened.empty)
+        return _raster(*of_file, where)
+
+
 def is_empty(values: FloatArray, empty: float | None) -> BoolArray:
     """Tell which cells of a raster have the number of empty ones.
 

@@ -22,6 +22,7 @@ from orchestrator.study.reading import CONFIRMED, fluid_of
 from orchestrator.study.scene import roughness_length
 from orchestrator.study.source import decoded, read_bytes
 from orchestrator.study.study import File, Group, Kind, Study
+from orchestrator.surface.ground import read_roughness
 from orchestrator.surface.heights import Surface
 from orchestrator.surface.parts import (
     SurfaceBed,
@@ -78,6 +79,11 @@ def _scene(tables: Mapping[str, Table], where: str, files: Files) -> SurfaceScen
     name = bed.get("surface")
     if isinstance(name, str):
         bed["surface"] = files.once(name, f"{where}: bed.surface", _named(name))
+    flow = made["method.flow"]
+    ground = flow.get("roughness_map")
+    if isinstance(ground, str):
+        field = f"{where}: method.flow.roughness_map"
+        flow["roughness_map"] = files.once(ground, field, read_roughness)
     try:
         if isinstance(bed["roughness"], str) and isinstance(diameter, float | int):
             bed["roughness"] = roughness_length(bed["roughness"], diameter)

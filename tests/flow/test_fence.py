@@ -133,7 +133,7 @@ def test_the_pressure_falls_by_the_loss(solve: Solve) -> None:
     pressure = solved.field("p")[:, 0]
     speed = np.linalg.norm(solved.velocity, axis=1)
     zones = directory / "constant/polyMesh/cellZones"
-    cells = read_list(zones, "fence1 ", int)[:, 0]
+    cells = read_list(zones, "fence1 ", kind=int)[:, 0]
     columns = np.split(cells[np.argsort(middles[cells, 0], kind="stable")], 2)
     first, second = (one[np.argsort(middles[one, 2])] for one in columns)
     fall = pressure[first] - pressure[second]

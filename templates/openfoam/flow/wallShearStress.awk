@@ -90,10 +90,14 @@ function read_patches(file,    line, text, words, i, patch) {
 }
 
 # Open the first list of a file, or the first one behind a line that begins with some
-# word; the number of its items.
+# word, of a patch that of its values: a rough wall has a list of lengths, too; the
+# number of its items.
 function open_list(file, word,    line, words, before) {
     while (words[1] != word && (getline line <file) > 0)
         split(line, words, " ")
+    if (word in start)
+        while (words[1] != "value" && (getline line <file) > 0)
+            split(line, words, " ")
     while (line != "(" && (getline line <file) > 0)
         if (line != "(")
             before = line
