@@ -7,15 +7,18 @@ import re
 import shlex
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from orchestrator import cli, pipeline
+from orchestrator import cli, pipeline, plan, tables
 from orchestrator.benchmark import commands as benchmark
 from orchestrator.errors import LONGEST, Fault, InputError, of_exception
 from orchestrator.runs import files, workspace
 from orchestrator.runs.workspace import EXPERIMENT, Workspace
+from orchestrator.study.study import Study
 from tests.conftest import Command
 
 GRAINS = """
@@ -274,3 +277,39 @@ def test_a_study_without_cases_does_not_say_that_they_were_done(
     assert "done already" not in again.err
     assert "no solver was started" in again.err
     assert again.out == first.out
+
+
+def test_report_draws_also_what_results_that_are_read_again_show_to_be_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Only then are flows that were added on the way known to be asked for."""
+    file = tmp_path / "waves.toml"
+    file.write_text(
+        "fluid = { kind = 'air' }\ngrain = { diameter = 1e-3 }\n"
+        "bed = { kind = 'pile', shape = 'dune', slope_deg = 10.0, height = 0.05 }\n"
+        "method = { kind = 'local', flow = { model = 'waves' } }\n"
+    )
+    out = tmp_path / "out"
+    assert cli.main(["study", str(file), "--out", str(out)]) == 0
+    refined: list[plan.Plan] = []
+    drawn: list[plan.Plan] = []
+    made_of = tables.make_tables
+
+    def one_more(made: plan.Plan, cases: Path) -> plan.Plan:
+        refined.append(made)
+        return replace(made) if len(refined) == 1 else made
+
+    def make_tables(study: Study, made: plan.Plan, *more: Any) -> tables.Tables:
+        drawn.append(made)
+        return made_of(study, made, *more)
+
+    monkeypatch.setattr(plan, "refined", one_more)
+    monkeypatch.setattr(tables, "make_tables", make_tables)
+    capsys.readouterr()
+    pipeline.redraw(out)
+    first, second = refined
+    assert [made is second for made in drawn] == [True]
+    assert first is not second
+    said = capsys.readouterr().err.splitlines()
+    assert said[0].startswith("drawing tables  0% of the work, about ")
+    assert said[-1] == "all is drawn  100% of the work"
