@@ -23,7 +23,6 @@ from orchestrator.study.heads import METRE
 from orchestrator.study.source import decoded, read_bytes
 from orchestrator.study.units import number
 from orchestrator.surface.heights import (
-    FEWEST,
     MOST_NODES,
     STEEPEST_DEG,
     Raster,
@@ -555,11 +554,10 @@ def _check_grid(text: str, where: str) -> _Grid:
 
 
 def _check_counts(widths: list[int], columns: float, rows: float, where: str) -> None:
-    """Refuse a grid whose lines have other counts of heights than its head."""
-    if columns % 1 or columns * rows != sum(widths) or min(columns, rows) < FEWEST:
-        what = f"{sum(widths)} heights, not {columns:.9g} x {rows:.9g}"
-        remedy = f"nrows lines of ncols numbers, {FEWEST} of each at least"
-        raise InputError(what, where, remedy)
+    """Refuse a grid whose lines have other counts of numbers than its head."""
+    if columns % 1 or columns * rows != sum(widths):
+        what = f"{sum(widths)} numbers, not {columns:.9g} x {rows:.9g}"
+        raise InputError(what, where, "nrows lines of ncols numbers")
     if {*widths} == {rows} and rows != columns:
         what = f"its lines have {rows:.9g} numbers, and ncols is {columns:.9g}"
         raise InputError(what, where, "are ncols and nrows exchanged?")

@@ -384,7 +384,7 @@ def test_a_form_of_few_cells_is_refused() -> None:
         (
             "a.asc",
             CORNER + "ncols 9.5\nnrows 9\ncellsize 1\n1 2 3\n",
-            "3 heights, not 9.5 x 9",
+            "3 numbers, not 9.5 x 9",
         ),
         ("a.asc", WHOLE.format("inf", 0), "cellsize inf"),
         ("a.asc", WHOLE.format(1, "nan"), "xllcorner nan"),
@@ -398,7 +398,7 @@ def test_a_form_of_few_cells_is_refused() -> None:
         (
             "a.asc",
             CORNER + "ncols 9\nnrows 9\ncellsize 1\n1 2 3\n",
-            "3 heights, not 9 x 9",
+            "3 numbers, not 9 x 9",
         ),
         ("a.tif", "no picture", "GeoTIFF: it is cut off, or another kind of file"),
         ("a.stl", "no triangles", "it is no whole STL file"),

@@ -12,6 +12,7 @@ from rasterio.transform import Affine
 
 import orchestrator
 from orchestrator import cli
+from orchestrator.surface.raster import opened_raster
 from orchestrator.types import FloatArray
 
 GRAIN = ["--fluid", "water", "--diameter", "1e-3", "--density", "2650"]
@@ -229,3 +230,12 @@ def test_bands_and_options_without_a_raster_are_refused(
     assert "--stress FILE" in capsys.readouterr().err
     assert cli.main(["threshold", *GRAIN, "--stress", str(tmp_path / "no.tif")]) == 2
     assert "there is no such file" in capsys.readouterr().err
+
+
+def test_a_small_grid_of_stress_is_a_map(tmp_path: Path) -> None:
+    """A surface asks for eight heights along each axis; a map of stress is of any size."""
+    head = "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n"
+    path = tmp_path / "small.asc"
+    path.write_text(f"{head}0.1 0.2 0.3\n0.4 0.5 0.6\n", encoding="utf-8")
+    with opened_raster(path, "stress") as opened:
+        assert opened.dataset.read(1).tolist() == [[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]]
