@@ -16,6 +16,7 @@ from orchestrator.report.results import Results
 from orchestrator.runs import case, cluster, engine, reuse, terminal, workspace
 from orchestrator.runs.case import Case
 from orchestrator.runs.engine import Display
+from orchestrator.runs.files import write_durably
 from orchestrator.runs.queues import Queue
 from orchestrator.runs.workspace import EXPERIMENT, STATE, STUDY, Workspace, claimed
 from orchestrator.study.own_errors import noted
@@ -24,8 +25,6 @@ from orchestrator.study.study import Study, parse
 
 Failures = Mapping[str, OrchestratorError]
 States = Mapping[str, Any]
-COMMANDS = {"surface": "study", "surfaces": "validate --surfaces PART"}
-"""Commands of the experiments whose names are other ones."""
 OF_TABLES = 0.5
 """Share of the time after the last case that tables take, nearly."""
 
@@ -263,7 +262,7 @@ def reopen(space: Workspace) -> tuple[Study, Plan]:
 
 def _again(about: Mapping[str, Any], root: Path) -> str:
     """The command of an experiment, with the file that it is on, and its directory."""
-    command = f"orchestrator {COMMANDS.get(about['name'], about['name'])}"
+    command = f"orchestrator {workspace.COMMANDS.get(about['name'], about['name'])}"
     source = about.get("source")
     if not isinstance(source, dict) or "file" not in source:
         return f"{command} --out {root}"
@@ -310,6 +309,42 @@ def redraw(out: Path, *, every: bool = False) -> Finished:
                 study, planned, space, states, failures, display, every=every
             )
         return Finished(space.page, 0, failures, answer, undrawn)
+
+
+def film(out: Path, file: Path) -> Path:
+    """Write the grains of a study's bed under its rising flow as an animation.
+
+    Parameters
+    ----------
+    out
+        The directory of the study.
+    file
+        The GIF.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If it is no GIF, cannot be written, or the study has no bed of grains.
+    """
+    from orchestrator.report import movie  # it imports matplotlib
+
+    movie.check(file)
+    space = Workspace(out.absolute())
+    study, planned = reopen(space)
+    done = reuse.done(planned.cases, space.cases)
+    made = tables.make_tables(study, planned, space.cases, done)
+    content = movie.of_study(Results(study, planned, made, space.cases))
+    try:
+        write_durably(file, content)
+    except OSError as error:
+        what = f"the animation cannot be written: {error.strerror or error}"
+        raise InputError(what, str(file), "name another file") from None
+    return file
 
 
 def prune(directory: Path) -> str:
@@ -375,7 +410,9 @@ def _draw(
         answer = report.said(results, cards, marked=True)
         try:
             rooms = guests.figures()
-            undrawn = report.write(results, causes, space, cards, every, rooms, written)
+            undrawn = report.write(
+                results, causes, space, cards, every, rooms, written, times
+            )
         except BaseException:
             # no memory for a picture, or an interrupt: the answer is found
             print(terminal.plain(answer), file=sys.stderr)

@@ -19,7 +19,6 @@ import pandas as pd
 from orchestrator.lab.strips import MOVED
 from orchestrator.lab.validate import (
     EVENTS,
-    FOLDER,
     GUST,
     INTENSITY,
     IVERSEN_WHITE,
@@ -44,6 +43,7 @@ from orchestrator.physics.beside import (
 )
 from orchestrator.physics.curves import GAMMA
 from orchestrator.physics.laws import DEFAULT, LAWS
+from orchestrator.physics.measured import MEASURED_BEDS
 from orchestrator.physics.threshold import PAPER
 from orchestrator.study import fields as columns
 from orchestrator.study import study
@@ -274,7 +274,7 @@ def of_grains() -> pd.DataFrame:
     An entrainment angle and a d/z0 stand for a range. The interval of a range is the
     widest of those of its ends and of its middle.
     """
-    beds = pd.read_csv(FOLDER / "beds.csv").rename(columns={"shields": "measured"})
+    beds = pd.read_csv(MEASURED_BEDS).rename(columns={"shields": "measured"})
     beds = beds.assign(group=beds["set"] + ", " + beds["source"])
     grains = measured_grains(beds)
     beds = beds.assign(galileo=grains.galileo, density_ratio=grains.density_ratio)

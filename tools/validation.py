@@ -39,6 +39,7 @@ from orchestrator.physics.beside import GRAINS, SUSTAINED
 from orchestrator.physics.constants import GAS_BELOW, SAND_GRAIN
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import DEFAULT as LAW
+from orchestrator.physics.measured import MEASURED_BEDS
 from orchestrator.physics.onset import Criteria, of_grains
 from orchestrator.types import FloatArray
 
@@ -333,7 +334,7 @@ def steep() -> str:
 
 def steep_rows() -> pd.DataFrame:
     """The measured rows of the steep flumes."""
-    beds = pd.read_csv(FOLDER / "beds.csv").rename(columns={"shields": "measured"})
+    beds = pd.read_csv(MEASURED_BEDS).rename(columns={"shields": "measured"})
     return beds[beds["set"] == STEEP[0]]
 
 
@@ -376,7 +377,7 @@ def ceases() -> str:
 
 def own_interval() -> str:
     """How many measured rows the model's own interval contains."""
-    beds = pd.read_csv(FOLDER / "beds.csv")
+    beds = pd.read_csv(MEASURED_BEDS)
     beds = beds[beds["set"] != RIVERS]
     grains = measured_grains(beds)
     criteria = Criteria(single(beds, GRAVEL).shields, grains, GUST)

@@ -263,7 +263,9 @@ def _panels(
     looks = _looks(numbers)
     del looks[OURS]
     x_label, y_label, limits = AXES[quantity]
-    canvas, axes = style.grid(drawn, 1.7, x_label, y_label, columns=3)
+    canvas, axes = style.grid(
+        drawn, 1.7, x_label, y_label, columns=3, width=style.WIDTH
+    )
     outside = 0
     for ax, scene in zip(axes, drawn, strict=True):
         outside += _panel(ax, numbers[numbers["scene"] == scene], quantity, looks)

@@ -28,7 +28,7 @@ from orchestrator.physics.curves import of_medium
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import CLIFT_GAUVIN, LAWS
-from orchestrator.physics.measured import kirchner_pivot
+from orchestrator.physics.measured import MEASURED_BEDS, kirchner_pivot
 from orchestrator.physics.onset import Criteria, Onset, of_grains
 from orchestrator.physics.threshold import LAWS_OF, PAPER
 from orchestrator.report import style
@@ -471,7 +471,7 @@ def compare_models(
 
 def _measured_beds() -> pd.DataFrame:
     """The measured beds, with Galileo number and pull of a contact over the weight."""
-    beds = pd.read_csv(FOLDER / "beds.csv").rename(columns={"shields": "measured"})
+    beds = pd.read_csv(MEASURED_BEDS).rename(columns={"shields": "measured"})
     grains = measured_grains(beds)
     return beds.assign(
         galileo=grains.galileo,

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from orchestrator.physics.constants import GAS_BELOW, GRAVITY
 from orchestrator.types import FloatArray
 
 
@@ -59,6 +60,69 @@ def _bin(row: dict[str, str]) -> Bin:
         tenth=float(row["tenth"]),
         ninetieth=float(row["ninetieth"]),
     )
+
+
+MEASURED_BEDS = Path(__file__).with_name("beds.csv")
+"""Measured beds, a row for each: of flumes, rivers and the field."""
+_OF_FORMULA = "formula of Iversen and White"
+"""The set of rows there that are of a formula."""
+
+
+def single_beds(*, in_gas: bool) -> tuple[FloatArray, FloatArray]:
+    """List every measured bed of `MEASURED_BEDS`.
+
+    Parameters
+    ----------
+    in_gas
+        Whether those in a gas or those in a liquid.
+
+    Returns
+    -------
+    reynolds, shields : FloatArray
+        Re* at the measured threshold and its critical Shields number, shape (n,).
+
+    Examples
+    --------
+    >>> reynolds, shields = single_beds(in_gas=True)
+    >>> bool((reynolds > 0).all()), reynolds.shape == shields.shape
+    (True, True)
+    """
+    d, solid, fluid, viscosity, shields = _rows_of_beds(in_gas)
+    ustar = np.sqrt(shields * (solid - fluid) / fluid * GRAVITY * d)
+    return ustar * d / viscosity, shields
+
+
+def measured_sizes(*, in_gas: bool) -> tuple[FloatArray, FloatArray]:
+    """List the sizes of the measured beds with their threshold friction velocities.
+
+    Parameters
+    ----------
+    in_gas
+        Whether those in a gas or those in a liquid.
+
+    Returns
+    -------
+    diameter, ustar : FloatArray
+        Diameters, m, and friction velocities, m/s, shape (n,).
+
+    Examples
+    --------
+    >>> diameter, ustar = measured_sizes(in_gas=False)
+    >>> bool((ustar > 0).all()), diameter.shape == ustar.shape
+    (True, True)
+    """
+    d, solid, fluid, _, shields = _rows_of_beds(in_gas)
+    return d, np.sqrt(shields * (solid - fluid) / fluid * GRAVITY * d)
+
+
+@cache
+def _rows_of_beds(in_gas: bool) -> FloatArray:
+    """Diameter, densities, viscosity and Shields number of each bed, shape (5, n)."""
+    with MEASURED_BEDS.open(encoding="utf-8", newline="") as stream:
+        table = [row for row in csv.DictReader(stream) if row["set"] != _OF_FORMULA]
+    names = ("d_m", "rho_sol_kg_m3", "rho_f_kg_m3", "nu_m2_s", "shields")
+    rows = np.array([[float(row[name]) for name in names] for row in table])
+    return np.asarray(rows[(rows[:, 2] < GAS_BELOW) == in_gas].T)
 
 
 BUFFINGTON_MONTGOMERY = _bins("all")

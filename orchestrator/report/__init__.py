@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 from orchestrator.runs import second, terminal
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from orchestrator.report.kept import Kept
     from orchestrator.report.page import Guest
     from orchestrator.report.results import Results
@@ -27,6 +29,7 @@ def write(
     every: bool = False,
     packages: Sequence[str] = (),
     written: Mapping[str, str] | None = None,
+    times: "pd.DataFrame | None" = None,
 ) -> list[str]:
     """Draw the figures of a study and write its page into its directory.
 
@@ -46,6 +49,8 @@ def write(
         Packages of others with further figures, as of `figures.kinds`.
     written
         Digests of the tables where they are written already, as of `write_tables`.
+    times
+        The times of the cases, as of `tables.timings`.
 
     Returns
     -------
@@ -53,7 +58,7 @@ def write(
         A line for each figure that could not be drawn, such as for want of memory. The
         page has the line in its place.
     """
-    from orchestrator.report import page, sections
+    from orchestrator.report import foot, page, sections
     from orchestrator.report.kept import Kept
 
     is_paper = any(guest.is_paper for guest in guests)
@@ -71,10 +76,18 @@ def write(
         results.study.title,
         listed,
         above=f"Study “{results.study.title}”",
+        foot=foot.of_page(folder, sections.programs(results), _wall_s(times)),
         links=sections.links(results),
         is_paper=is_paper,
     )
     return faults
+
+
+def _wall_s(times: "pd.DataFrame | None") -> float | None:
+    """The wall time of all cases; None without any."""
+    if times is None or times.empty:
+        return None
+    return float(times[["solver_s", "outside_s"]].sum().sum())
 
 
 def _drawn(
@@ -98,7 +111,7 @@ def _drawn(
         terminal.check_signals()
         return drawn
 
-    with style.settings():
+    with style.settings(style.LETTERS):
         made = second.shared(of_kind, len(missing))
     for number, drawn in zip(missing, made, strict=True):
         found[number] = drawn

@@ -29,6 +29,8 @@ ALWAYS = ("scenes", "methods")
 """Tables from which the plan of the study follows, which every figure may ask."""
 WORDS = ("name", "title", "caption", "data", "place", "follows", "part")
 """What is kept of a figure as it is, beside its image."""
+ENDINGS = (".svg", "-narrow.svg", ".csv")
+"""What follows the name of a figure in those of its files."""
 LISTS = ("cases", "tables")
 """What is kept of it as a list."""
 
@@ -119,11 +121,11 @@ class Kept:
         listed = []
         for figure in drawn.figures:
             about = {name: getattr(figure, name) for name in (*WORDS, *LISTS)}
-            digest = ""
-            if figure.image:
-                self._folder.put(f"{FIGURES}/{figure.name}.svg", figure.image)
-                digest = sha256(figure.image).hexdigest()
-            listed.append((about, digest))
+            digests = {}
+            for ending, content in _files(figure).items():
+                self._folder.put(f"{FIGURES}/{figure.name}{ending}", content)
+                digests[ending] = sha256(content).hexdigest()
+            listed.append((about, digests))
         if not drawn.fault:
             self._now[file] = {"from": self.sources(drawn.reads), "figures": listed}
 
@@ -179,15 +181,29 @@ class Kept:
         digest = case.digest_of_results(run, self._results.cases)
         return [digest, case.is_whole(run, self._results.cases)]
 
-    def _figure(self, about: Mapping[str, Any], digest: str) -> Figure:
-        """A figure with its image; ValueError where that is not the one drawn."""
-        image = b""
-        if digest:
-            path = self._folder.path(f"{FIGURES}/{about['name']}.svg")
-            image = path.read_bytes()
-            if sha256(image).hexdigest() != digest:
+    def _figure(self, about: Mapping[str, Any], digests: Mapping[str, str]) -> Figure:
+        """A figure with its files; ValueError where one is not what was written."""
+        files = dict.fromkeys(ENDINGS, b"")
+        for ending, digest in digests.items():
+            path = self._folder.path(f"{FIGURES}/{about['name']}{ending}")
+            files[ending] = path.read_bytes()
+            if sha256(files[ending]).hexdigest() != digest:
                 raise ValueError(about["name"])
         words: dict[str, Any] = {name: about[name] for name in WORDS}
         for name in LISTS:
             words[name] = tuple(about[name])
-        return Figure(**words, drawing=None, image=image)
+        image, narrow, numbers = (files[ending] for ending in ENDINGS)
+        return Figure(
+            **words,
+            drawing=None,
+            image=image,
+            narrow_image=narrow,
+            numbers=numbers.decode("utf-8"),
+        )
+
+
+def _files(figure: Figure) -> dict[str, bytes]:
+    """What is written of a figure, by what follows its name."""
+    contents = figure.image, figure.narrow_image, figure.numbers.encode("utf-8")
+    files = zip(ENDINGS, contents, strict=True)
+    return {ending: content for ending, content in files if content}

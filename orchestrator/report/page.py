@@ -471,6 +471,7 @@ def write_page(
     sections: Sequence[Section],
     *,
     above: str = "",
+    foot: Mapping[str, Any] | None = None,
     links: Mapping[str, str] | None = None,
     is_paper: bool = False,
 ) -> None:
@@ -488,6 +489,8 @@ def write_page(
         Its parts, the answer first; their figures have images.
     above
         What stands above the first part, by default the title.
+    foot
+        What stands at its end, as of `foot.of_page`.
     links
         Addresses of cases by their names.
     is_paper
@@ -497,6 +500,7 @@ def write_page(
         "page.html.j2",
         title=title,
         above=above or title,
+        foot=page_text("foot", **foot) if foot else "",
         sections=sections,
         links=links or {},
         is_paper=is_paper,
@@ -526,7 +530,7 @@ def write_experiment(
     solvers
         Versions of the solvers, by name.
     """
-    from orchestrator.report import style  # it imports matplotlib
+    from orchestrator.report import foot, style  # style imports matplotlib
 
     listed = []
     for section in sections:
@@ -539,4 +543,5 @@ def write_experiment(
     files: list[Element] = [Table(versions(solvers))]
     if any(section.figures for section in sections):
         files.insert(0, Text(page_text("files_of_figures")))
-    write_page(folder, name, title, [*listed, Section("Files", files)])
+    listed.append(Section("Files", files))
+    write_page(folder, name, title, listed, foot=foot.of_page(folder, solvers))

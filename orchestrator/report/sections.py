@@ -174,14 +174,24 @@ def _methods(results: Results) -> Section:
             content.append(Text(page_text("checked", checks=results.tables["check"])))
     content += _beside_measurements(results)
     content.append(Text(_left_out(results)))
-    programs = versions(case.programs(results.cases, results.plan.cases))
     content += [
         Text(page_text("force_laws")),
         Table(sheets.force_laws(results)),
         Table(sheets.parameters(results), fold="All parameters"),
-        Table(programs, fold="Versions of the programs"),
+        Table(versions(programs(results)), fold="Versions of the programs"),
     ]
     return Section("How it was computed", content, "methods", "Methods")
+
+
+def programs(results: Results) -> dict[str, str]:
+    """Name the programs that the cases of a study were run by.
+
+    Returns
+    -------
+    dict of str to str
+        Their versions, by name.
+    """
+    return dict(case.programs(results.cases, results.plan.cases))
 
 
 def _beside_measurements(results: Results) -> Iterator[Element]:

@@ -14,7 +14,7 @@ from orchestrator.physics import curves as published
 from orchestrator.physics.beside import FIELD
 from orchestrator.physics.fluids import ALIKE, NUMBERS_OF_PAPER
 from orchestrator.physics.laws import LAWS
-from orchestrator.physics.measured import MEASURED_SOURCE
+from orchestrator.physics.measured import MEASURED_SOURCE, single_beds
 from orchestrator.report import labels, style, theory
 from orchestrator.report.results import Results, held, split_by, valid
 from orchestrator.report.style import Look
@@ -22,7 +22,7 @@ from orchestrator.report.theory import BINS, Going, Line
 from orchestrator.study import fields
 from orchestrator.study.criterion import SUSTAINED
 from orchestrator.tables.facts import are_followed, needs_run
-from orchestrator.types import BoolArray, FloatArray
+from orchestrator.types import BoolArray, FloatArray, IntArray
 
 SHAPES = "os^DvP<X>p8hd*"
 """Markers, in the order in which rows take them."""
@@ -46,8 +46,15 @@ SERIES = ("nu_m2_s", "force_law", "regime", SHAPE)
 """Columns in which piles agree that a line joins."""
 FIELD_REYNOLDS = (8.8, 13.5)
 """Re* of the sites of `FIELD`."""
+JUMP, FAR = 1.25, 3.0
+"""Least factor of a jump of a curve, and over the steps beside it, in logarithms."""
 GOING_DASH = (0, (7, 1.2, 1.5, 1.2))
 """Dash of the curves of grains in sustained motion."""
+PUBLISHED = "published curves, see caption"
+"""Label of the curves for air and for water, which the caption names by their colours.
+"""
+MEASURED = "measured, see caption"
+"""Label of what was measured in water and in the field, as the caption says."""
 DOTTED = "dotted: the force law does not hold"
 """Label of the part of a curve that is dotted."""
 GAP = np.full((1, 2), np.nan)
@@ -275,6 +282,7 @@ def about(rows: pd.DataFrame) -> dict[str, Any]:
         "sloped": SLOPED if is_sloped else "",
         "curves": "; ".join(curve.name for curve in published.WATER),
         "measured": MEASURED_SOURCE,
+        "sites": len(FIELD),
         "bagnold_from": f"{theory.BAGNOLD_FROM:g}",
     }
     return of_the_points | of_the_lines
@@ -332,7 +340,7 @@ def _points_of(axes: Sequence[Axes]) -> Any:
     found = []
     for ax in axes:
         for line in ax.lines:
-            if line.get_gid() != "intervals":
+            if line.get_gid() not in ("intervals", "single beds"):
                 found.append(np.asarray(line.get_xydata(), float))
     return np.concatenate(found).T
 
@@ -393,10 +401,37 @@ class DrawnCurve(NamedTuple):
         """
         parts = [(self.label, self.holds, self.dash), (DOTTED, self.dotted, ":")]
         look: Look = {"color": self.colour, "lw": self.width, "gid": RESULT[0]}
+        jumps = jumps_of(self.points)
         for label, chosen, dash in parts:
             if chosen.any():
                 shown = np.where(chosen, self.points, np.nan)
+                shown = np.insert(shown, jumps, np.nan, axis=1)
                 ax.plot(*shown, ls=dash, label=label, **look)
+
+
+def jumps_of(points: FloatArray) -> IntArray:
+    """Find where a curve jumps, so that no line is drawn between both sides.
+
+    Parameters
+    ----------
+    points
+        Re* and Shields number along the curve, shape (2, n).
+
+    Returns
+    -------
+    IntArray
+        The numbers of the points behind a jump: of those whose Shields number is
+        another one by `JUMP` times, and by `FAR` times the step before and behind.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        steps = np.abs(np.diff(np.log(points[1])))
+    if len(steps) < 3:
+        return np.empty(0, np.int64)
+    around = np.maximum(
+        np.concatenate([steps[1:2], steps[:-1]]), np.append(steps[1:], steps[-2])
+    )
+    is_jump = (steps > np.log(JUMP)) & (steps > FAR * around)
+    return np.flatnonzero(is_jump) + 1
 
 
 class Points(NamedTuple):
@@ -533,7 +568,7 @@ def _draw_points(
 ) -> list[tuple[Line2D, BoolArray]]:
     """Intervals and the rows' own markers; groups of markers with what they show."""
     x, y, low, high = (rows[column].to_numpy(float) for column in columns)
-    _draw_intervals(ax, x, low, high, colour, size)
+    _draw_intervals(ax, x, (low, y, high), colour, size)
     usable = valid(rows).to_numpy()
     shape = rows[SHAPE].to_numpy(str)
     drawn = []
@@ -560,13 +595,20 @@ def _draw_points(
 
 
 def _draw_intervals(
-    ax: Axes, x: Any, low: Any, high: Any, colour: str, size: float
+    ax: Axes, x: Any, interval: tuple[Any, Any, Any], colour: str, size: float
 ) -> None:
     """Bars with caps, as one line with gaps: singly they take three times as long.
 
-    A bar without an upper end leaves the frame.
+    An interval, by its lower end, its number and its upper end, that has no upper end
+    has an arrow from the number.
     """
-    high = np.where(np.isnan(high), BEYOND * low, high)
+    low, y, high = interval
+    is_open = np.isnan(high) & np.isfinite(low)
+    if is_open.any():
+        arrow: Look = {"ls": "", "marker": style.UP, "ms": style.ARROW}
+        arrow |= {"color": colour, "mfc": "none", "mew": 0.8, "alpha": 0.5}
+        ax.plot(x[is_open], y[is_open], zorder=2.5, gid="open intervals", **arrow)
+    high = np.where(is_open, y, high)
     ends = np.column_stack([low, high, np.full_like(low, np.nan)]).ravel()
     bar: Look = {"color": colour, "lw": 0.8, "solid_capstyle": "butt", "alpha": 0.5}
     caps: Look = {"marker": "_", "ms": size + 0.8, "mew": 0.7}
@@ -589,21 +631,37 @@ def _draw_published(
         for name, points in theory.air_lines(scenes, alpha).items():
             if is_sloped and name != SLOPED:
                 continue
-            # the caption names the curves, in the order of their dashes
-            label = (
-                f"air: {name} × slope factor" if is_sloped else "air: published curves"
-            )
             colour = colours[alpha] if colours else style.AIR
             look: Look = {"color": colour, "ls": AIR_STYLES[name], "lw": 0.8}
-            ax.plot(*points, label=label, zorder=1.5, **look)
+            ax.plot(*points, label=PUBLISHED, zorder=1.5, **look)
     is_air = theory.in_gas(scenes).all()
-    densities = scenes["rho_f_kg_m3"]
-    is_of_paper = np.isclose(densities, NUMBERS_OF_PAPER[0], rtol=ALIKE, atol=0).any()
     if is_air and not is_sloped:
         _draw_field(ax, xlim)
-    # the paper sets its own gas beside water
-    if not is_air or (is_of_paper and not is_sloped):
+    if not is_air or (_has_gas_of_paper(scenes) and not is_sloped):
         _draw_water(ax, xlim)
+
+
+def draw_single_beds(ax: Axes, scenes: pd.DataFrame) -> None:
+    """Draw every measured bed behind all else, in the fluids that scenes have.
+
+    Parameters
+    ----------
+    ax
+        The panel.
+    scenes
+        The scenes.
+    """
+    is_gas = set(theory.in_gas(scenes))
+    look: Look = {"ls": "", "marker": "o", "ms": 2.2, "color": "0.72", "mew": 0}
+    for in_gas in sorted(is_gas | ({False} if _has_gas_of_paper(scenes) else set())):
+        ax.plot(*single_beds(in_gas=in_gas), gid="single beds", zorder=0.5, **look)
+
+
+def _has_gas_of_paper(scenes: pd.DataFrame) -> bool:
+    """Whether some scenes have the gas that the paper sets beside water."""
+    densities = scenes["rho_f_kg_m3"]
+    is_of_paper = np.isclose(densities, NUMBERS_OF_PAPER[0], rtol=ALIKE, atol=0)
+    return bool(is_of_paper.any())
 
 
 def _draw_field(ax: Axes, xlim: tuple[float, float]) -> None:
@@ -612,10 +670,9 @@ def _draw_field(ax: Axes, xlim: tuple[float, float]) -> None:
     if high < xlim[0] or low > xlim[1]:
         return
     look: Look = {"color": "black", "lw": 1.6, "zorder": 2.2}
-    label = f"air: measured at {len(FIELD)} sites in the field"
     gaps = [(low, theta, high, theta, np.nan, np.nan) for theta in FIELD]
     points = np.array(gaps).reshape(-1, 2)
-    ax.plot(*points.T, gid="field", label=label, **look)
+    ax.plot(*points.T, gid="field", label=MEASURED, **look)
 
 
 def _draw_water(ax: Axes, xlim: tuple[float, float]) -> None:
@@ -624,7 +681,7 @@ def _draw_water(ax: Axes, xlim: tuple[float, float]) -> None:
     for curve in published.WATER:
         lines += [np.column_stack(curve.points()), GAP]
     thin: Look = {"color": style.WATER, "lw": 0.7, "zorder": 1}
-    ax.plot(*np.concatenate(lines).T, label="water: published curves", **thin)
+    ax.plot(*np.concatenate(lines).T, label=PUBLISHED, gid="water", **thin)
     bins = [item for item in BINS if xlim[0] < item.middle < xlim[1]]
     x = np.array([item.middle for item in bins])
     y = np.array([item.median for item in bins])
@@ -633,7 +690,7 @@ def _draw_water(ax: Axes, xlim: tuple[float, float]) -> None:
     ninetieths = [item.ninetieth for item in bins]
     ax.vlines(x, tenths, ninetieths, **dark)
     ax.hlines(y, [item.low for item in bins], [item.high for item in bins], **dark)
-    ax.plot(x, y, "s", ms=3.5, label="measured in water: median, 10 to 90 %", **dark)
+    ax.plot(x, y, "s", ms=3.5, label=MEASURED, gid="medians", **dark)
 
 
 def panels(

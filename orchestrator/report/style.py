@@ -1,6 +1,7 @@
 """How all figures look: settings, sizes, colours by meaning, legends, files."""
 
 import re
+import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from copy import copy
@@ -20,8 +21,10 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
+from matplotlib.path import Path
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from orchestrator.report import plotted
 from orchestrator.runs.files import Folder
 
 RC: dict[Any, Any] = {
@@ -47,19 +50,24 @@ RC: dict[Any, Any] = {
     "figure.dpi": 200,
 }
 """Settings that differ from matplotlib's defaults."""
+SIZES = [name for name in RC if name.endswith("size") and name != "lines.markersize"]
+"""Settings that are sizes of letters."""
 WIDTH = 7.0
-"""Width of a figure across two columns of a paper, inches."""
+"""Width of a figure of an experiment, across two columns of a paper, inches."""
 NARROW = 4.4
 """Width of a drawing that a narrow page shows whole, with letters to read, inches."""
-LETTERS = 10.5
-"""Size of these letters, points: 12 pixels on a page of 400."""
-SIDES = (0.66, 0.12)
-"""Margins of panels, left and right, inches."""
-UNDER = 0.42
-"""Height of the numbers and the label of an x axis, inches."""
-LINE = 0.165
-"""Height of a line of a title or a legend, inches."""
-PANELS = 6
+WIDE = 9.2
+"""Width of the same figure for a wide page, where it has a drawing of its own, inches.
+"""
+LETTERS = 11.0
+"""Size of the letters of these two, points: 12 pixels on a page of 400."""
+SIDES = (5.6, 1.1)
+"""Margins of panels, left and right, in sizes of a letter."""
+UNDER = 3.8
+"""Height of the numbers and the label of an x axis, in sizes of a letter."""
+LINE = 1.6
+"""Height of a line of a title or a legend, in sizes of a letter."""
+PANELS = 4
 """Largest number of panels of a figure."""
 SHADES = {
     "beta_deg": ("viridis", 0.0, 0.85),
@@ -114,7 +122,13 @@ RANGE = "#d8d3c7"
 Panel = TypeVar("Panel")
 Look = dict[str, Any]
 """Properties of an artist."""
-NOTE: Look = {"fontsize": 6.5, "color": "0.35", "gid": "note"}
+_ARROW = np.array([[0, 0], [0, 1], [-0.18, 0.72], [0, 1], [0.18, 0.72]])
+_STROKES = [Path.MOVETO, Path.LINETO, Path.MOVETO, Path.LINETO, Path.LINETO]
+ARROW = 36.0
+"""Size of a marker of an open interval: its arrow is half of it long, points."""
+UP, RIGHT = (Path(points, _STROKES) for points in (_ARROW, _ARROW[:, ::-1]))
+"""Markers of intervals that are open above, or to the right: arrows of one length."""
+NOTE: Look = {"color": "0.35", "gid": "note"}
 
 
 Place = Literal["lead", "under", "", "folded"]
@@ -147,8 +161,16 @@ class Figure:
         The figure of the paper that it follows, such as ``Fig. 15``; mostly none.
     part
         Its width over that of the page.
+    narrow
+        The same for a narrow page, where that has a drawing of its own.
+    narrow_image
+        What a narrow page shows, SVG; empty where it shows the same.
     tables
         The tables that it is drawn from.
+    numbers
+        The numbers that it shows, as CSV; empty until it is drawn, or without any.
+    has_png
+        Whether a file of it as PNG is beside the SVG.
     """
 
     name: str
@@ -162,6 +184,10 @@ class Figure:
     follows: str = ""
     part: float = 1.0
     tables: tuple[str, ...] = ()
+    narrow: Callable[[], Canvas] | None = None
+    narrow_image: bytes = b""
+    numbers: str = ""
+    has_png: bool = False
 
     @cached_property
     def canvas(self) -> Canvas | None:
@@ -169,8 +195,13 @@ class Figure:
         return self.drawing() if callable(self.drawing) else self.drawing
 
 
-def settings() -> AbstractContextManager[None]:
+def settings(letters: float | None = None) -> AbstractContextManager[None]:
     """Draw by matplotlib's defaults and `RC` alone, not by a matplotlibrc.
+
+    Parameters
+    ----------
+    letters
+        Size of all letters, points; by default those of `RC`.
 
     Returns
     -------
@@ -179,7 +210,24 @@ def settings() -> AbstractContextManager[None]:
     """
     defaults: dict[Any, Any] = dict(matplotlib.rcParamsDefault)
     del defaults["backend"]  # figures are made without a window
-    return matplotlib.rc_context({**defaults, **RC})
+    sizes: dict[Any, Any] = dict.fromkeys(SIZES, letters) if letters else {}
+    return matplotlib.rc_context({**defaults, **RC, **sizes})
+
+
+def inches(letters: float) -> float:
+    """A length in sizes of a letter, of the settings that hold, in inches.
+
+    Parameters
+    ----------
+    letters
+        The length, in sizes of a letter.
+
+    Returns
+    -------
+    float
+        The length in inches.
+    """
+    return letters * float(matplotlib.rcParams["font.size"]) / 72
 
 
 def palette(column: str, values: Sequence[float]) -> dict[float, str]:
@@ -230,9 +278,10 @@ def grid(
     height: float,
     x: str,
     y: str,
-    columns: int = 2,
+    columns: int = 1,
     *,
     sharey: bool = True,
+    width: float = NARROW,
 ) -> tuple[Canvas, list[Axes]]:
     """Make a figure of panels, which all share x.
 
@@ -250,6 +299,8 @@ def grid(
         Panels beside each other, at most.
     sharey
         Whether all panels share y.
+    width
+        Its width, inches.
 
     Returns
     -------
@@ -260,22 +311,23 @@ def grid(
     """
     columns = min(len(titles), columns)
     lines = -(-len(titles) // columns)
-    left, right = SIDES
+    left, right = (inches(side) for side in SIDES)
     above = 0.0
     if any(titles):
-        above = LINE * max(title.count("\n") + 1 for title in titles) + right
+        lines_of_titles = max(title.count("\n") + 1 for title in titles)
+        above = inches(LINE) * lines_of_titles + right
     between = 2 * right if sharey else left + right
-    wide = (WIDTH - left - right - (columns - 1) * between) / columns
-    figure = Canvas(figsize=(WIDTH, lines * height + (lines - 1) * above))
+    wide = (width - left - right - (columns - 1) * between) / columns
+    figure = Canvas(figsize=(width, lines * height + (lines - 1) * above))
     figure.subplots_adjust(
-        left=left / WIDTH,
+        left=left / width,
         bottom=0.0,
-        right=1 - right / WIDTH,
+        right=1 - right / width,
         top=1.0,
         wspace=between / wide,
         hspace=above / height,
     )
-    extend(figure, above + right, UNDER)
+    extend(figure, above + right, inches(UNDER))
     grid_of_axes = figure.subplots(
         lines, columns, sharex=True, sharey=sharey, squeeze=False
     )
@@ -359,13 +411,17 @@ def _legend(figure: Canvas, items: Sequence[Artist], most: int, place: str) -> f
     """Place a legend of at most so many columns; its height, inches."""
     if not items:
         return 0.0
+    fits = int((figure.get_figwidth() / inches(1.0) - 6.0) / 0.6)
+    for item in items:
+        item.set_label("\n".join(textwrap.wrap(str(item.get_label()), fits)))
     longest = max(len(str(item.get_label())) for item in items)
-    inches = 0.5 + 0.055 * longest  # a sample, and letters
-    columns = max(1, min(most, int(WIDTH / inches)))
+    wide = inches(5.0 + 0.57 * longest)  # a sample, and letters
+    columns = max(1, min(most, int(figure.get_figwidth() / wide)))
     look: Look = {"handles": items, "loc": place, "ncols": columns}
     figure.legend(**look)
-    lines = -(-len(items) // columns)
-    return lines * LINE + SIDES[1]
+    more = sum(str(item.get_label()).count("\n") for item in items)
+    lines = -(-len(items) // columns) + more
+    return inches(lines * LINE + SIDES[1])
 
 
 def samples(axes: Sequence[Axes]) -> list[Artist]:
@@ -393,6 +449,8 @@ def samples(axes: Sequence[Axes]) -> list[Artist]:
                 before.set(color="0.2", markeredgecolor="0.2")
                 if before.get_markerfacecolor() != "white":
                     before.set_markerfacecolor("0.2")
+    for label, sample in entries.items():
+        sample.set_label(label.replace("θ_c", "$θ_c$"))
     return list(entries.values())
 
 
@@ -481,7 +539,9 @@ def saved(figure: Figure, folder: Folder, *, png: bool = False) -> Figure:
         figure.canvas.set_layout_engine("none")  # it is laid out now
     made = drawn_as(figure)
     folder.put(f"{FIGURES}/{figure.name}.svg", made.image)
-    return replace(made, image=raster or made.image)
+    if made.numbers:
+        folder.put(f"{FIGURES}/{figure.name}.csv", made.numbers)
+    return replace(made, image=raster or made.image, has_png=bool(raster))
 
 
 def drawn_as(figure: Figure) -> Figure:
@@ -495,8 +555,15 @@ def drawn_as(figure: Figure) -> Figure:
     canvas = figure.canvas  # `savefig` would draw twice, once for the layout alone
     if canvas is None:
         return replace(figure, drawing=None)
-    part = round(float(canvas.get_figwidth()) / WIDTH, 3)
-    return replace(figure, drawing=None, image=svg(canvas), part=part)
+    return replace(
+        figure,
+        drawing=None,
+        narrow=None,
+        image=svg(canvas),
+        narrow_image=svg(figure.narrow()) if figure.narrow else b"",
+        part=round(min(float(canvas.get_figwidth()) / WIDTH, 1.0), 3),
+        numbers=figure.numbers or plotted.numbers(canvas),
+    )
 
 
 def as_png(drawn: Canvas) -> bytes:

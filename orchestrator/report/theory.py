@@ -38,22 +38,24 @@ Their lines need not be told apart.
 Dash = Any
 """A line's style, as matplotlib has it."""
 _BROKEN = (0, (4, 1.5))
+_CHAIN = (0, (6, 1.5, 1.2, 1.5))
+_SHORT = (0, (2, 1.2))
 LOOKS: tuple[tuple[str, Dash], ...] = (
-    ("#5a5a5a", "--"),
-    ("#5a5a5a", "-"),
-    ("#c8102e", "-"),
-    ("#c8102e", _BROKEN),
-    ("#009e73", "-"),
-    ("#e69f00", "-"),
-    ("#e69f00", _BROKEN),
-    ("#7b3294", "-"),
-    ("#e377c2", "-"),
-    ("#009e73", _BROKEN),
-    ("#7b3294", _BROKEN),
+    ("#1d1d1b", "--"),
+    ("#1d1d1b", "-"),
+    ("#d55e00", "-"),
+    ("#d55e00", _BROKEN),
+    ("#0072b2", "-"),
+    ("#b58900", _CHAIN),
+    ("#b58900", _SHORT),
+    ("#7b3294", _CHAIN),
+    ("#cc79a7", "-"),
+    ("#0072b2", _BROKEN),
+    ("#7b3294", _SHORT),
 )
 """Colour and dash where colours mean laws, in the order of `LAWS`.
 
-Variants share a colour.
+Variants share a colour. Those of one dash differ for deuteranopes and protanopes, too.
 """
 DASHES: tuple[Dash, ...] = (
     "-",

@@ -4,6 +4,7 @@ import contextlib
 import csv
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -44,6 +45,8 @@ RESULTS = DirectoryKind("benchmark of the solver", "benchmark.json")
 COMPARISON = DirectoryKind("comparison with the pack", RESULTS.marker)
 PACK = DirectoryKind("benchmark pack", "manifest.json")
 KINDS = (STUDY, EXPERIMENT, RESULTS, COMPARISON, PACK)
+COMMANDS = {"surface": "study", "surfaces": "validate --surfaces PART"}
+"""Commands of the experiments whose names are other ones."""
 STATE = "report.json"
 """Marker that what is drawn was finished, and of which cases."""
 
@@ -235,10 +238,13 @@ class Workspace(Folder):
         is_same = bool(question) and not changed
         if not is_same:
             self._check_file(kind, name, source.get("file"))
+        is_resumed = not changed and before.get("source") == dict(source)
+        begun = before.get("begun") if is_resumed else None
         value = {
             "orchestrator": __version__,
             "kind": kind.word,
             "name": name,
+            "begun": begun or datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
             "cases": [*cases],
             "source": dict(source),
             **question,

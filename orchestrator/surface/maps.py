@@ -308,7 +308,11 @@ def shares(
         The figure.
     """
     canvas, (ax,) = style.grid(
-        [""], 2.6, f"{speed} over flat ground, m/s", "share that moves, %", 1
+        [""],
+        2.6,
+        f"{speed} over flat ground, m/s",
+        "share that moves, %",
+        width=style.WIDTH,
     )
     colours = []
     for label, moving, leaving, colour in curves:

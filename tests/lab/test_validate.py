@@ -17,6 +17,7 @@ from orchestrator.lab import strips, validate
 from orchestrator.physics import beside
 from orchestrator.physics.curves import GAMMA, iversen_white
 from orchestrator.physics.grain import Grain
+from orchestrator.physics.measured import MEASURED_BEDS
 from orchestrator.physics.rolling import sustained
 from orchestrator.study import fields, scopes, study
 from orchestrator.study.scene import Scene
@@ -105,9 +106,9 @@ def test_rows_are_scored_alike_and_a_formula_is_none_of_them() -> None:
 
 
 def test_what_is_taken_without_a_model_is_of_the_fluid() -> None:
-    beds = pd.read_csv(validate.FOLDER / "beds.csv").query("set == 'flumes, visual'")
+    beds = pd.read_csv(MEASURED_BEDS).query("set == 'flumes, visual'")
     assert (validate.by_constants(beds) == 0.05).all()
-    air = pd.read_csv(validate.FOLDER / "beds.csv").query("set == 'wind, field'")
+    air = pd.read_csv(MEASURED_BEDS).query("set == 'wind, field'")
     assert (validate.by_constants(air) == 0.0123).all()
     # Shao and Lu have 0.0123 (1 + gamma/(rho g d^2))
     held = 1 + GAMMA / (2650 * 9.81 * air["d_m"] ** 2)
@@ -170,7 +171,7 @@ def test_rows_are_held_by_what_is_between_two_windows() -> None:
 
 
 def test_the_interval_of_a_kind_holds_its_rows_in_flumes() -> None:
-    beds = pd.read_csv(validate.FOLDER / "beds.csv").query("set in @FLUMES")
+    beds = pd.read_csv(MEASURED_BEDS).query("set in @FLUMES")
     at = validate.single(beds, "bridged")
     here = (at.reynolds >= 1) & (at.reynolds < 10)
     grain = {
@@ -311,7 +312,7 @@ def test_the_paper_has_no_answer_in_the_transition() -> None:
 
 
 def test_the_measured_rows_are_whole() -> None:
-    beds = pd.read_csv(validate.FOLDER / "beds.csv")
+    beds = pd.read_csv(MEASURED_BEDS)
     counts = beds.groupby("set").size()
     assert counts["flumes, visual"] == 245
     assert counts["flumes, fixed intensity"] == 28
@@ -321,7 +322,7 @@ def test_the_measured_rows_are_whole() -> None:
 
 
 def test_the_points_of_the_formula_are_on_it_with_the_cohesion_of_the_cards() -> None:
-    beds = pd.read_csv(validate.FOLDER / "beds.csv")
+    beds = pd.read_csv(MEASURED_BEDS)
     tunnel = beds[beds["set"] == validate.IVERSEN_WHITE]
     assert len(tunnel) == 8
     # the pull of a contact at 30 degrees that holds as Shao and Lu's gamma
@@ -336,7 +337,7 @@ def test_the_points_of_the_formula_are_on_it_with_the_cohesion_of_the_cards() ->
 
 
 def test_grains_that_go_on_are_as_near_as_the_documents_say() -> None:
-    beds = pd.read_csv(validate.FOLDER / "beds.csv")
+    beds = pd.read_csv(MEASURED_BEDS)
     shields = validate.sustained_shields(beds, validate.GUST, is_entrained=True)
     rows = beds.assign(model="m", ratio=shields / beds["shields"], sure="read")
     factors = validate.scores(rows).set_index("set")["factor"]
@@ -353,7 +354,7 @@ def test_grains_that_go_on_are_as_near_as_the_documents_say() -> None:
 
 
 def test_a_shallow_flow_is_why_steep_beds_hold_their_grains() -> None:
-    beds = pd.read_csv(validate.FOLDER / "beds.csv")
+    beds = pd.read_csv(MEASURED_BEDS)
     steep = beds[beds["set"] == "steep flumes"].iloc[::4]
     shallow = validate.measured_grains(steep)
     deep = shallow.changed(fall=0.0)

@@ -1,5 +1,6 @@
 """Measured thresholds and pivots, published curves, and how the laws compare with them."""
 
+import math
 from itertools import pairwise
 from typing import Any
 
@@ -7,17 +8,33 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.lab.validate import FOLDER
+from orchestrator.lab.validate import IVERSEN_WHITE
 from orchestrator.physics import curves
 from orchestrator.physics.beside import FIELD, MEASURED, beside
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.measured import (
     BUFFINGTON_MONTGOMERY,
+    MEASURED_BEDS,
     VISUAL,
     egiazaroff_hiding,
     kirchner_pivot,
+    single_beds,
     wilcock_crowe_hiding,
 )
+
+
+def test_every_measured_bed_has_a_place_in_one_of_two_diagrams() -> None:
+    table = pd.read_csv(MEASURED_BEDS)
+    table = table[table["set"] != IVERSEN_WHITE].reset_index(drop=True)
+    parts = [single_beds(in_gas=in_gas) for in_gas in (False, True)]
+    assert len(table) == sum(len(reynolds) for reynolds, _ in parts) == 594
+    reynolds, shields = parts[0]
+    row = table.iloc[0]
+    assert shields[0] == row["shields"]
+    excess = (row["rho_sol_kg_m3"] - row["rho_f_kg_m3"]) / row["rho_f_kg_m3"]
+    speed = math.sqrt(shields[0] * excess * 9.81 * row["d_m"])
+    assert reynolds[0] == pytest.approx(speed * row["d_m"] / row["nu_m2_s"])
+    assert len(parts[1][0]) == (table["rho_f_kg_m3"] < 100).sum() == 3
 
 
 def test_the_bins_follow_each_other_and_are_those_of_the_rows() -> None:
@@ -27,7 +44,7 @@ def test_the_bins_follow_each_other_and_are_those_of_the_rows() -> None:
         assert all(
             b.low < b.middle < b.high and b.tenth < b.median < b.ninetieth for b in bins
         )
-    rows = pd.read_csv(FOLDER / "beds.csv")
+    rows = pd.read_csv(MEASURED_BEDS)
     excess = (rows["rho_sol_kg_m3"] / rows["rho_f_kg_m3"] - 1) * 9.81 * rows["d_m"]
     reynolds = np.sqrt(rows["shields"] * excess) * rows["d_m"] / rows["nu_m2_s"]
     for one in VISUAL:

@@ -242,7 +242,7 @@ def test_closed_form_is_drawn_before_there_are_results(results: Results) -> None
     )
 
 
-def test_figures_have_at_most_six_panels_and_numbers_under_each_column(
+def test_figures_have_few_panels_and_numbers_under_the_lowest(
     results: Results,
 ) -> None:
     several = copies(results, *({"averaging_length": i + 1.0} for i in range(7)))

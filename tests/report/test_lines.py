@@ -171,7 +171,5 @@ def test_many_laws_have_colours_of_their_own(several: Results) -> None:
     assert len(met) > 1
     assert len(colours) == len(set(met))
     assert colours == {theory.look(name)[0] for name in met}
-    (medians,) = (
-        line for line in ax.lines if str(line.get_label()).startswith("measured")
-    )
+    (medians,) = (line for line in ax.lines if line.get_gid() == "medians")
     assert np.asarray(medians.get_ydata()).tolist() == theory.MEDIANS.tolist()

@@ -132,8 +132,12 @@ def test_links_lead_to_what_is_there(
     assert folders <= targets
     assert all(path.is_dir() for path in targets if not path.suffix)
     assert all(path.is_file() for path in targets if path.suffix == ".svg")
-    tables = {path.stem for path in targets if path.suffix == ".csv"}
+    sheets = [path for path in targets if path.suffix == ".csv"]
+    tables = {path.stem for path in sheets if path.parent.name == "tables"}
     assert tables == {"columns", *results.tables}
+    numbers = [path for path in sheets if path.parent.name == "figures"]
+    assert numbers
+    assert all(path.is_file() for path in numbers)
 
 
 def test_same_results_give_the_same_bytes(results: Results, tmp_path: Path) -> None:
@@ -213,12 +217,7 @@ def test_in_a_browser_the_slider_moves_grains_above_the_fold(
     )
     shown = {}
     for width in (1280, 500):
-        command = [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom",
-                   f"--window-size={width},800", f"--user-data-dir={tmp_path / 'profile'}",
-                   (tmp_path / "page.html").as_uri()]  # fmt: skip
-        dom = subprocess.run(
-            command, capture_output=True, text=True, timeout=HANGS_S
-        ).stdout
+        dom = _dom(tmp_path / "page.html", width)
         shown[width] = {
             name: int(dom.split(f'data-{name}="')[1].split('"')[0])
             for name in ("bottom", "card", "wide")
@@ -230,6 +229,60 @@ def test_in_a_browser_the_slider_moves_grains_above_the_fold(
     assert shown[1280]["bottom"] < 800
     assert shown[1280]["wide"] <= 1280
     assert shown[500]["wide"] <= 500
+
+
+LONG = """<script>addEventListener("load", () => {
+  const root = document.documentElement, tables = [...document.querySelectorAll("table")];
+  const all = (name) => document.querySelectorAll(name).length;
+  const table = document.querySelector("section:nth-of-type(2) table");
+  const first = () => table.tBodies[0].rows[0].cells[1].textContent;
+  const head = table.tHead.rows[0].cells[1];
+  root.dataset.tools = all(".tools");
+  head.querySelector("button").click();
+  root.dataset.rising = first() + head.getAttribute("aria-sort");
+  head.querySelector("button").click();
+  root.dataset.falling = first() + head.getAttribute("aria-sort");
+  const filter = document.querySelector(".tools input");
+  filter.value = "bed 2";
+  filter.dispatchEvent(new Event("input"));
+  root.dataset.found = document.querySelector(".tools [role]").textContent;
+  dispatchEvent(new Event("beforeprint"));
+  root.dataset.printed = [...table.tBodies[0].rows].filter((row) => !row.hidden).length;
+});</script>"""
+
+
+@pytest.mark.skipif(not BROWSER, reason="no chromium here")
+def test_in_a_browser_a_long_table_sorts_and_filters(tmp_path: Path) -> None:
+    values = ["−3.5 … 2", "above 12", "1.0 × 10", "—", *map(str, range(100, 118))]
+    names = [f"bed {number}" for number in range(len(values))]
+    table = pd.DataFrame({"bed": names, "wind, m/s": values})
+    sections = [
+        Section("Short", [Table.of(table[:5])]),
+        Section("Long", [Table.of(table)]),
+    ]
+    page_module.write_experiment(SPEED, sections, Folder(tmp_path), "page.html", {})
+    html = (tmp_path / "page.html").read_text(encoding="utf-8")
+    start, end = html.index("<meta http-equiv"), html.index('<meta name="viewport"')
+    path = tmp_path / "long.html"
+    path.write_text(html[:start] + LONG + html[end:], encoding="utf-8")
+    dom = _dom(path, 1280)
+    told = dict(re.findall(r'data-(\w+)="([^"]*)"', dom.split(">", 2)[1]))
+    assert told == {
+        "tools": "1",
+        "rising": "−3.5&nbsp;…&nbsp;2ascending",
+        "falling": "117descending",
+        "found": "3 of 22 rows",
+        "printed": "22",
+    }
+
+
+def _dom(path: Path, width: int) -> str:
+    """What a browser makes of a page."""
+    command = [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom",
+               f"--window-size={width},800", f"--user-data-dir={path.parent / 'profile'}",
+               path.as_uri()]  # fmt: skip
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=HANGS_S)
+    return ended.stdout
 
 
 GRAIN = "grain = { diameter = 1e-3 }\nmethod.kind = 'pivot'\n"
@@ -258,7 +311,7 @@ def test_gallery_of_studies_is_written_anew(studies: Path) -> None:
     assert words.count(f"{number.figure} <small>{number.unit}</small>") == 2
     assert words.count(f'<span class="ends">{number.interval}</span>') == 2
     assert words.count(card.worth.word[1:]) == 2
-    assert words.count("data:image/svg+xml") == 2
+    assert words.count('="data:image/svg+xml') == 2
     assert "2 result pages" in words
     gallery.write_gallery(studies)
     assert (studies / gallery.NAME).read_text("utf-8") == html
@@ -330,7 +383,13 @@ def test_page_of_an_experiment_holds_all_of_its_sections(tmp_path: Path) -> None
         "data:image/png;base64"
     ] * 2
     files = {path.name for path in (tmp_path / "figures").iterdir()}
-    assert files == {"first.png", "first.svg", "second.png", "second.svg"}
+    assert files == {
+        f"{name}.{ending}"
+        for name in ("first", "second")
+        for ending in ("csv", "png", "svg")
+    }
+    hrefs = parsed.all("a", "href")
+    assert {f"figures/{name}" for name in files} <= {*hrefs}
 
 
 def test_the_address_of_a_figure_is_its_text(html: str, page: Path) -> None:

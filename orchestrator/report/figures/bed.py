@@ -25,6 +25,7 @@ from orchestrator.report.style import Figure
 from orchestrator.runs.case import Case
 from orchestrator.solvers.dem import ENGINE
 from orchestrator.study import fields
+from orchestrator.tables import csv
 from orchestrator.types import FloatArray, IntArray
 
 LONG = 100.0
@@ -297,6 +298,7 @@ def draw(results: Results) -> Iterator[Figure]:
             data=data(steps, shown, flows),
             place="" if seen else "lead",
             follows="Fig. 13",
+            numbers=_numbers(steps, flows),
         )
         seen.add(name)
 
@@ -436,6 +438,21 @@ def data(steps: Steps, shown: int, flows: Flows) -> dict[str, Any]:
     if len(steps.lines) > 1:
         found["lines"] = _paths(steps)
     return found
+
+
+def _numbers(steps: Steps, flows: Flows) -> str:
+    """The drawn grains as packed, with the flow of the stop by which each has moved."""
+    x, z = steps.places[0].T
+    has_moved = steps.level > 0
+    flow = np.where(has_moved, np.array(flows.advised)[steps.level], np.nan)
+    columns = {
+        "grain": steps.grains,
+        "x/d": x,
+        "z/d": z,
+        "is mobile": steps.pile.packing.mobile[steps.grains],
+        f"moves at, {flows.unit}": flow,
+    }
+    return csv(pd.DataFrame(columns), "%.6g")
 
 
 def _paths(steps: Steps) -> list[list[Any]]:

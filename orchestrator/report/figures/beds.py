@@ -15,7 +15,7 @@ Figs. 15 and 16 of the paper. A marker shows the mean {{ about.stress }} over th
 that had moved when they first were the fraction n/N of the counted ones; Re* is that of
 this stress. A fraction that was not reached has no marker. Thin lines join beds that
 differ in d alone. A bar holds the step between two flows and the resolution of the
-count, which is half a grain. A bar leaves the frame where half a grain more was not
+count, which is half a grain. An arrow stands where half a grain more was not
 reached. Black: the closed form of one grain at the same slope, entrainment angle and
 z₀/d. A line ends where its force law does. It is dotted where this study has grains
 beyond the law {%- if about.pair %}; the Re* of such a grain can lie outside the shaded

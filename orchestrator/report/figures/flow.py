@@ -60,7 +60,8 @@ def _speeds(results: Results, shown: Sequence[Pile]) -> Canvas:
     toe = max(pile.model.line.x[-2] / pile.bed.height for pile in shown)
     window = (-2.0, toe + 8.0, 0.0, 3.0)
     left, right, bottom, top = window
-    height = (style.WIDTH - sum(style.SIDES)) * (top - bottom) / (right - left)
+    sides = style.inches(sum(style.SIDES))
+    height = 1.6 * (style.NARROW - sides) * (top - bottom) / (right - left)
     titles = [solved.title(results, pile) for pile in shown]
     figure, axes = style.grid(titles, height, "x/h", "z/h", 1)
     for ax, pile in zip(axes, shown, strict=True):
@@ -78,11 +79,11 @@ def _speeds(results: Results, shown: Sequence[Pile]) -> Canvas:
 
 def _speed_bar(figure: Canvas, image: AxesImage) -> None:
     """The bar of the colours of speeds, below the panels."""
-    style.extend(figure, 0.0, 0.55)
-    inch = 1 / figure.get_figheight()
-    place = figure.add_axes((0.1, 0.4 * inch, 0.88, 0.1 * inch))
+    style.extend(figure, 0.0, style.inches(5.0))
+    letter = style.inches(1.0) / figure.get_figheight()
+    place = figure.add_axes((0.1, 3.6 * letter, 0.86, 0.9 * letter))
     bar = figure.colorbar(image, cax=place, orientation="horizontal")
-    bar.set_label("speed over that of the approaching flow at 10 h, |u|/Uₑ")
+    bar.set_label("|u|/Uₑ, of the approaching flow at 10 h")
 
 
 def _streamlines(ax: Axes, window: solved.Window, velocity: FloatArray) -> None:

@@ -10,7 +10,6 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
-from orchestrator.digits import percent
 from orchestrator.physics.verdict import BOTH, MODEL
 from orchestrator.report import (
     answers,
@@ -119,7 +118,7 @@ def _of_the_card(results: Results) -> Iterator[Figure]:
 def _draw_card(row: pd.Series, others: Sequence[str], table: pd.DataFrame) -> Canvas:
     """The curves of a bed and of its replicates, and its answer."""
     told = single.quantity_of_row(row)
-    canvas = style.canvas(2.0, style.NARROW)
+    canvas = style.canvas(2.6, style.NARROW)
     ax = canvas.subplots()
     table = table[np.isfinite(table["ustar0_m_s"]) & (table["ustar0_m_s"] > 0)]
     for scene in others:
@@ -129,7 +128,7 @@ def _draw_card(row: pd.Series, others: Sequence[str], table: pd.DataFrame) -> Ca
     points = table[table["scene_id"] == row["scene_id"]]
     moved = points["fraction_moved"]
     reach = []
-    for factor, look in _curves_of_card(row):
+    for factor, look in curves_of_card(row):
         flow = units.told_by(row, factor * points["ustar0_m_s"], told)
         _draw_curve(ax, flow, moved, look)
         reach += _reach(flow, moved)
@@ -138,14 +137,23 @@ def _draw_card(row: pd.Series, others: Sequence[str], table: pd.DataFrame) -> Ca
     ax.set(xlim=(0.9 * min(reach), 1.02 * max(reach)), ylim=(0, 1), ylabel="n/N")
     ax.set_xlabel(f"{told.name}, {told.unit}")
     handles = style.samples([ax])
-    canvas.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    canvas.legend(handles=handles, loc="outside lower center")
     return canvas
 
 
-def _curves_of_card(row: pd.Series) -> list[tuple[float, Look]]:
-    """The factors of the flows of a bed and how they are drawn; the advised one first.
+def curves_of_card(row: pd.Series) -> list[tuple[float, Look]]:
+    """List the curves of a bed with their looks, the advised one first.
 
-    A level bed has one: its measured threshold is that of each of its grains.
+    Parameters
+    ----------
+    row
+        A threshold of the bed with the columns of its scene.
+
+    Returns
+    -------
+    list of (float, dict)
+        The factor on the computed flows, and the look. A level bed has one curve: its
+        measured threshold is that of each of its grains.
     """
     if single.is_level(row) or np.isnan(row["compared_ustar0_m_s"]):
         return [(1.0, {**ADVISED, "label": single.MODEL})]
@@ -175,13 +183,13 @@ def _draw_answer(ax: Axes, row: pd.Series, told: ReportedQuantity) -> None:
         ax.plot(ends, [fraction] * 2, color=PALE, lw=6, gid="interval", zorder=1)
     ax.plot([at], [fraction], "o", color=ANSWER, ms=6, mec="white", gid="card")
     bold: Look = {"textcoords": "offset points", "color": ANSWER, "weight": "bold"}
-    text = f"{percent(fraction)} at {at:.3g} {told.unit}"
+    text = f"{at:#.3g} {told.unit}"
     ax.annotate(text, (at, fraction), xytext=(7, -8), **bold)
     if row["advised"] == BOTH:
         model = float(row[told.column()])
         ax.plot([model], [fraction], "o", color=FLOW, ms=6, mec="white", gid="model")
         own: Look = {**bold, "color": FLOW}
-        ax.annotate(f"{model:.3g} {told.unit}", (model, fraction), (7, -8), **own)
+        ax.annotate(f"{model:#.3g} {told.unit}", (model, fraction), (7, -8), **own)
 
 
 def _reach(flow: Any, moved: pd.Series) -> list[float]:

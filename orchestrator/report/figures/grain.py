@@ -67,7 +67,7 @@ def grain_panels(row: pd.Series) -> Canvas:
         The drawing.
     """
     told = single.quantity_of_row(row)
-    here = _other_sizes(row, 61)
+    here = other_sizes(row, 61)
     d = here["d_m"].to_numpy()
     found = of_rows(here)
     ustar = np.where(found["holds"], found["ustar"], np.nan)
@@ -82,8 +82,22 @@ def grain_panels(row: pd.Series) -> Canvas:
     return canvas
 
 
-def _other_sizes(row: pd.Series, count: int) -> pd.DataFrame:
-    """A grain in some sizes from a sixth to six times its own, an odd number."""
+def other_sizes(row: pd.Series, count: int) -> pd.DataFrame:
+    """Change the size of a grain.
+
+    Parameters
+    ----------
+    row
+        The grain with the columns of its scene.
+    count
+        Number of sizes.
+
+    Returns
+    -------
+    DataFrame
+        Rows of sizes from a sixth to six times its own; of an odd number that one is in
+        the middle.
+    """
     size = float(row["d_m"])
     d = np.geomspace(size / 6, size * 6, count)
     rows = pd.DataFrame([row] * count)
@@ -137,7 +151,6 @@ def _compared_lines(ax: Axes, row: pd.Series, told: ReportedQuantity) -> None:
         "xycoords": ax.get_xaxis_transform(),
         "textcoords": "offset points",
         "va": "top",
-        "fontsize": 7,
     }
     ax.annotate(name, (compared, 1.0), xytext=(4, 0), **look)
     if not row["measured_rows"] > 0:

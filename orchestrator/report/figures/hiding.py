@@ -11,7 +11,7 @@ from orchestrator.physics import measured
 from orchestrator.report import shields, style
 from orchestrator.report.figures import FigureKind
 from orchestrator.report.results import Results, case_names, split_by
-from orchestrator.report.style import Figure
+from orchestrator.report.style import Figure, Look
 from orchestrator.types import FloatArray
 
 HIDING_AXES = ("dᵢ/d₅₀", "$θ_c$ of the size over that of d₅₀")
@@ -38,7 +38,7 @@ CAPTION = (
     "its exposed grains has moved, over that at d₅₀, which lies between two classes. "
     "Markers: geometric mean over the beds of the study. Bars: the range of these "
     "beds, and the part that the number of grains in the class leaves to chance (80 "
-    "%); a bar leaves the frame where too few grains give no bound. Open: fewer "
+    "%); an arrow where too few grains give no upper bound. Open: fewer "
     "than ten grains. Lines: published hiding functions, which are for flow over beds "
     "in space and for transport rates, not for first motion."
 )
@@ -57,7 +57,7 @@ def draw(results: Results) -> Iterator[Figure]:
     if not is_known.any():
         return
     keys = ["method"]
-    (sheet,) = shields.sheets(rows, keys, 2.7, *HIDING_AXES, columns=3)
+    (sheet,) = shields.sheets(rows, keys, 2.7, *HIDING_AXES)
     colours = style.palette("fraction", sorted(set(rows["fraction"])))
     known = rows[["hiding", "hiding_low", "hiding_high"]].to_numpy(float)
     known = known[np.isfinite(known) & (known > 0)]
@@ -88,9 +88,14 @@ def _draw_classes(ax: Axes, rows: pd.DataFrame, colour: str) -> None:
     logs = rows[["size_over_d", "hiding"]].map(np.log)
     mean = np.exp(logs.groupby(number).mean())
     classes = rows.groupby(number)
-    # an end that is not known is beyond the frame
+    # a lower end that is not known is beyond the frame; an upper one has an arrow
     low = classes["hiding_low"].min(skipna=False).fillna(0.0)
-    high = classes["hiding_high"].max(skipna=False).fillna(shields.BEYOND)
+    high = classes["hiding_high"].max(skipna=False)
+    is_open = high.isna()
+    high = high.where(~is_open, mean["hiding"])
+    arrow: Look = {"ls": "", "marker": style.UP, "ms": style.ARROW, "mfc": "none"}
+    above = mean[is_open]
+    ax.plot(above["size_over_d"], above["hiding"], color=colour, alpha=0.5, **arrow)
     ax.errorbar(
         mean["size_over_d"],
         mean["hiding"],

@@ -33,7 +33,7 @@ def draw(results: Results) -> Iterator[Figure]:
 
 def _laws(best: list[theory.Line]) -> Canvas:
     """A row for each law, the nearest one above."""
-    canvas = style.canvas(0.6 + 0.22 * len(best))
+    canvas = style.canvas(0.8 + 0.28 * len(best), style.NARROW)
     ax = canvas.subplots()
     rising = best[::-1]
     for place, line in enumerate(rising):

@@ -41,7 +41,7 @@ def draw(results: Results) -> Iterator[Figure]:
 def _pivots(rows: pd.DataFrame) -> Canvas:
     """The distribution of pivots of the exposed grains, beside that of natural beds."""
     rows = rows.drop_duplicates(["grain_id", "s_m", "pivot_deg"])
-    figure = style.canvas(3.4)
+    figure = style.canvas(3.6, style.NARROW)
     ax = figure.subplots()
     widths = rows.assign(width=rows["width"].fillna(0.0))
     for (width,), part in split_by(widths, "width"):
@@ -57,7 +57,7 @@ def _pivots(rows: pd.DataFrame) -> Canvas:
     ax.axvline(LATTICE_PIVOT_DEG, color=style.WATER, lw=1, label="lattice, β = 60°")
     ax.set(xlabel="pivot angle of an exposed grain, degrees", xlim=(0, 180))
     ax.set(ylabel="percentile", ylim=(0, 100))
-    ax.legend(loc="lower right")
+    figure.legend(handles=style.samples([ax]), loc="outside lower center")
     return figure
 
 

@@ -33,6 +33,8 @@ TOLD = ("alpha_deg", "d_m", "z0_over_d", "force_law")
 """Columns that the text of a point always tells of its scene."""
 FEW = 8
 """Number of piles up to which every fraction is drawn in the one diagram."""
+EXACT = 60
+"""Number of single grains up to which those by the closed form are points as well."""
 LINES = 3
 """Number of laws beyond which only those near the measurements are drawn."""
 CAPTION = """\
@@ -40,10 +42,11 @@ CAPTION = """\
 beds. The stress is the mean wall stress over the grains that had moved when their
 fraction was first {{ fractions }}; {{ piles.methods }}. {{ low_regime(piles) }} {%
 endif %} {% if grains %} Dots: single grains; {{ grains.methods }}. {% endif %} Bars are
-intervals. A bar that leaves the frame has no upper end. {{ is_open({"is_open": (piles
+intervals; an arrow has no upper end. {{ is_open({"is_open": (piles
 and piles.is_open) or (grains and grains.is_open)}) }} Lines: one grain on a flat bed
 ({{ names }}). A line is dotted where the force law does not hold but the study has
-grains. {{ references(about) }}"""
+grains. {{ references(about) }} Pale grey dots: each bed of
+which a threshold was measured, in flumes, in rivers and in wind in the field."""
 
 
 def draw(results: Results) -> Iterator[Figure]:
@@ -88,6 +91,7 @@ def _diagram(
     xlim = shields.ends(scenes, piles, grains)
     points = _points(grains, piles, results)
     level = scenes.assign(alpha_deg=0.0)
+    shields.draw_single_beds(ax, scenes)
     drawn = shields.diagram(ax, level, xlim, curves, points)
     shields.log_axes(sheet, xlim)
     _legends(canvas, ax)
@@ -181,7 +185,8 @@ def _grains_on_the_least_slope(results: Results) -> pd.DataFrame:
 
 def _few_exact(grains: pd.DataFrame) -> pd.DataFrame:
     """Single grains, of which few that the closed form answered are points as well."""
-    if grains.empty or len(grains) > FEW:
+    is_answered = "shields_closed_form" in grains
+    if grains.empty or len(grains) > EXACT or not is_answered:
         return grains
     is_exact = ~needs_run(grains)
     exact = {

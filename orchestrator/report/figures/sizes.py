@@ -17,13 +17,15 @@ DISC: Look = {"ls": "", "marker": "o", "color": ANSWER, "ms": 6, "label": "compu
 RING: Look = {**DISC, "mfc": "white", "mew": 1.4, "label": "fewer than ten grains"}
 SQUARE: Look = {"ls": "", "marker": "s", "color": INK, "ms": 5}
 SQUARE["label"] = "fitted to measurements"
+OPEN: Look = {"ls": "", "marker": style.RIGHT, "ms": style.ARROW, "mfc": "none"}
+OPEN |= {"color": ANSWER, "zorder": 1.5}
 TOGETHER: Look = {"color": ANSWER, "lw": 1, "ls": ":", "zorder": 0.5}
 TOGETHER["label"] = "all sizes together"
 CAPTION = (
     "Orange: computed, with the interval that so few grains leave; rings: fewer than "
     "ten grains. Squares: the function that Wilcock and Crowe (2003) fitted to "
     "transport, at the measured stress of d50. Dotted: all sizes together. An "
-    "interval that reaches the frame is open."
+    "arrow is an interval without an upper end."
 )
 
 
@@ -54,25 +56,26 @@ def _sizes(row: pd.Series, here: pd.DataFrame) -> Canvas:
     value = weight * here["shields_own"].to_numpy(float)
     low = weight * here["shields_own_low"].to_numpy(float)
     high = weight * here["shields_own_high"].to_numpy(float)
-    few = here["few"].to_numpy(bool)
     compared = [answers.hidden_stress(row, size) for size in here["size_over_d"]]
     at = float(row["rho_f_kg_m3"]) * float(row["ustar0_m_s"]) ** 2
     top = 1.15 * np.nanmax([*value[np.isfinite(value)], *compared, at])
-    count = len(here)
-    places = np.arange(count)[::-1]
-    canvas = style.canvas(0.9 + 0.2 * count, style.NARROW)
+    places = np.arange(len(here))[::-1]
+    canvas = style.canvas(1.3 + 0.26 * len(here), style.NARROW)
     ax = canvas.subplots()
-    right = np.nan_to_num(high, nan=2 * top)
+    is_open = np.isnan(high)
+    right = np.where(is_open, value, high)
     ax.hlines(places, np.nan_to_num(low), right, color=PALE, lw=8, zorder=1)
+    ax.plot(value[is_open], places[is_open], **OPEN)
+    few = here["few"].to_numpy(bool)
     ax.plot(value[~few], places[~few], **DISC)
     if np.isfinite(value[few]).any():
         ax.plot(value[few], places[few], **RING)
     ax.plot(compared, places, **SQUARE)
     ax.axvline(at, **TOGETHER)
     ax.set_yticks(places, _names(float(row["d_m"]), here))
-    ax.set(xlim=(0, top), ylim=(-0.6, count - 0.4), xlabel="stress on the bed, Pa")
+    ax.set(xlim=(0, top), ylim=(-0.6, len(here) - 0.4), xlabel="stress on the bed, Pa")
     handles = style.samples([ax])
-    canvas.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    canvas.legend(handles=handles, loc="outside lower center", ncols=2)
     return canvas
 
 

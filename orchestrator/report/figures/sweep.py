@@ -66,7 +66,7 @@ def _sweep(
     scale = 1e3 if info.unit == "m" else 1.0
     unit = "mm" if info.unit == "m" else info.unit
     is_one = len(series) == 1
-    canvas = style.canvas(2.4, style.NARROW if is_one else style.WIDTH)
+    canvas = style.canvas(2.4 + 0.23 * len(series), style.NARROW)
     ax = canvas.subplots()
     sizes: set[float] = set()
     for number, (name, part) in enumerate(series):
@@ -79,10 +79,8 @@ def _sweep(
     ax.set(ylim=(0, None), xlabel=f"{info.label}, {unit}".rstrip(", "))
     ax.set_ylabel(f"{told.name}, {told.unit}")
     handles = style.samples([ax])
-    if is_one:
-        canvas.legend(handles=handles, loc="outside lower center", ncols=len(handles))
-    else:
-        canvas.legend(handles=handles, loc="outside right upper")
+    columns = len(handles) if is_one else 1
+    canvas.legend(handles=handles, loc="outside lower center", ncols=columns)
     return canvas
 
 
