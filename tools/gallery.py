@@ -43,6 +43,8 @@ NOTES = {
     "ladder": "What a ladder is, and what its lines are for: [ladder.md](ladder.md).",
 }
 """What is added to the section of a preset."""
+WHOLE = ("ladder",)
+"""Sections whose answer is shown whole: lines for a study file stand below the card."""
 WIDE = 900  # pixels
 COLOURS = 256
 HEAD = """\
@@ -75,8 +77,8 @@ def section(directory: Path, preset: str) -> str:
     of = OF.get(preset, preset)
     (file,) = ROOT.glob(f"orchestrator/*/presets/{of}.toml")
     answer = (directory / f"{preset}.txt").read_text(encoding="utf-8")
-    card = shortened(answer)
-    question = card.splitlines()[0]
+    card = shortened(answer, is_whole=preset in WHOLE)
+    question = " ".join(card.partition("?")[0].split()) + "?"
     command = COMMANDS.get(preset, f"study {preset}")
     lines = [
         f"## {preset}" if of == preset else f"## {preset} of {of}",
@@ -95,15 +97,19 @@ def section(directory: Path, preset: str) -> str:
     return "\n".join(lines)
 
 
-def shortened(answer: str) -> str:
-    """The card of an answer: what stands before its tables, without the name of the page."""
+def shortened(answer: str, *, is_whole: bool = False) -> str:
+    """The card of an answer, or all of it but the name of the page.
+
+    A card is a first paragraph, and lines that are indented.
+    """
+    head, _, rest = answer.partition("\n\n")
     lines = []
-    for line in answer.splitlines():
-        is_table = line.startswith(("all rows", "measured", "  measured", "page: "))
-        if is_table:
+    for line in rest.splitlines():
+        is_of_card = not line.strip() or line.startswith("  ")
+        if line.startswith("/") or not (is_of_card or is_whole):
             break
         lines.append(line.rstrip())
-    return "\n".join(lines).strip()
+    return "\n".join([head, "", *lines]).strip()
 
 
 def draw(figure: Path, picture: Path) -> None:
