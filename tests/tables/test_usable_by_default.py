@@ -22,7 +22,10 @@ def _check(made: pd.DataFrame) -> None:
         made[numbers].to_numpy(), rel=1e-3
     )
     for name in ("decides", "usable", "reason", "why_not"):
-        assert there[name].fillna("").tolist() == made[name].fillna("").tolist()
+        stored_words, words = (
+            table[name].astype(object).fillna("").tolist() for table in (there, made)
+        )
+        assert words == stored_words
 
 
 def test_every_bed_fluid_and_size_has_a_row() -> None:
