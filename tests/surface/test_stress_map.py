@@ -91,6 +91,8 @@ def test_the_map_is_the_stress_over_the_threshold_and_its_ends(tmp_path: Path) -
     with rasterio.open(tmp_path / "out" / "stress_ratio.tif") as dataset:
         assert dataset.crs.to_epsg() == 25832
         assert dataset.transform == UTM
+        ends = ("tau/tau_c", "tau/tau_c, low end", "tau/tau_c, high end")
+        assert dataset.descriptions == ends
         assert np.isnan(dataset.nodata)
         assert float(dataset.tags()["threshold_stress_pa"]) == pytest.approx(middle)
     with Image.open(tmp_path / "out" / "stress_ratio.png") as picture:
