@@ -421,8 +421,12 @@ def test_a_command_of_a_page_on_a_finished_study_ends_well(
     given = {tuple(word for word in words if word.startswith("--")) for words in asked}
     assert given
     folder = tmp_path / "results" / ("" if name == "gallery" else "pile")
+    movie = tmp_path / "grains.gif"
     for options in given:
-        assert cli.main([name, str(folder), *options]) == 0
+        values = [str(movie)] if options[-1:] == ("--movie",) else []
+        assert cli.main([name, str(folder), *options, *values]) == 0
+    if name == "report":
+        assert movie.read_bytes().startswith(b"GIF8")
 
 
 @pytest.fixture
