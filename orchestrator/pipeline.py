@@ -419,7 +419,7 @@ def _draw(
             raise
     terminal.check_signals()
     if not failures and not undrawn:
-        space.note_answer(planned.ids, answer)
+        space.note_answer(planned.ids, terminal.plain(answer))
     if not undrawn:
         display.end()
     return answer, undrawn

@@ -235,10 +235,13 @@ def values(name: str, text: str) -> list[Value]:
     if len(ends) == 1:
         return [*numbers]
     first, last = numbers
-    is_count = 2 <= count <= MOST_POINTS and count % 1 == 0
-    if not (first < last < math.inf and is_count):
+    if not first < last < math.inf:
         what = f"{text!r} is not a range of values that rise"
         raise InputError(what, OPTIONS[name], FORM)
+    if not (2 <= count <= MOST_POINTS and count % 1 == 0):
+        what = f"{text!r} is not a range with a number of values"
+        remedy = f"the number is the last of three: a whole one from 2 to {MOST_POINTS}"
+        raise InputError(what, OPTIONS[name], remedy)
     import numpy as np  # a single number is answered without
 
     from orchestrator import digits

@@ -200,6 +200,9 @@ def _along_the_bed(scene: Scene, tolerance: float | None) -> Decision:
     written = Decision(scene, answer, LOCAL, known(LOCAL, answer), ENDLESS)
     if tolerance is None:
         return written
+    beyond = unmeasured(answer)
+    if beyond and answer.method.flow.facts.is_solved:
+        return _with_reason(written, f"{NOT_MET} for {beyond}")
     return _on_chosen_mesh(written, _ways_along(answer), tolerance)
 
 
@@ -224,16 +227,25 @@ def _on_chosen_mesh(
         return _with_reason(written, f"the study asks for the flow model {model.name}")
     known_ways = [one for one in ways if math.isfinite(one.known.total)]
     if not known_ways:
-        beyond = unmeasured(written.scene) or "such a bed"
-        return _with_reason(written, f"{NOT_MET} for {beyond}")
+        return written
     offers = choice.offered(known_ways, choice.cost_s(written.scene))
     if not offers:
         return _with_reason(written, NONE_CHEAPER)
     way = choice.chosen(offers, tolerance)
-    why = f"{written.why}, its flow by {choice.in_words(way, known_ways, tolerance)}"
+    meshes = [_as_mesh(one, written.scene) for one in known_ways]
+    said = choice.in_words(_as_mesh(way, written.scene), meshes, tolerance)
+    why = f"{written.why}; its flow: {said}"
     return Decision(
         written.asked, way.answer, way.fidelity, way.known, why, is_chosen=True
     )
+
+
+def _as_mesh(way: Way, written: Scene) -> Way:
+    """A way that is called by its mesh, the only choice where the grains are given."""
+    name = f"the mesh of {way.fidelity.flow.name}"
+    if way.answer == written:
+        name = "the mesh as written"
+    return replace(way, fidelity=replace(way.fidelity, name=name))
 
 
 def _with_reason(decision: Decision, why: str) -> Decision:
@@ -346,7 +358,7 @@ def as_written(scene: Scene, why: str = "") -> Decision:
     fidelity = fidelity_of(answer)
     by_dem = answer.method.is_resolved_in_time
     beyond = unmeasured(answer, by_dem=by_dem)
-    if beyond and beyond not in why:
+    if beyond:
         why = f"{why}; no error is known for {beyond}"
     return Decision(scene, answer, fidelity, known(fidelity, answer), why)
 
@@ -475,14 +487,10 @@ def _why_as_written(scene: Scene, tolerance: float | None) -> str | None:
     # the fidelities approximate DEM in a held, solved flow
     if scene.method.flow.facts is not _best_model(scene):
         return f"the study asks for the flow model {scene.method.flow.model}"
-    if scene.threshold.update:
-        return "no error is known for a bed that changes"
     if scene.method.grains.waiting_time < HELD_FROM:
         return "the study asks for a ramp of the flow"
-    beyond = unmeasured(scene)
-    if beyond:
-        return f"no error is known for {beyond}"
-    return None
+    # the decision on the scene as it is written has the reason
+    return "" if unmeasured(scene) else None
 
 
 def _may_be_by_dem(scene: Scene) -> bool:

@@ -42,6 +42,8 @@ CRITERION = "threshold.criterion"
 """A quantity that every scene has."""
 FRACTIONS = "threshold.fractions"
 """The quantity of which one value that was measured is enough: each has its error."""
+MOST_NAMED = 3
+"""Quantities outside of what was measured that a reason names; it counts the others."""
 NONE, GIVEN = "none", "given"
 """Words of a field without a value, and of one whose value is a table or a file."""
 Value = float | str
@@ -120,12 +122,17 @@ def _over_diameter(scene: Scene) -> Iterator[float]:
 
 
 def _level_length(scene: Scene) -> Iterator[float]:
-    """The length of level bed in heights, of a level bed in diameters."""
+    """The length of the level part of a form in heights."""
+    bed = _bed(scene)
+    if not bed.is_level and "length" in bed.form.fields:
+        yield bed.level_length / bed.relief
+
+
+def _length_of_level(scene: Scene) -> Iterator[float]:
+    """The length of a level bed in diameters."""
     bed = _bed(scene)
     if bed.is_level:
         yield bed.level_length / scene.grain.diameter
-    elif "length" in bed.form.fields:
-        yield bed.level_length / bed.relief
 
 
 def _spacing(scene: Scene) -> Iterator[Value]:
@@ -231,6 +238,7 @@ SIMILAR: tuple[MeasuredQuantity, ...] = (
     ),
     MeasuredQuantity("bed.lee_slope_deg", ("bed.lee_slope_deg",), _lee_slope),
     MeasuredQuantity("bed.length/bed.height", ("bed.length",), _level_length),
+    MeasuredQuantity("bed.length/grain.diameter", ("bed.length",), _length_of_level),
     MeasuredQuantity("bed.spacing/bed.height", ("bed.spacing",), _spacing),
     MeasuredQuantity("bed.brink_radius/bed.height", ("bed.brink_radius",), _brink),
     MeasuredQuantity("bed.counted", ("bed.counted",), _counted),
@@ -348,7 +356,7 @@ def _rows(quantity: str, values: Iterable[Value]) -> Iterator[dict[str, Value]]:
 
 
 def outside(part: str, scene: Scene) -> str:
-    """Name the first quantity of a pile that is outside of what was measured.
+    """Name the quantities of a pile that are outside of what was measured.
 
     Parameters
     ----------
@@ -360,8 +368,8 @@ def outside(part: str, scene: Scene) -> str:
     Returns
     -------
     str
-        The quantity, with the values that were measured, in words; empty where there
-        is none. Of a class that was not measured it is the bed.
+        The first `MOST_NAMED` of them, with the values that were measured, in words;
+        empty where there is none. Of a class that was not measured it is the bed.
     """
     return _outside(part, scene, measured.folder())
 
@@ -372,6 +380,7 @@ def _outside(part: str, scene: Scene, _: Path) -> str:
     domain = measured.domain()
     if (part, name, CRITERION) not in domain:
         return "such a bed"
+    found = []
     for quantity in QUANTITIES:
         if not quantity.is_of(part):
             continue
@@ -381,8 +390,11 @@ def _outside(part: str, scene: Scene, _: Path) -> str:
         if quantity.name == FRACTIONS and len(beyond) < len(values):
             continue
         if beyond:
-            return _in_words(quantity.name, spanned)
-    return ""
+            found.append(_in_words(quantity.name, spanned))
+    told = found[:MOST_NAMED]
+    if len(found) > MOST_NAMED:
+        told.append(f"{len(found) - MOST_NAMED} more")
+    return " and ".join(told)
 
 
 def has_measured(scene: Scene, fraction: float) -> bool:

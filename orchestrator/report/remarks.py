@@ -112,7 +112,8 @@ def remarks(results: Results) -> list[Remark]:
     if table["rho_f_kg_m3"].map(is_gas).any():
         usual = [DRY_GRAINS, FIRST_MOTION]
         if sheets.quantity_of_rows(table) is WIND:
-            usual.insert(0, over_ground(table))
+            asked = results.exemplars if len(results.exemplars) else table
+            usual.insert(0, over_ground(asked))
     return said + usual[: max(0, MOST - len(said))]
 
 

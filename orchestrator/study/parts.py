@@ -310,6 +310,11 @@ class Obstacle(Part):
             raise UnfitError(
                 "bed.obstacles", what, "a fence alone is porous: leave it out"
             )
+        if self.length and self.kind != "block":
+            what = f"a {self.kind} with a length of {metres(self.length)}"
+            raise UnfitError(
+                "bed.obstacles", what, "a block alone has a length: leave it out"
+            )
         return self
 
     @property

@@ -215,6 +215,7 @@ def test_a_number_that_is_usual_in_another_unit_is_asked_about_and_answered(
             )
         ),
         ([*D, "--roughness", "d/10:d/30:3"], ["--roughness", "values that rise"]),
+        (["--diameter", "1e-4:1e-3:100001"], ["number of values", "2 to 100000"]),
         ([*D, "--roughness", "d/30:1e-4:3"], ["--roughness: 'd/30:1e-4:3' is neither"]),
         ([*D, "--slope", "0:31:5"], ["--slope: 31 deg"]),
         (

@@ -88,7 +88,7 @@ def test_where_nothing_meets_the_tolerance_the_message_says_what_would_help(
         ({"method.kind": "peeling", "flow.gusts": GUSTS}, "peeling"),
         ({"method.kind": "peeling", "method.flow.model": "waves"}, "waves"),
         ({"method.flow.model": "waves"}, "waves"),
-        ({"threshold.update": 0.1, "method.flow.first_cell_height": 5e-4}, "changes"),
+        ({"threshold.update": 0.1, "method.flow.first_cell_height": 5e-4}, "update"),
         ({"bed.packing": "poured", "bed.width": 6.0}, "no error is known"),
         ({"forces.averaging_length": 10.0}, "averaging_length other than 0.025"),
         ({"method.flow.first_cell_height": 0.005}, "first cells of 0.005 m"),
@@ -122,6 +122,22 @@ def test_of_a_method_that_is_asked_for_a_tolerance_chooses_the_mesh(
     assert cells == [20, 40]
     assert strict.known.total <= 0.05 < loose.known.total <= 0.2
     assert decide(scene, None).scene == scene
+    assert "its flow: the mesh of quick, the cheapest fidelity" in loose.why
+    # a mesh of its own that is as good is left as it is
+    own = pile({"method.kind": kind, "method.flow.cells_per_face": 20}, height=0.02)
+    assert "its flow: the mesh as written" in decide(own, 0.2).why
+
+
+@pytest.mark.parametrize("kind", ["auto", "dem", "peeling"])
+@pytest.mark.parametrize("tolerance", [None, 0.2])
+def test_what_was_not_measured_is_told_once_with_all_that_is_outside(
+    kind: str, tolerance: float | None, pile: MakePile
+) -> None:
+    fields = {"method.kind": kind, "grain.friction_angle_deg": 30.0}
+    why = decide(pile(fields, entrainment_angle_deg=50.0), tolerance).why
+    assert why.count("no error is known for") == 1
+    assert "grain.friction_angle_deg other than 35" in why
+    assert " and bed.entrainment_angle_deg other than 60" in why
 
 
 def test_over_a_level_bed_the_flow_is_exact_and_the_grains_are_chosen(

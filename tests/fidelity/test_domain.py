@@ -31,7 +31,7 @@ SCENE_ERRORS = ROOT / "docs" / "measured" / "scene_errors.csv"
 SPANNED = {
     *("fluid.density", "fluid.viscosity", "fluid.gravity", "flow.top", "flow.depth"),
     *("grain.density", "grain.diameter", "grain.sizes", "forces.law", "forces.stress"),
-    *("bed.slope_deg", "bed.lee_slope_deg", "bed.height", "bed.length"),
+    *("bed.slope_deg", "bed.lee_slope_deg", "bed.height"),
     *(
         "bed.roughness",
         "bed.shape",
@@ -45,7 +45,7 @@ SPANNED = {
 """Fields of which the calibration has more than one value."""
 UNTESTED = {
     *("bed.kind", "bed.profile", "bed.smoothing", "bed.forms", "bed.spacing"),
-    *("bed.brink_radius", "bed.entrainment_angle_deg"),
+    *("bed.brink_radius", "bed.entrainment_angle_deg", "bed.length"),
     *("bed.relative_size", "bed.poured_depth", "bed.width"),
     "bed.dropped_grains",
     *("grain.friction_angle_deg", "grain.cohesion", "flow.gusts", "flow.towards"),

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from orchestrator.bed.line import BedLine, of_bed
 from orchestrator.flow.case import FlowCase
@@ -26,6 +27,15 @@ def fenced(porosity: float | None) -> PileBed:
         fence = {"kind": "fence", "x": X, "height": HEIGHT, "porosity": porosity}
         fences = (Obstacle.model_validate(fence),)
     return bed(shape="flat", length=0.1, obstacles=fences)
+
+
+@pytest.mark.parametrize("kind", ["fence", "half-cylinder"])
+def test_a_length_is_that_of_a_block(kind: str) -> None:
+    """Else an answer would tell a length that no flow has seen."""
+    about = {"x": X, "height": HEIGHT, "length": 0.05}
+    Obstacle.model_validate({"kind": "block", **about})
+    with pytest.raises(ValidationError, match=f"a {kind} with a length of 50 mm"):
+        Obstacle.model_validate({"kind": kind, **about})
 
 
 def flow(porosity: float | None, cells: int = 16) -> FlowCase:
