@@ -33,7 +33,6 @@ COMMAND = Command(
     page="docs/commands.md",
     examples={
         "report results/first-look": "draw its page again",
-        "report results/paper --all": "draw the folded figures too",
         "report results/dune --movie dune.gif": "an animation of its grains",
     },
     options=_options,

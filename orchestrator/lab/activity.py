@@ -15,6 +15,7 @@ from scipy.special import erfi, ndtr
 from orchestrator.physics import saltation
 from orchestrator.physics.beside import SUSTAINED
 from orchestrator.physics.grain import Grain
+from orchestrator.physics.measured import MEASURED_BEDS
 from orchestrator.physics.onset import of_grains
 from orchestrator.report.page import Paragraphs, Section, Table
 from orchestrator.types import FloatArray
@@ -126,8 +127,8 @@ def compare_activity() -> pd.DataFrame:
 def _measured_thresholds() -> pd.DataFrame:
     """Shields numbers at which motion stops and starts at each site."""
     found = {}
-    for end, name in (("stops", "cessation"), ("starts", "beds")):
-        rows = pd.read_csv(FOLDER / f"{name}.csv")
+    for end, file in (("stops", FOLDER / "cessation.csv"), ("starts", MEASURED_BEDS)):
+        rows = pd.read_csv(file)
         field = rows[rows["source"].str.startswith("Martin and Kok 2018: ")]
         sites = field["source"].str.removeprefix("Martin and Kok 2018: ")
         found[end] = field["shields"].set_axis(sites)

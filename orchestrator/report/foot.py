@@ -6,6 +6,7 @@ from shlex import quote
 from typing import Any
 
 from orchestrator import __version__
+from orchestrator.errors import printable
 from orchestrator.runs.engine import human
 from orchestrator.runs.files import Folder
 from orchestrator.runs.workspace import COMMANDS, STUDY, read_marker
@@ -48,13 +49,18 @@ def _command(about: Mapping[str, Any]) -> str:
     if "study" in about:
         if not isinstance(source, dict) or "file" not in source:
             return ""
-        words = ["study", quote(PurePath(str(source["file"])).name)]
+        words = ["study", _named(source["file"])]
         if about.get("tolerance") is not None:
             words += ["--tolerance", f"{about['tolerance']:g}"]
     elif name:
         words = [COMMANDS.get(name, name)]
         if isinstance(source, dict) and "file" in source:
-            words.append(quote(PurePath(str(source["file"])).name))
+            words.append(_named(source["file"]))
     else:
         return ""
     return " ".join(["orchestrator", *words])
+
+
+def _named(file: object) -> str:
+    """The name of a study file in a command, as it can be printed."""
+    return quote(printable(PurePath(str(file)).name))

@@ -26,6 +26,7 @@ from orchestrator.runs.files import (
 ROOMS: tuple[str, ...] = (
     "types.py",
     "errors.py",
+    "extras.py",
     "digits.py",
     "runs",
     "solvers",

@@ -280,7 +280,9 @@ def test_points_of_the_chart_are_the_shares_and_its_letters_are_large(
         sizes = [float(text.get_fontsize()) for text in letters]
         assert min(sizes) >= 10.5
     (legend,) = canvas.legends
-    assert {float(text.get_fontsize()) for text in legend.get_texts()} == {10.5}
+    assert {float(text.get_fontsize()) for text in legend.get_texts()} == {
+        style.LETTERS
+    }
     looks = chart.LOOKS.values()
     assert len({look["marker"] for look in looks}) == len(looks)
     assert len({look.get("color") for look in looks}) == len(looks)

@@ -73,9 +73,9 @@ def test_the_card_and_the_picture_have_x_of_the_file(
         assert place.figure == f"{first:.1f}"
         told = "\n".join(lines(card))
         assert f"{first:.1f} m" in told
-        assert any(f"x = {first:.1f} m" in text for text in _texts(results))
+        assert any(f"at {first:.1f} m" in text for text in _texts(results))
     assert "wind towards -x" in answers.card(both[1]).scene
-    assert "flow ←" in _texts(both[1])
+    assert "← flow" in _texts(both[1])
 
 
 def _texts(results: Results) -> list[str]:
