@@ -13,6 +13,9 @@ from orchestrator.commands import commands as of_core
 from orchestrator.errors import Fault, InputError, of_exception
 from orchestrator.runs import terminal
 
+DATE_DIGITS = 11
+"""Most digits of a date in seconds since 1970: one up to the year 5138."""
+
 
 def _with_negative_numbers(words: Sequence[str]) -> list[str]:
     """Write a negative number in one word with its option.
@@ -51,9 +54,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     terminal.listen()
     terminal.take()
-    for name in ("SOURCE_DATE_EPOCH", "MPLBACKEND"):
-        # numpy and matplotlib raise at import where these are odd; figures need neither
-        os.environ.pop(name, None)
+    # numpy and matplotlib raise at import where these are odd
+    os.environ.pop("MPLBACKEND", None)
+    date = os.environ.get("SOURCE_DATE_EPOCH", "")
+    if not (date.isdecimal() and len(date) <= DATE_DIGITS):
+        os.environ.pop("SOURCE_DATE_EPOCH", None)
     # a home that cannot be written is no news: matplotlib has then a cache of its own
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     warnings.showwarning = lambda message, *_, **__: say(f"warning: {message}")

@@ -9,7 +9,7 @@ from orchestrator import __version__
 from orchestrator.errors import printable
 from orchestrator.runs.engine import human
 from orchestrator.runs.files import Folder
-from orchestrator.runs.workspace import COMMANDS, STUDY, read_marker
+from orchestrator.runs.workspace import COMMANDS, STUDY, is_dated, read_marker
 
 
 def of_page(
@@ -37,7 +37,7 @@ def of_page(
         "date": about.get("begun", ""),
         "version": __version__,
         "programs": programs,
-        "run": human(wall_s) if wall_s else "",
+        "run": human(wall_s) if wall_s and not is_dated() else "",
         "command": _command(about),
     }
 

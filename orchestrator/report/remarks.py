@@ -33,6 +33,8 @@ MOST = 6
 """Remarks up to which those are added that are true of every study of a kind."""
 JUMP = 0.05
 """Relative change of the ratio of the ends of an interval from which it is told."""
+AGREES = 1.05
+"""Factor below which a computed threshold is neither too high nor too low."""
 NEAR_ONE = 1.1
 """Factor of a correction below which it is told with three digits."""
 PAPER_FLUID = Remark(
@@ -177,6 +179,8 @@ def _correction(results: Results, table: pd.DataFrame) -> Iterator[Remark]:
     if np.isnan(computed / measured) or row["verdict"] == USABLE:
         return
     ratio = computed / measured
+    if max(ratio, 1 / ratio) < AGREES:
+        return
     flow = "wind" if is_gas(float(row["rho_f_kg_m3"])) else "flow"
     who = "the flumes’ median is"
     if single.is_by_formula(row):

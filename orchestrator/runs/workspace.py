@@ -2,6 +2,7 @@
 
 import contextlib
 import csv
+import os
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping
 from datetime import UTC, datetime
@@ -47,6 +48,9 @@ PACK = DirectoryKind("benchmark pack", "manifest.json")
 KINDS = (STUDY, EXPERIMENT, RESULTS, COMPARISON, PACK)
 COMMANDS = {"surface": "study", "surfaces": "validate --surfaces PART"}
 """Commands of the experiments whose names are other ones."""
+EPOCH = "SOURCE_DATE_EPOCH"
+"""Variable with the date that pages have, s since 1970, as tools of reproducible builds
+take it; without run times they are then the same bytes whenever they are made."""
 STATE = "report.json"
 """Marker that what is drawn was finished, and of which cases."""
 
@@ -244,7 +248,7 @@ class Workspace(Folder):
             "orchestrator": __version__,
             "kind": kind.word,
             "name": name,
-            "begun": begun or datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+            "begun": begun or _now(),
             "cases": [*cases],
             "source": dict(source),
             **question,
@@ -585,3 +589,22 @@ def _sizes(space: Workspace, head: str) -> list[str]:
         what = f"{len(left)} cases of an earlier study file, {total}, such as {names}"
         lines.append(f"not asked for: {what}; they stay until you remove them")
     return lines
+
+
+def is_dated() -> bool:
+    """Whether `EPOCH` is set: pages are to be the same bytes whenever they are made.
+
+    Returns
+    -------
+    bool
+        Whether it is.
+    """
+    return EPOCH in os.environ
+
+
+def _now() -> str:
+    """The time to the minute, or that of `EPOCH`."""
+    now = datetime.now(UTC)
+    if is_dated():
+        now = datetime.fromtimestamp(int(os.environ[EPOCH]), UTC)
+    return now.strftime("%Y-%m-%d %H:%M UTC")

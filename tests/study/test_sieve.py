@@ -67,6 +67,14 @@ def test_a_table_is_read_as_laboratories_write_it(name: str) -> None:
     assert table.said
 
 
+@pytest.mark.parametrize("head", ["phi", "diameter_phi"])
+def test_a_table_of_sizes_may_have_phi(head: str) -> None:
+    """The negative logarithm to the base 2 of millimetres."""
+    table = read_sieve(f"{head},fraction\n-1,0.4\n0,0.5\n1,0.1\n", "s")
+    sizes = dict(table.rows)
+    assert sizes == pytest.approx({2e-3: 0.4, 1e-3: 0.5, 5e-4: 0.1})
+
+
 def test_sieves_have_the_openings_of_their_numbers() -> None:
     text = 'Sieve,% passing\n"3/8""",100\nNo. 4,80\n#10,50\nNo. 20,20\n20 mesh,20\n'
     with pytest.raises(InputError, match=r"line 6: 0.85 mm stands twice"):

@@ -190,6 +190,11 @@ def test_observations_between_the_hours_do_not_count_twice() -> None:
     found = read_winds("valid,ws,wd\n" + "\n".join([*hours, *more]), WHERE)
     shares = {(way, speed): share for way, speed, share in found.rows}
     assert shares == pytest.approx({(270.0, 4.0): 0.925, (90.0, 20.0): 0.075})
+    # as well where each part of the time has a column of its own
+    hours = [f"2020,1,1,{hour},0,4,270" for hour in range(10)]
+    more = [f"2020,1,1,5,{minute},20,90" for minute in (15, 30, 45)]
+    head = "year,month,day,hour,minute,ws,wd\n"
+    assert read_winds(head + "\n".join([*hours, *more]), WHERE).rows == found.rows
 
 
 ALIKE = {

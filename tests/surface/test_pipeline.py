@@ -101,7 +101,7 @@ def test_motion_starts_where_the_answer_says(
     assert below.sum() >= 0.01 * faces["area_m2"].sum()
     file = folder.parent / "cone.toml"
     assert main(["study", str(file), "--out", str(folder)]) == 0
-    said = capsys.readouterr().out
+    said = " ".join(capsys.readouterr().out.split())
     assert f"in a wind of {row['starts, m/s']:.3g} m/s at 10 m from 270°" in said
     # before the sentences stands the card
     card = said.partition("Where the numbers come from: ")[0]
@@ -256,7 +256,6 @@ def test_the_page_of_one_surface_names_it_on_the_card_alone(folder: Path) -> Non
         "starts<small>m/s</small>",
         "first at x<small>m</small>",
     ]
-    # the map is as wide as it has something to show
-    (part,) = re.findall(r'figures/least.svg"><img[^>]*--part:([\d.]+)"', page)
-    assert 0.4 < float(part) < 0.8
+    # the map is narrower than the page, as it has something to show
+    assert re.search(r'figures/least.svg"><img[^>]* class="part"', page)
     assert "within 0.06 to 0.13 of the reference speed" in page
