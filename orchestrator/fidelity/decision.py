@@ -19,6 +19,7 @@ from orchestrator.fidelity.fidelities import (
     LOCAL,
     PAIRS,
     Fidelity,
+    Rung,
     fidelity_of,
 )
 from orchestrator.fidelity.known import UNKNOWN, Known, known
@@ -203,17 +204,7 @@ def _along_the_bed(scene: Scene, tolerance: float | None) -> Decision:
     beyond = unmeasured(answer)
     if beyond and answer.method.flow.facts.is_solved:
         return _with_reason(written, f"{NOT_MET} for {beyond}")
-    return _on_chosen_mesh(written, _ways_along(answer), tolerance)
-
-
-def _ways_along(scene: Scene) -> Iterator[Way]:
-    """The rungs of the flow beside the closed form along the bed."""
-    yield Way(LOCAL, scene, known(LOCAL, scene), choice.cost_s(scene))
-    for flow in {one.flow.name: one.flow for one in PAIRS}.values():
-        if flow.takes(scene):
-            answer = changed(scene, flow.changes(scene))
-            one = replace(LOCAL, name=f"{flow.name} flow", flow=flow)
-            yield Way(one, answer, known(LOCAL, answer), choice.cost_s(answer))
+    return _on_chosen_mesh(written, _ways_on_meshes(answer), tolerance)
 
 
 def _on_chosen_mesh(
@@ -537,18 +528,24 @@ def _ways(scene: Scene) -> Iterator[Way]:
 
 
 def _ways_on_meshes(scene: Scene) -> Iterator[Way]:
-    """A scene as it is written, and with each rung of the flow in place of it."""
-    yield Way(fidelity_of(scene), scene, _known(scene), choice.cost_s(scene))
-    for one in PAIRS:
-        flow = one.flow_over(scene)
-        if one.grains.describes(scene) and flow.takes(scene):
+    """A scene as it is written, and with each rung of the flow in place of its own."""
+    own = fidelity_of(scene)
+    yield Way(own, scene, known(own, scene), choice.cost_s(scene))
+    for flow in {
+        one.flow_over(scene).name: one.flow_over(scene) for one in PAIRS
+    }.values():
+        if flow.takes(scene):
             answer = changed(scene, flow.changes(scene))
-            yield Way(one, answer, _known(answer), choice.cost_s(answer))
+            found = known(fidelity_of(answer), answer)
+            yield Way(_on_flow(own, flow, scene), answer, found, choice.cost_s(answer))
 
 
-def _known(scene: Scene) -> Known:
-    """The numerical error of a pile as it is written."""
-    return known(fidelity_of(scene), scene)
+def _on_flow(own: Fidelity, flow: Rung, scene: Scene) -> Fidelity:
+    """The fidelity of given grains on a rung of the flow: that of a name, if any."""
+    for one in PAIRS:
+        if one.flow_over(scene) is flow and one.grains.describes(scene):
+            return one
+    return replace(own, name=f"{flow.name} flow", flow=flow)
 
 
 CHECKS = 19

@@ -128,6 +128,16 @@ def test_of_a_method_that_is_asked_for_a_tolerance_chooses_the_mesh(
     assert "its flow: the mesh as written" in decide(own, 0.2).why
 
 
+def test_so_it_does_of_the_closed_form_along_a_bed() -> None:
+    """Its grains are places: the flow alone has an error."""
+    scene = study.load("dune", 0.2).scenes[0]
+    asked = decide(changed(scene, {"method.kind": "local"}), 0.2)
+    assert asked.scene.method.kind == "local"
+    assert not asked.is_unchecked
+    assert asked.scene.method.flow.cells_per_face == 20
+    assert "its flow: the mesh of quick, the cheapest fidelity" in asked.why
+
+
 @pytest.mark.parametrize("kind", ["auto", "dem", "peeling"])
 @pytest.mark.parametrize("tolerance", [None, 0.2])
 def test_what_was_not_measured_is_told_once_with_all_that_is_outside(
