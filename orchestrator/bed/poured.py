@@ -15,8 +15,10 @@ import pandas as pd
 from orchestrator import digits
 from orchestrator.bed import deck
 from orchestrator.bed.deck import DENSITY, DIAMETER, GRAVITY, WEIGHT, DeckCase
+from orchestrator.bed.exposure import places_within, unshadowed
 from orchestrator.bed.line import BedLine
-from orchestrator.bed.packing import APRON, Packing, Places, places_within, unshadowed
+from orchestrator.bed.packing import APRON, Packing
+from orchestrator.bed.places import Places
 from orchestrator.errors import InputError, Noisy, SolverError
 from orchestrator.solvers.dem import ENGINE
 from orchestrator.study.parts import LogNormal, Range, Sizes

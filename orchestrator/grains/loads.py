@@ -11,9 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orchestrator import digits
-from orchestrator.bed import packing, poured
+from orchestrator.bed import poured
+from orchestrator.bed.cover import cover
+from orchestrator.bed.exposure import shadows
 from orchestrator.bed.line import BedLine, of_bed
-from orchestrator.bed.packing import APRON, Lattice, Packing, Places
+from orchestrator.bed.packing import APRON, Lattice, Packing, places_along
+from orchestrator.bed.pile import pile
+from orchestrator.bed.places import Places
 from orchestrator.bed.poured import PouredBed
 from orchestrator.errors import InputError
 from orchestrator.flow.case import FlowCase
@@ -59,7 +63,7 @@ DECIMALS = 7
 """Decimals of the lengths, in d, that a poured bed depends on: beds of another scale
 share it."""
 
-_covered = cache(packing.cover)
+_covered = cache(cover)
 
 
 @cache
@@ -88,7 +92,7 @@ def has_rows_along(scene: Scene) -> bool:
 @cache
 def _packed(ground: BedLine, lattice: Lattice, line: BedLine) -> Packing:
     """A pile of two faces on a bed line, which obstacles before it make longer."""
-    packed = packing.pile(ground, lattice)
+    packed = pile(ground, lattice)
     _, arc_length = line.nearest(packed.centres)
     return replace(packed, arc_length=arc_length)
 
@@ -347,7 +351,7 @@ class Geometry:
         bed = self.bed
         d = self.scene.grain.diameter
         if not self.scene.method.may_pack_grains:
-            return packing.places_along(self.line, self.counts)
+            return places_along(self.line, self.counts)
         for run in self.pouring:
             assert self.cases is not None, "the grains of a poured bed lie in its run"
             directory = self.cases / run.name
@@ -402,7 +406,7 @@ class Geometry:
         along, height = self._placing
         flat = np.column_stack([along, np.zeros_like(along)])
         places = Places.of(flat, packed.places.xyz[:, 1], packed.width)
-        return packing.shadows(places, height, packed.sizes / 2)
+        return shadows(places, height, packed.sizes / 2)
 
     @property
     def is_balanced(self) -> bool:

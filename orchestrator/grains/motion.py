@@ -21,7 +21,7 @@ from orchestrator.bed.deck import (
     read_table,
     read_texts,
 )
-from orchestrator.bed.packing import across
+from orchestrator.bed.places import across
 from orchestrator.digits import FORMAT
 from orchestrator.errors import Exploded, Noisy, SolverError
 from orchestrator.solvers.dem import ENGINE

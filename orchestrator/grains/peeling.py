@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orchestrator import digits
-from orchestrator.bed.packing import TOUCH, Places
+from orchestrator.bed.places import TOUCH, Places
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
 REACH = 1.4

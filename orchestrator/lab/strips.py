@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orchestrator.bed.packing import Packing, Places
+from orchestrator.bed.packing import Packing
+from orchestrator.bed.places import Places
 from orchestrator.grains import peeling, threshold
 from orchestrator.grains.loads import Geometry
 from orchestrator.study.closed_form import single_grain

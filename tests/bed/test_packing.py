@@ -9,9 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orchestrator.bed import packing
+from orchestrator.bed.cover import cover, offset
+from orchestrator.bed.exposure import unshadowed
 from orchestrator.bed.line import between_flats, of_bed, triangle
-from orchestrator.bed.packing import Lattice, Packing, Places, cover, pile
+from orchestrator.bed.packing import Lattice, Packing
+from orchestrator.bed.pile import pile
+from orchestrator.bed.places import Places
 from orchestrator.study.declare import UnfitError
 from orchestrator.study.parts import Packing as Pattern
 from orchestrator.types import BoolArray, FloatArray
@@ -161,14 +164,14 @@ def test_beds_that_no_row_of_grains_fits_are_refused() -> None:
         1 / D
     )
     with pytest.raises(UnfitError, match="more sharply than a grain at"):
-        packing.offset(trough, 3.0)
+        offset(trough, 3.0)
 
 
 def _unshadowed(
     x: FloatArray, z: FloatArray, r: FloatArray, y: Any = 0.0, w: Any = 0
 ) -> BoolArray:
     places = Places.of(np.column_stack([x, np.zeros_like(x)]), y, w)
-    return packing.unshadowed(places, z, r)
+    return unshadowed(places, z, r)
 
 
 def test_a_grain_under_the_flank_of_a_larger_one_is_not_exposed() -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from orchestrator.bed import poured
 from orchestrator.bed.line import BedLine
-from orchestrator.bed.packing import Places
+from orchestrator.bed.places import Places
 from orchestrator.bed.poured import BED, DUMP, PouredBed
 from orchestrator.errors import InputError, SolverError
 from orchestrator.grains.loads import Geometry

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.bed import deck
-from orchestrator.bed.packing import Places
+from orchestrator.bed.places import Places
 from orchestrator.grains import motion, peeling, threshold
 from orchestrator.grains.peeling import Force, ForceTable, Loading
 from orchestrator.runs.case import templates

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.bed.packing import Packing, Places
+from orchestrator.bed.packing import Packing
+from orchestrator.bed.places import Places
 from orchestrator.grains import peeling, sheltering
 from orchestrator.grains.loads import Geometry
 from orchestrator.grains.peeling import ForceTable, Loading

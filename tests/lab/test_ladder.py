@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from orchestrator import plan
-from orchestrator.bed import packing
+from orchestrator.bed.pile import pile as packed_pile
 from orchestrator.experiment import Runs, piles
 from orchestrator.fidelity.classes import LEVEL_BED, scene_class
 from orchestrator.fidelity.fidelities import FLAT
@@ -96,8 +96,9 @@ def test_the_cost_of_a_pile_does_not_depend_on_what_was_asked_before(
 
         return count
 
-    packed, found = packing.pile, threshold.threshold
-    monkeypatch.setattr(packing, "pile", counted("packed", packed))
+    found = threshold.threshold
+    packed = counted("packed", packed_pile)
+    monkeypatch.setattr("orchestrator.grains.loads.pile", packed)
     monkeypatch.setattr(threshold, "threshold", counted("found", found))
     work = []
     for _ in range(3):
