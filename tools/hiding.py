@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.bed.poured import BED
-from orchestrator.grains.loads import Geometry
+from orchestrator.grains.geometry import Geometry
 from orchestrator.grains.threshold import MOBILITIES
 from orchestrator.lab import validate
 from orchestrator.lab.strips import ROUGH, Strips, hiding_of

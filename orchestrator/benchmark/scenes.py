@@ -11,7 +11,8 @@ from orchestrator.benchmark.mechanics import mechanics, three_grains
 from orchestrator.benchmark.pack import OF_POCKET, Problem, expectation
 from orchestrator.flow.run import SPEED_HEIGHT
 from orchestrator.grains import cells
-from orchestrator.grains.loads import forces
+from orchestrator.grains.forces import forces
+from orchestrator.grains.loads import loads_of
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.pile_case import MARGIN
 from orchestrator.grains.threshold import PileThreshold
@@ -420,14 +421,14 @@ def _grains(pile: Pile, cases: Path) -> pd.DataFrame:
         "d_m": packing.sizes * d,
         "kind": np.select(kinds, ["fixed", "counted", "pushed"], "mobile"),
         "slope_deg": np.where(exposed, slope_deg, np.nan),
-        "ustar_over_ustar0": np.where(exposed, pile.loads(cases).ratio, np.nan),
+        "ustar_over_ustar0": np.where(exposed, loads_of(pile, cases).ratio, np.nan),
     }
     return pd.DataFrame(columns)
 
 
 def _forces(pile: Pile, curve: pd.DataFrame, cases: Path) -> pd.DataFrame:
     """The flow's force on each exposed grain, which has its own size, by load step."""
-    loading = pile.loads(cases).loading
+    loading = loads_of(pile, cases).loading
     exposed = np.flatnonzero(loading.ratio)
     fx, fz = loading.at(curve["ustar0_m_s"])[:, exposed].reshape(-1, 2).T
     columns = {

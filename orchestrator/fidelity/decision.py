@@ -23,7 +23,7 @@ from orchestrator.fidelity.fidelities import (
     fidelity_of,
 )
 from orchestrator.fidelity.known import UNKNOWN, Known, known
-from orchestrator.grains.loads import LONGEST_PACKED, Geometry, has_rows_along
+from orchestrator.grains.geometry import LONGEST_PACKED, Geometry, has_rows_along
 from orchestrator.grains.pile import Pile
 from orchestrator.study import methods, models
 from orchestrator.study.criterion import SUSTAINED, is_sustained

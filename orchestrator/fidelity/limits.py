@@ -18,7 +18,7 @@ from orchestrator.fidelity.decision import is_along, written
 from orchestrator.flow.model import of_scene
 from orchestrator.flow.run import SPEED_HEIGHT
 from orchestrator.flow.theory import seen_by_the_flow
-from orchestrator.grains.loads import Geometry
+from orchestrator.grains.geometry import Geometry
 from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.study import units

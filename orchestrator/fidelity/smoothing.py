@@ -4,7 +4,7 @@ import warnings
 
 from orchestrator.errors import InputError
 from orchestrator.fidelity import limits
-from orchestrator.grains.loads import has_rows_along
+from orchestrator.grains.geometry import has_rows_along
 from orchestrator.study.declare import UnfitError
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene

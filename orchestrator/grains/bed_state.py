@@ -13,7 +13,7 @@ from orchestrator import digits
 from orchestrator.bed import deck
 from orchestrator.bed.line import BedLine
 from orchestrator.bed.packing import Packing
-from orchestrator.grains.loads import Geometry
+from orchestrator.grains.geometry import Geometry
 from orchestrator.types import BoolArray, FloatArray
 
 GRAINS = "grains.csv"

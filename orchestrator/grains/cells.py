@@ -16,7 +16,7 @@ import numpy as np
 from orchestrator.bed import deck
 from orchestrator.bed.deck import DENSITY, DIAMETER, GRAVITY, WEIGHT, DeckCase
 from orchestrator.grains import motion
-from orchestrator.grains.loads import forces
+from orchestrator.grains.forces import forces
 from orchestrator.runs.files import canonical_json
 from orchestrator.solvers.dem import ENGINE
 from orchestrator.study.closed_form import closed_form

@@ -19,7 +19,7 @@ from orchestrator.bed.deck import DeckCase, GrainTable
 from orchestrator.bed.packing import Packing
 from orchestrator.bed.poured import PouredBed
 from orchestrator.errors import SolverError
-from orchestrator.grains.loads import Geometry
+from orchestrator.grains.geometry import Geometry
 from orchestrator.grains.motion import MODES, Motion
 from orchestrator.physics import saltation
 from orchestrator.physics.constants import SAND_GRAIN

@@ -11,7 +11,8 @@ from typing import ClassVar
 from orchestrator.grains import wear
 from orchestrator.grains.bed_state import BedState
 from orchestrator.grains.followed import FollowedCase
-from orchestrator.grains.loads import Geometry
+from orchestrator.grains.geometry import Geometry
+from orchestrator.grains.loads import loads_of
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile_case import PileCase
 from orchestrator.grains.wear import FlowRun, WornFlow
@@ -84,7 +85,7 @@ class Pivot(Method):
 
     def motion(self, cases: Path) -> Motion:
         """Motion at the flows of Eq. 3 or 5, or at those that lift a grain before."""
-        loads = self.geometry.loads(cases)
+        loads = loads_of(self.geometry, cases)
         return Motion.of_flows(rolling := loads.alone(), loads.lifting(rolling))
 
 
@@ -128,7 +129,7 @@ class Peeling(Method):
         if self.geometry.scene.threshold.update:
             left = self.last(cases).left
             return Motion.of_flows(left[self.geometry.packing.windward])
-        loads = self.geometry.loads(cases)
+        loads = loads_of(self.geometry, cases)
         rolling = loads.leaving()
         return Motion.of_flows(rolling, loads.lifting(rolling))
 

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.flow.stress import WallStress
-from orchestrator.grains.loads import Geometry, Loads
+from orchestrator.grains.geometry import Geometry
+from orchestrator.grains.loads import Loads, loads_of
 from orchestrator.grains.methods import METHODS, Method
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.threshold import PileThreshold, of_grains, of_pile
@@ -123,8 +124,10 @@ class Pile(Geometry):
         FloatArray
             The ratios, shape (N,).
         """
-        changes = bool(self.scene.threshold.update)
-        ratio = self.method.last(cases).speed if changes else self.loads(cases).ratio
+        if self.scene.threshold.update:
+            ratio = self.method.last(cases).speed
+        else:
+            ratio = loads_of(self, cases).ratio
         return np.asarray(ratio[self.packing.windward])
 
     def first(self, motion: Motion) -> tuple[float, float]:
@@ -186,7 +189,7 @@ class Pile(Geometry):
         motion = self.method.motion(cases)
         if not self.is_sustained or self.scene.is_followed:
             return motion
-        return motion.until(*self.loads(cases).sustained())
+        return motion.until(*loads_of(self, cases).sustained())
 
     def correction_error(self, fraction: float, cases: Path) -> float:
         """Find the relative error of a correction of tau_c: 0 without one.
@@ -227,7 +230,7 @@ class Pile(Geometry):
         if self.scene.is_followed:
             # both are asked at once: no grain is known to have left alone
             return np.ones(self.packing.count, bool)
-        further, over = self.loads(cases).sustained()
+        further, over = loads_of(self, cases).sustained()
         return np.asarray(self.method.motion(cases).flows / over < further)
 
     def thresholds(

@@ -13,7 +13,8 @@ from orchestrator.errors import InputError
 from orchestrator.grains import motion, wear
 from orchestrator.grains.bed_state import GRAINS, BedState
 from orchestrator.grains.cells import GrainCase
-from orchestrator.grains.loads import Geometry, Loads
+from orchestrator.grains.geometry import Geometry
+from orchestrator.grains.loads import Loads, loads_of
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.wear import WornFlow
 from orchestrator.physics.gusts import gust_stresses
@@ -238,7 +239,7 @@ class PileCase(GrainCase):
         """The grains under the flow when the run begins."""
         geometry = Geometry(self.scene, cases)
         if self.flow is None:
-            return geometry.loads(cases), BedState.whole(geometry.packing)
+            return loads_of(geometry, cases), BedState.whole(geometry.packing)
         return wear.loads(geometry, self.flow, cases), wear.state(
             geometry, self.flow, cases
         )

@@ -18,7 +18,8 @@ from orchestrator.flow.case import FlowCase
 from orchestrator.flow.run import WALL_STRESS
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains.bed_state import BedState, sunk
-from orchestrator.grains.loads import Geometry, Loads
+from orchestrator.grains.geometry import Geometry
+from orchestrator.grains.loads import Loads, under
 from orchestrator.runs.case import Case
 from orchestrator.solvers import openfoam
 from orchestrator.study.scene import BEYOND_ASKED, READ_LATER, Scene
@@ -228,9 +229,9 @@ def loads(geometry: Geometry, flow: FlowRun, cases: Path) -> Loads:
     """
     stress = WallStress.from_csv(cases / flow.name / WALL_STRESS)
     if not isinstance(flow, WornFlow):
-        return geometry.under(stress)
+        return under(geometry, stress)
     worn = line(geometry, flow, cases), state(geometry, flow, cases).present
-    return geometry.under(stress, *worn)
+    return under(geometry, stress, *worn)
 
 
 def peeled(geometry: Geometry, flow: FlowRun, cases: Path) -> BedState:

@@ -15,7 +15,8 @@ import numpy as np
 from orchestrator.bed.packing import Packing
 from orchestrator.bed.places import Places
 from orchestrator.grains import peeling, threshold
-from orchestrator.grains.loads import Geometry
+from orchestrator.grains.geometry import Geometry
+from orchestrator.grains.loads import loads_of
 from orchestrator.study.closed_form import single_grain
 from orchestrator.study.fidelities import Fields
 from orchestrator.study.scene import Scene
@@ -144,7 +145,7 @@ class Strips:
             ]
         )
         packed = bed.packing
-        loads = bed.loads(self.cases)
+        loads = loads_of(bed, self.cases)
         places = Places.of(packed.centres @ turn.T, packed.across, packed.width)
         loading = replace(
             loads.loading,

@@ -16,6 +16,7 @@ from orchestrator.flow.stress import bubble
 from orchestrator.grains import threshold
 from orchestrator.grains.cells import SingleGrainCase
 from orchestrator.grains.corrected import CorrectedPile
+from orchestrator.grains.loads import interlocking
 from orchestrator.grains.motion import MODES, Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold
@@ -527,7 +528,7 @@ class Answer:
         self.cases = cases
         self.motion = pile.motion(cases)
         self.speed = pile.speed(cases)
-        self.interlocking = pile.interlocking(cases)
+        self.interlocking = interlocking(pile, cases)
         self.first = pile.first(self.motion)
         self.checked = (np.nan, np.nan)
         if decision.is_along:

@@ -14,7 +14,7 @@ from orchestrator.bed.line import BedLine
 from orchestrator.bed.places import Places
 from orchestrator.bed.poured import BED, DUMP, PouredBed
 from orchestrator.errors import InputError, SolverError
-from orchestrator.grains.loads import Geometry
+from orchestrator.grains.geometry import Geometry
 from orchestrator.runs import engine
 from orchestrator.runs.case import templates
 from orchestrator.study import study

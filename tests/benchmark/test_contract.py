@@ -19,7 +19,7 @@ from orchestrator.bed.deck import GrainTable
 from orchestrator.benchmark import pack, scenes
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains import motion
-from orchestrator.grains.loads import Geometry
+from orchestrator.grains.geometry import Geometry
 from orchestrator.runs.case import templates
 from orchestrator.solvers.dem import ENGINE
 from orchestrator.study import study

@@ -13,6 +13,7 @@ import pytest
 from orchestrator import pipeline
 from orchestrator.benchmark import compare
 from orchestrator.benchmark.compare import Options, Outcome
+from orchestrator.grains.loads import loads_of
 from orchestrator.runs.workspace import Workspace
 from tests.benchmark.conftest import NATIVE, RIGHT, ROOT
 
@@ -88,7 +89,7 @@ def test_the_native_starts_know_the_pivots_of_a_poured_bed(
     flows = pd.read_csv(next(poured.glob("scenes/4-*/load_steps.csv")))[
         "ustar0_m_s"
     ].to_numpy()
-    alone = pile.loads(pile.cases).alone()
+    alone = loads_of(pile, pile.cases).alone()
     numbers = pd.read_csv(tmp_path / "results" / "comparison.csv")
     moved = numbers[numbers["quantity"] == "moved"]
     assert moved["answer"].max() > 3

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from orchestrator.flow.stress import WallStress
-from orchestrator.grains.loads import Geometry
+from orchestrator.grains.geometry import Geometry
 from orchestrator.study import study
 
 DIAMETER, HEIGHT = 1e-3, 0.02

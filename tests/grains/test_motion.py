@@ -19,7 +19,8 @@ from orchestrator.bed.deck import NOISE, GrainTable, read_table
 from orchestrator.errors import Exploded, Noisy, SolverError
 from orchestrator.fidelity.decision import written
 from orchestrator.grains import motion, threshold
-from orchestrator.grains.loads import forces
+from orchestrator.grains.forces import forces
+from orchestrator.grains.loads import loads_of
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.runs.case import templates
@@ -89,7 +90,7 @@ def test_a_pile_that_lifts_off_has_moved_and_says_so(tmp_path: Path) -> None:
     assert (grains.loc[grains["carried_off"] == 1, "mode"] == "lifted").all()
     # by geometry lift bears the weight normal to the bed before any grain rolls
     pile, cases = Pile(written(asked.scenes[0])), tmp_path / "cases"
-    loads, scene = pile.loads(cases), pile.scene
+    loads, scene = loads_of(pile, cases), pile.scene
     lifting, ratio = loads.lifting(loads.alone()), loads.ratio[pile.packing.windward]
     assert (np.isinf(lifting) == (ratio == 0)).all()
     lift = forces(scene)[1](lifting[ratio > 0] * ratio[ratio > 0])

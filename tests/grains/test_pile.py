@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import linprog
 
 from orchestrator.errors import Exploded, InputError
-from orchestrator.grains.loads import Loads
+from orchestrator.grains.loads import Loads, interlocking, loads_of
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.pile_case import flows
@@ -154,7 +154,7 @@ def test_the_grains_of_a_row_without_a_free_end_hold_one_another(
         + f'[method]\nkind = "{method}"\n'
     )
     (scene,) = study.parse(text, name="row", where="test").scenes
-    assert least <= Pile(scene).interlocking(tmp_path) <= most
+    assert least <= interlocking(Pile(scene), tmp_path) <= most
 
 
 def test_load_steps_begin_below_the_first_grain_that_is_held(tmp_path: Path) -> None:
@@ -165,7 +165,7 @@ def test_load_steps_begin_below_the_first_grain_that_is_held(tmp_path: Path) -> 
         + '[method]\nkind = "dem"\n'
     )
     (scene,) = study.parse(text, name="loose", where="test").scenes
-    loads = Pile(scene).loads(tmp_path)
+    loads = loads_of(Pile(scene), tmp_path)
     alone = loads.alone()
     assert (alone == 0).any()
     first = alone[alone > 0].min()
@@ -181,7 +181,7 @@ def test_no_law_makes_a_hold_of_a_row(tmp_path: Path, law: str) -> None:
     text = text.replace("cells_per_face = 20", 'model = "waves"')
     text += f'[method]\nkind = "pivot"\n[forces]\nlaw = "{law}"\n'
     (scene,) = study.parse(text, name="row", where="test").scenes
-    assert Pile(scene).interlocking(tmp_path) == pytest.approx(1, abs=0.01)
+    assert interlocking(Pile(scene), tmp_path) == pytest.approx(1, abs=0.01)
 
 
 @pytest.mark.parametrize(
@@ -204,7 +204,7 @@ def test_rows_of_a_bed_without_grains_are_judged_around_the_first_motion(
         )
         text = text.replace("cells_per_face = 20", 'model = "waves"')
         (scene,) = study.parse(text, name="long", where="test").scenes
-        each[method] = Pile(scene).interlocking(tmp_path)
+        each[method] = interlocking(Pile(scene), tmp_path)
     assert (each["pivot"] > 1.5) == (each["local"] > 1.5) == holds
     assert each["local"] == pytest.approx(each["pivot"], rel=0.1)
 
@@ -221,7 +221,9 @@ def test_along_a_plane_the_closed_form_is_that_of_a_grain_on_it(
     text = text.replace("cells_per_face = 20", 'model = "flat"')
     (scene,) = study.parse(text, name="plane", where="test").scenes
     exact = closed_form(scene).friction_velocity
-    np.testing.assert_allclose(Pile(scene).loads(tmp_path).alone(), exact, rtol=5e-9)
+    np.testing.assert_allclose(
+        loads_of(Pile(scene), tmp_path).alone(), exact, rtol=5e-9
+    )
 
 
 STUDY = """
@@ -477,7 +479,7 @@ def test_load_steps_rise_where_the_last_grain_asked_for_lies_loose(
     results: Results = request.getfixturevalue(name)
     pile = _pile(results, "dem")
     scene = changed(pile.scene, {"method.grains.final_fraction": 1e-6})
-    rising = flows(Pile(scene, results.cases).loads(results.cases))
+    rising = flows(loads_of(Pile(scene, results.cases), results.cases))
     assert (np.diff(rising) > 0).all()
 
 
@@ -490,7 +492,10 @@ def test_the_deck_has_the_grains_as_they_lie(
     text = (results.cases / pile.case.name / "grains.data").read_text()
     rows = [row.split() for row in text.partition("Atoms\n\n")[2].splitlines()]
     _, _, diameter, _, _, y, _ = np.array(rows, float).T
-    force, exposed = pile.loads(results.cases).loading.at(0.02), pile.packing.windward
+    force, exposed = (
+        loads_of(pile, results.cases).loading.at(0.02),
+        pile.packing.windward,
+    )
     np.testing.assert_allclose(diameter, pile.packing.sizes * 1e-3, rtol=5e-9)
     if name == "mixed":  # each is driven by its own size
         sizes = pile.packing.sizes[exposed]
@@ -513,7 +518,7 @@ def test_a_bed_none_of_whose_grains_is_held_is_refused(
     for name in ("alone", "leaving"):
         monkeypatch.setattr(Loads, name, lambda loads: np.zeros(pile.packing.count))
     with pytest.raises(InputError, match="lets it go"):
-        flows(pile.loads(mixed.cases))
+        flows(loads_of(pile, mixed.cases))
 
 
 def test_a_poured_bed_that_loses_a_grain_says_what_helps(

@@ -11,7 +11,8 @@ import pytest
 from orchestrator.bed.packing import Packing
 from orchestrator.bed.places import Places
 from orchestrator.grains import peeling, sheltering
-from orchestrator.grains.loads import Geometry
+from orchestrator.grains.geometry import Geometry
+from orchestrator.grains.loads import loads_of
 from orchestrator.grains.peeling import ForceTable, Loading
 from orchestrator.lab import validate
 from orchestrator.lab.sphere import sphere
@@ -160,7 +161,7 @@ def test_each_grain_of_a_lattice_bears_the_stress_of_its_own_bed() -> None:
     answers = {}
     for method in ("pivot", "peeling"):
         (scene,) = parse(PILE % method, name="a", where="a").scenes
-        loads = Geometry(scene).loads(Path())
+        loads = loads_of(Geometry(scene), Path())
         answers[method] = loads.alone() if method == "pivot" else loads.leaving()
     beta, alpha = math.radians(60), math.radians(15)
     tau = (
@@ -176,7 +177,7 @@ def test_each_grain_of_a_lattice_bears_the_stress_of_its_own_bed() -> None:
     assert answers["peeling"].max() == pytest.approx(exact, rel=0.05)
     text = PILE % "pivot" + "flow.gusts = { intensity = 0.4, events = 100 }\n"
     (gusty,) = parse(text, name="a", where="a").scenes
-    ratio = Geometry(gusty).loads(Path()).alone() / answers["pivot"]
+    ratio = loads_of(Geometry(gusty), Path()).alone() / answers["pivot"]
     assert ratio == pytest.approx(1 / math.sqrt(peak_over_mean(0.4, 100)), rel=1e-6)
 
 
@@ -187,7 +188,7 @@ def test_grains_that_were_hidden_share_the_stress_when_those_above_have_gone() -
     packed, present = bed.packing, np.ones(len(bed.packing.sizes), bool)
     counted = np.flatnonzero(packed.windward)
     present[counted[np.argsort(packed.arc_length[counted])[30:42]]] = False
-    loads = replace(bed.loads(Path()), present=present)
+    loads = replace(loads_of(bed, Path()), present=present)
     assert loads.exposed.sum() == bed.exposed(np.ones_like(present)).sum() - 1
     drag = np.where(loads.exposed, loads.loading.drag(np.full(len(present), unit)), 0.0)
     patch, areas = bed.patches

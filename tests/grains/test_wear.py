@@ -8,7 +8,7 @@ import pytest
 
 from orchestrator.grains import bed_state, wear
 from orchestrator.grains.bed_state import BedState
-from orchestrator.grains.loads import Geometry
+from orchestrator.grains.geometry import Geometry
 from orchestrator.grains.pile import Pile
 from orchestrator.report.figures import bed
 from orchestrator.report.results import Results

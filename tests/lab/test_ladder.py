@@ -98,7 +98,7 @@ def test_the_cost_of_a_pile_does_not_depend_on_what_was_asked_before(
 
     found = threshold.threshold
     packed = counted("packed", packed_pile)
-    monkeypatch.setattr("orchestrator.grains.loads.pile", packed)
+    monkeypatch.setattr("orchestrator.grains.geometry.pile", packed)
     monkeypatch.setattr(threshold, "threshold", counted("found", found))
     work = []
     for _ in range(3):

@@ -8,7 +8,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from orchestrator.grains.loads import Geometry, on_slopes
+from orchestrator.grains.forces import on_slopes
+from orchestrator.grains.geometry import Geometry
+from orchestrator.grains.loads import loads_of
 from orchestrator.grains.pile_case import in_time
 from orchestrator.physics.gusts import gust_stresses, peak_over_mean
 from orchestrator.study.closed_form import closed_form
@@ -78,7 +80,7 @@ def test_the_force_of_each_event_is_that_of_its_stress(
     intensity: float, events: int
 ) -> None:
     scene = _scene(PILE, intensity, events)
-    loads = Geometry(scene).loads(Path())
+    loads = loads_of(Geometry(scene), Path())
     rising = float(closed_form(scene).friction_velocity) * np.array([1.0, 1.3])
     factors = in_time(scene.flow.gusts, loads, rising)  # type: ignore[arg-type]
     each = factors[1:].reshape(len(rising), events + 1)

@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator.bed import poured
 from orchestrator.errors import InputError
-from orchestrator.grains.loads import Geometry
+from orchestrator.grains.geometry import Geometry
 from orchestrator.study import parts, study
 from orchestrator.study.parts import LogNormal, Sizes
 from orchestrator.study.scene import Scene

@@ -12,7 +12,7 @@ import pytest
 from orchestrator import guests, plan
 from orchestrator.errors import InputError
 from orchestrator.fidelity import limits
-from orchestrator.grains.loads import Geometry
+from orchestrator.grains.geometry import Geometry
 from orchestrator.runs.files import canonical_json
 from orchestrator.study import closed_form, fields, methods, parts, study
 from orchestrator.study.parts import Forces, GrainBed, GrainPart
