@@ -8,6 +8,8 @@ written with nine. Two processors then differ only where a number lies within th
 last digits of the middle between two numbers of nine digits, once in some ten millions.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -167,6 +169,27 @@ def number(count: int, noun: str) -> str:
     if count == 1:
         return f"{count} {noun}"
     return f"{count} {noun}s"
+
+
+def enumerated(words: Sequence[str]) -> str:
+    """Write several things one after the other.
+
+    Parameters
+    ----------
+    words
+        What they are.
+
+    Returns
+    -------
+    str
+        The words, with "and" before the last.
+
+    Examples
+    --------
+    >>> enumerated(["slope"]), enumerated(["slope", "size", "law"])
+    ('slope', 'slope, size and law')
+    """
+    return " and ".join(filter(None, [", ".join(words[:-1]), *words[-1:]]))
 
 
 def percent(part: float, decimals: int = 0) -> str:

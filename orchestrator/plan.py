@@ -3,9 +3,9 @@
 import time
 import timeit
 from collections import Counter
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -375,7 +375,7 @@ def _few(plan: Plan, slower: float) -> Iterator[str]:
         instead = [Pile(one.instead.scene) for one in answers]
         spared_s = slower * sum(pile.case.cost_s for pile in instead)
         by_dem = [plan.piles[asked] for asked in (*runs.design, *runs.kept)]
-        cost_s = sum(pile.case.cost_s for pile in by_dem)
+        cost_s = slower * sum(pile.case.cost_s for pile in by_dem)
         yield f"  {number(len(answers), 'pile')} by {runs.in_words}"
         cost = f"{human(cost_s)} of DEM in place of {human(cost_s + spared_s)}"
         yield f"    {cost}, which it takes if their error is beyond the tolerance:"
@@ -392,15 +392,17 @@ def _about(pile: Pile) -> str:
 
 
 def _choices(study: Study, plan: Plan, workers: int) -> Iterator[str]:
-    """Say what each tolerance costs and leaves unusable, if nothing was run before."""
+    """Say what the study takes with each tolerance, and what is known within it.
+
+    The times are those of `expected` where no case is done.
+    """
     piles = [one for one in study.scenes if isinstance(one.bed, PileBed)]
     if not piles:
         return
     count = sum(len(scene.threshold.fractions) for scene in piles)
     tolerances = sorted({*TOLERANCES, *filter(None, [study.tolerance])})
-    slower = pace() * BESIDE / workers
-    what = f"how many of {count} thresholds are known within it"
-    yield f"what a choice costs, and {what}:"
+    told = f"time of the whole study by tolerance, {number(workers, 'worker')}"
+    yield f"{told}; how many of {count} thresholds are known to be within it:"
     for tolerance in tolerances:
         made = plan
         if tolerance != study.tolerance:
@@ -410,13 +412,21 @@ def _choices(study: Study, plan: Plan, workers: int) -> Iterator[str]:
             if isinstance(answer.scene.bed, PileBed):
                 errors = map(answer.error_at, answer.scene.threshold.fractions)
                 within += sum(one is not None and one <= tolerance for one in errors)
-        took = human(slower * made.cost_s)
-        yield f"  {tolerance:g}: {took}, {within} known within it"
+        took = _whole(made, workers)
+        yield f"  tolerance {tolerance:g}: {took}, {within} known within it"
+    free = make(replace(study, tolerance=None)) if study.tolerance else plan
+    yield f"  no tolerance: {_whole(free, workers)}"
     whole = of({scene.id: as_written(scene) for scene in study.scenes})
-    yield f"  as written: {human(slower * whole.cost_s)}"
+    if any(scene.method.is_open for scene in piles):
+        yield f"  by DEM where it can: {_whole(whole, workers)}"
     if study.tolerance and plan.cost_s > whole.cost_s:
         dearer = "costs more than the study as written: leave it out"
-        yield f"  {study.tolerance:g} {dearer}"
+        yield f"  tolerance {study.tolerance:g} {dearer}"
+
+
+def _whole(plan: Plan, workers: int) -> str:
+    """Expected time of all of a plan, if nothing of it were done."""
+    return f"about {human(sum(_wall_s(plan, plan.cases.values(), workers)))}"
 
 
 def _not_usable(plan: Plan, tolerance: float | None) -> Iterator[str]:
@@ -431,8 +441,8 @@ def _not_usable(plan: Plan, tolerance: float | None) -> Iterator[str]:
             if is_plane and scene.grain.sizes is None:
                 yield "equal spheres in one plane settle into a crystal"
             elif error is None:
-                what = "their numerical error on such beds was not measured"
-                yield f"{what}; `orchestrator convergence` estimates it"
+                remedy = decision.of_unknown_error(answer, fraction, tolerance)
+                yield f"{decision.NOT_MEASURED} ({remedy})"
             elif tolerance is not None and error > tolerance * (1 + 1e-9):
                 yield "no fidelity is known to be within the tolerance"
 
@@ -466,7 +476,17 @@ def expected(
     yield f"{number(len(plan.cases), 'case')}: {kinds}; to run: {todo}"
     for root, count in Counter(cases.parent for cases in found.values()).items():
         yield f"  {count} done in {root}"
-    # a chain of cases takes at least the sum of its times, however many run beside it
+    runs, drawing = _wall_s(plan, missing, workers)
+    wall = f"about {human(runs + drawing)} with {number(workers, 'worker')}"
+    rest = f"{human(drawing)} of them for tables and figures"
+    yield f"expected: {wall}, {rest}; {len(missing) * BYTES / 1e6:.0f} MB"
+
+
+def _wall_s(plan: Plan, missing: Collection[Case], workers: int) -> tuple[float, float]:
+    """Expected times of some cases of a plan, and of its tables and figures, s.
+
+    A chain of cases takes at least the sum of its times, however many run beside it.
+    """
     walls = {case.name: case.cost_s / min(case.ranks, workers) for case in missing}
     longest_s = 0.0
     for case in missing:
@@ -474,13 +494,11 @@ def expected(
         longest_s = max(longest_s, chain_s)
     alone_s = sum(case.cost_s for case in missing)
     slower = pace()
-    runs = slower * BESIDE * max(alone_s / workers, longest_s)
-    drawing = slower * plan.drawing_s
-    wall = f"about {human(runs + drawing)} with {number(workers, 'worker')}"
-    rest = f"{human(drawing)} of them for tables and figures"
-    yield f"expected: {wall}, {rest}; {len(missing) * BYTES / 1e6:.0f} MB"
+    runs_s = slower * BESIDE * max(alone_s / workers, longest_s)
+    return runs_s, slower * plan.drawing_s
 
 
+@cache  # the times that a plan says are of one moment
 def pace() -> float:
     """Measure how slow this machine is.
 

@@ -1,5 +1,6 @@
 """What a plan says before anything runs."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -27,8 +28,14 @@ bed = {{ kind = "pile", slope_deg = 15.0{} }}
         (
             "",
             'method.flow.model = "waves"\nmethod.kind = "pivot"',
-            "4 thresholds of piles will not be usable: their numerical error on such "
-            "beds was not measured; `orchestrator convergence` estimates it",
+            "4 thresholds of piles will not be usable: the numerical error on such a "
+            "bed was not measured (run `orchestrator convergence` on the study file",
+        ),
+        (
+            ", height = 0.05",
+            'method.kind = "dem"',
+            "4 thresholds of piles will not be usable: the numerical error on such a "
+            "bed was not measured (leave method.kind out: the program then chooses",
         ),
         (
             "",
@@ -60,13 +67,18 @@ def test_a_plan_says_what_each_choice_costs_and_names_its_checks(
     (check,) = plan.make(asked).checks.values()
     assert sum("1 check by DEM" in line for line in said) == 1
     assert any(check.case.name in line for line in said)
-    (head,) = (line for line in said if line.startswith("what a choice costs"))
+    (head,) = (
+        line for line in said if line.startswith("time of the whole study by tolerance")
+    )
     count = sum(len(one.threshold.fractions) for one in asked.scenes)
     assert f"of {count} thresholds" in head
     first = said.index(head) + 1
     names = [line.split(":")[0].strip() for line in said[first : first + 3]]
-    assert names == ["0.05", "0.2", "as written"]
+    assert names == ["tolerance 0.05", "tolerance 0.2", "no tolerance"]
     assert f"{count} known within it" in said[first + 1]
+    # no case is done: the time of the file's tolerance is that which is expected
+    (time,) = re.findall(r": (about \d+ \w+), ", said[first + 1])
+    assert said[-1].startswith(f"expected: {time} with 2 workers")
 
 
 def test_a_tolerance_that_costs_more_than_the_study_as_written_is_told(

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 
+from orchestrator.errors import InputError
 from orchestrator.fidelity import choice, spread
 from orchestrator.fidelity.choice import Way
 from orchestrator.fidelity.classes import FLOW, GRAINS, scene_class
@@ -41,6 +42,8 @@ ALONG = f"{LONG_BED}: closed form along the bed, checked where motion starts"
 HOPS = "sustained motion: entrainment has a closed form, rolling and hopping a table"
 ENDLESS = "the rows of the bed have no end: closed form along the bed"
 NOT_MET = "the tolerance cannot be met, no error is known"
+NOT_MEASURED = "the numerical error on such a bed was not measured"
+ESTIMATE = "run `orchestrator convergence` on the study file, which estimates it"
 NONE_CHEAPER = "no fidelity whose error is known is cheaper than the scene as written"
 KEPT = ("method.flow.speed", "method.flow.viscosity")
 """Numbers of the solve that every fidelity keeps: u*/U_e is the same at each of them
@@ -352,6 +355,47 @@ def as_written(scene: Scene, why: str = "") -> Decision:
     if beyond:
         why = f"{why}; no error is known for {beyond}"
     return Decision(scene, answer, fidelity, known(fidelity, answer), why)
+
+
+def of_unknown_error(
+    decision: Decision, fraction: float, tolerance: float | None
+) -> str:
+    """Say what helps where the numerical error of a threshold is not known.
+
+    Parameters
+    ----------
+    decision
+        The decision on its scene.
+    fraction
+        Fraction n/N of the counted grains.
+    tolerance
+        The tolerance of the study, if it has one.
+
+    Returns
+    -------
+    str
+        Where the study asks for a method, and the program would choose one whose error
+        is known, the remedy names that one; else it names the command that estimates
+        the error.
+    """
+    asked = decision.asked
+    if not asked.method.is_open:
+        free = _left_open(asked, tolerance)
+        if free is not None and free.error_at(fraction) is not None:
+            chosen = f"the program then chooses the method {free.scene.method.kind}"
+            is_known = "whose numerical error on such a bed is known"
+            return f"leave method.kind out: {chosen}, {is_known}"
+    return ESTIMATE
+
+
+@cache
+def _left_open(scene: Scene, tolerance: float | None) -> Decision | None:
+    """The decision on a scene without the method that it asks for, if it may be so."""
+    try:
+        free = changed(scene, {"method.kind": default_of("method.kind")})
+        return decide(free, tolerance)
+    except InputError:
+        return None
 
 
 def on_fidelity(

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from orchestrator.digits import enumerated
 from orchestrator.fidelity import measured
 from orchestrator.fidelity.classes import (
     BY_DEM,
@@ -305,7 +306,20 @@ def _quantities() -> tuple[MeasuredQuantity, ...]:
         taken.update(one.fields)
     own = [each for each in FIELDS if each.name not in taken]
     fields = [MeasuredQuantity(each.name, (each.name,), _own(each)) for each in own]
-    return (*fields, *SIMILAR)
+    return tuple(sorted((*fields, *SIMILAR), key=_place))
+
+
+def _place(quantity: MeasuredQuantity) -> int:
+    """The place of a quantity in a reason: what makes the bed what it is comes first.
+
+    Beds with obstacles were measured with few grains and laws. That the obstacle is
+    another one is then the reason against a bed beside one that has none.
+    """
+    beginnings = ("bed.obstacles", "bed.")
+    for place, beginning in enumerate(beginnings):
+        if quantity.name.startswith(beginning):
+            return place
+    return len(beginnings)
 
 
 QUANTITIES = _quantities()
@@ -394,7 +408,7 @@ def _outside(part: str, scene: Scene, _: Path) -> str:
     told = found[:MOST_NAMED]
     if len(found) > MOST_NAMED:
         told.append(f"{len(found) - MOST_NAMED} more")
-    return " and ".join(told)
+    return enumerated(told)
 
 
 def has_measured(scene: Scene, fraction: float) -> bool:

@@ -8,8 +8,8 @@ from functools import lru_cache
 import numpy as np
 import pandas as pd
 
+from orchestrator.digits import enumerated, percent
 from orchestrator.digits import number as number_of
-from orchestrator.digits import percent
 from orchestrator.fidelity import crest
 from orchestrator.grains.pile import Pile
 from orchestrator.physics.constants import GRAIN_COLUMNS
@@ -513,10 +513,7 @@ def _name_of(row: pd.Series, rows: pd.DataFrame, telling: Sequence[str]) -> str:
 
 def _axes(telling: Sequence[str]) -> str:
     """What several beds or grains differ in, in words."""
-    names = [labels.info_of(name).label for name in telling[:3]]
-    if len(names) == 1:
-        return names[0]
-    return f"{', '.join(names[:-1])} and {names[-1]}"
+    return enumerated([labels.info_of(name).label for name in telling[:3]])
 
 
 def _first_of_several(
@@ -856,7 +853,7 @@ def _of_hills(hills: Sequence[tuple[float, pd.DataFrame]]) -> Card:
     if not all(rows["measured_verified"].all() for _, rows in hills):
         source_ += " Not every number was read in its source."
     slopes = [f"{rows['alpha_deg'].iloc[0]:.0f}°" for _, rows in hills]
-    steepest = f"steepest slope{'s' if len(slopes) > 1 else ''} {_listed(slopes)}"
+    steepest = f"steepest slope{'s' if len(slopes) > 1 else ''} {enumerated(slopes)}"
     return Card(
         "Does the model reproduce the separation bubble behind a hill?",
         f"{number_of(len(hills), 'hill')} of the wind-tunnel experiment RUSHIL, "
@@ -867,13 +864,6 @@ def _of_hills(hills: Sequence[tuple[float, pd.DataFrame]]) -> Card:
         Worth("care", "usable, for flows", _like_the_tunnel(hills)),
         ("What was measured", "Can it be used?"),
     )
-
-
-def _listed(words: Sequence[str]) -> str:
-    """Words in a list, with "and" before the last."""
-    if len(words) < 2:
-        return "".join(words)
-    return f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def _like_the_tunnel(hills: Sequence[tuple[float, pd.DataFrame]]) -> str:
@@ -893,10 +883,10 @@ def _like_the_tunnel(hills: Sequence[tuple[float, pd.DataFrame]]) -> str:
     said = []
     if like:
         verb = "separates" if len(like) == 1 else "separate"
-        said.append(f"{_listed(like)} {verb} behind the same hills as the tunnel")
+        said.append(f"{enumerated(like)} {verb} behind the same hills as the tunnel")
     if unlike:
         verb = "does" if len(unlike) == 1 else "do"
-        said.append(f"{_listed(unlike)} {verb} not")
+        said.append(f"{enumerated(unlike)} {verb} not")
     return f"{'; '.join(said)}. Compare flows; no threshold is meant."
 
 
@@ -916,7 +906,7 @@ def _behind(aspect: float, rows: pd.DataFrame) -> Number:
     if not own > 0:
         note = f"the same by all {len(rows)} models" if len(rows) > 1 else ""
         if others:
-            note = f"by {_listed(others)} reattachment at {ends.min():.1f}"
+            note = f"by {enumerated(others)} reattachment at {ends.min():.1f}"
             note += f" … {ends.max():.1f} h" if len(ends) > 1 else " h"
         return Number(
             math.nan,

@@ -283,7 +283,8 @@ def _usable(table: pd.DataFrame, reasons: pd.DataFrame) -> Iterator[Remark]:
     of_table = reasons[reasons["scene_id"].isin(table["scene_id"])]
     code = of_table["reason"].value_counts().idxmax()
     most = of_table[of_table["reason"] == code].iloc[0]
-    said = f"The most frequent reason against the others: {most['why_not']}."
+    others = "the others" if usable else "them"
+    said = f"The most frequent reason against {others}: {most['why_not']}."
     if pd.notna(most["remedy"]):
         said += f" What helps: {most['remedy']}."
     yield Remark(f"Usable: {usable} of {count} thresholds.", said)

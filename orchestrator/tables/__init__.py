@@ -21,6 +21,7 @@ import pandas as pd
 
 from orchestrator import digits
 from orchestrator.errors import OrchestratorError
+from orchestrator.fidelity.decision import of_unknown_error
 from orchestrator.grains.pile import Pile
 from orchestrator.physics import beside, verdict
 from orchestrator.physics.reported import OF_CHANNELS, REPORTED
@@ -30,10 +31,10 @@ from orchestrator.runs.files import Folder, digest_text
 from orchestrator.study import fields
 from orchestrator.study.study import Study
 from orchestrator.tables import check, paired, quoted, rows, usable
-from orchestrator.tables.check import contradictions, with_agreement
+from orchestrator.tables.check import KEYS, contradictions, with_agreement
 from orchestrator.tables.columns import Listed, several
 from orchestrator.tables.quoted import of_classes
-from orchestrator.tables.usable import with_scatter, with_usable
+from orchestrator.tables.usable import Remedies, with_scatter, with_usable
 from orchestrator.types import Row
 
 Tables = Mapping[str, pd.DataFrame]
@@ -181,7 +182,13 @@ def make_tables(study: Study, plan: Plan, cases: Path, done: Container[str]) -> 
     checks = with_agreement(
         pd.DataFrame(rows.check_rows(plan, cases, done)), thresholds
     )
-    beds = with_usable(thresholds, asked, study.tolerance, contradictions(checks))
+    beds = with_usable(
+        thresholds,
+        asked,
+        study.tolerance,
+        contradictions(checks),
+        _remedies(plan, thresholds, study.tolerance),
+    )
     lone = with_usable(grains, asked, study.tolerance)
     curves = _stacked(each.curve for each in told)
     classes = _listed(each.classes for each in told)
@@ -204,6 +211,20 @@ def make_tables(study: Study, plan: Plan, cases: Path, done: Container[str]) -> 
         "check": checks,
     }
     return {name: table for name, table in made.items() if not table.empty}
+
+
+def _remedies(
+    plan: Plan, thresholds: pd.DataFrame, tolerance: float | None
+) -> Remedies:
+    """What helps where the numerical error of a threshold is not known."""
+    found = {}
+    if not thresholds.empty:
+        unknown = thresholds[thresholds["numerical_error"].isna()]
+        for scene, fraction in unknown[KEYS].itertuples(index=False):
+            decision = plan.decisions[scene]
+            remedy = of_unknown_error(decision, fraction, tolerance)
+            found[str(scene), float(fraction)] = remedy
+    return found
 
 
 def _answer(

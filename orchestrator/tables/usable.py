@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.digits import percent
+from orchestrator.fidelity.decision import NOT_MEASURED
 from orchestrator.flow.run import SPEED_HEIGHT
 from orchestrator.grains.threshold import within
 from orchestrator.physics import verdict
@@ -41,6 +42,10 @@ SIMILAR = ["layout", "lifted", "alpha_deg", "force_law", "fraction"]
 collide or do not."""
 ABOVE_TOLERANCE = "tolerance"
 """The reason against a threshold whose numerical error is above the tolerance."""
+NOT_KNOWN = "error not known"
+"""The reason against a threshold whose numerical error was not measured."""
+Remedies = Mapping[tuple[str, float], str]
+"""What helps against `NOT_KNOWN`, by the scene and the fraction."""
 LAYOUTS = {"aligned": "rows along the bed", "disordered": "rows along the bed"}
 """Packings whose grains lie alike: a lattice scatters as one with small random gaps."""
 POURED = ["width", "sizes", "poured_depth"]
@@ -142,6 +147,7 @@ def with_usable(
     scenes: pd.DataFrame,
     tolerance: float | None,
     contradicted: Contradictions | None = None,
+    remedies: Remedies | None = None,
 ) -> Judged:
     """Add to thresholds of piles or of single grains whether they are usable.
 
@@ -155,6 +161,8 @@ def with_usable(
         The relative error that is allowed, if one was asked for.
     contradicted
         What DEM says against the thresholds.
+    remedies
+        What helps where the numerical error of a threshold is not known.
 
     Returns
     -------
@@ -188,7 +196,7 @@ def with_usable(
         key = (row["scene_id"], row.get("fraction", np.nan))
         if contradicted and key in contradicted:
             against.append(Reason("contradicted", contradicted[key]))
-        reasons.append(against)
+        reasons.append([_with_remedy(each, key, remedies) for each in against])
     of_verdict = verdict.columns(records, reasons)
     if not is_pile:
         units = with_laws(rows, units, np.array(of_verdict["usable"], bool))
@@ -196,6 +204,15 @@ def with_usable(
     made = {**of_verdict, **measured, **units}
     judged = pd.concat([table, pd.DataFrame(made, index=table.index)], axis=1)
     return Judged(judged, pd.DataFrame(_listed(records, reasons)))
+
+
+def _with_remedy(
+    reason: Reason, key: tuple[str, float], remedies: Remedies | None
+) -> Reason:
+    """A reason with what helps against it, where that depends on the scene."""
+    if reason.code != NOT_KNOWN or not remedies:
+        return reason
+    return reason._replace(remedy=remedies.get(key, ""))
 
 
 def _with(rows: pd.DataFrame, columns: Mapping[str, Any]) -> pd.DataFrame:
@@ -301,9 +318,7 @@ def _reasons_of_pile(
     yield from _reasons_of_bed(row)
     error = row["numerical_error"]
     if pd.isna(error):
-        what = "its numerical error on such a bed was not measured"
-        remedy = "run `orchestrator convergence` on the study file, which estimates it"
-        yield Reason("error not known", what, remedy)
+        yield Reason(NOT_KNOWN, NOT_MEASURED)
     elif tolerance and error > tolerance * (1 + 1e-9):
         what = f"numerical error {percent(error, 1)} is above the tolerance of "
         what += f"{100 * tolerance:.3g} %"

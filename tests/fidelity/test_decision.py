@@ -146,8 +146,35 @@ def test_what_was_not_measured_is_told_once_with_all_that_is_outside(
     fields = {"method.kind": kind, "grain.friction_angle_deg": 30.0}
     why = decide(pile(fields, entrainment_angle_deg=50.0), tolerance).why
     assert why.count("no error is known for") == 1
-    assert "grain.friction_angle_deg other than 35" in why
-    assert " and bed.entrainment_angle_deg other than 60" in why
+    # what makes the bed what it is comes first
+    beyond = "bed.entrainment_angle_deg other than 60 and grain.friction_angle_deg"
+    assert f"{beyond} other than 35" in why
+
+
+def test_an_obstacle_is_the_first_reason_against_a_bed_with_one() -> None:
+    """Beds beside one were measured with one law and one density, too."""
+    fenced = study.load("fence", None).scenes[-1]
+    assert fenced.obstacles
+    why = decide(fenced, None).why
+    first = why.partition("no error is known for ")[2]
+    assert first.startswith("bed.obstacles: ")
+    assert "grain.density" in first or " more" in first
+
+
+def test_what_helps_against_an_unknown_error_is_what_has_a_known_one(
+    pile: MakePile,
+) -> None:
+    """DEM's own error was measured on beds of fewer diameters than that of peeling."""
+    asked = decide(pile({"method.kind": "dem"}, height=0.05), None)
+    assert asked.error_at(0.3) is None
+    said = decision.of_unknown_error(asked, 0.3, None)
+    free = decide(changed(asked.asked, {"method.kind": "auto"}), None)
+    assert free.error_at(0.3) is not None
+    assert said.startswith("leave method.kind out")
+    assert free.scene.method.kind in said
+    assert decision.of_unknown_error(asked, 0.99, None) == decision.ESTIMATE
+    open_bed = decide(pile({"grain.friction_angle_deg": 20.0}), None)
+    assert decision.of_unknown_error(open_bed, 0.3, None) == decision.ESTIMATE
 
 
 def test_over_a_level_bed_the_flow_is_exact_and_the_grains_are_chosen(
