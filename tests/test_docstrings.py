@@ -21,9 +21,11 @@ import orchestrator
 PHYSICS = (
     "orchestrator.physics.fluids",
     "orchestrator.physics.gusts",
+    "orchestrator.physics.cessation",
     "orchestrator.physics.curves",
     "orchestrator.physics.laws",
     "orchestrator.physics.measured",
+    "orchestrator.physics.rebound",
     "orchestrator.physics.rolling",
     "orchestrator.physics.saltation",
     "orchestrator.physics.threshold",

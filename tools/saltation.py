@@ -1,4 +1,4 @@
-"""The tables of thresholds of grains that hop, at the nodes of `orchestrator.physics.saltation`.
+"""The tables of thresholds of grains that hop, at the nodes of `orchestrator.physics.cessation`.
 
 python tools/saltation.py > orchestrator/physics/saltation.csv
 python tools/saltation.py roughness > orchestrator/physics/saltation_roughness.csv
@@ -11,17 +11,16 @@ import sys
 
 import numpy as np
 
-from orchestrator.physics.grain import Grain
-from orchestrator.physics.saltation import (
+from orchestrator.physics.cessation import (
     DENSITY_NODES,
     GALILEO_NODES,
     OTHER_DENSITY_NODES,
     OTHER_GALILEO_NODES,
     RATIO_NODES,
     SLOPE_NODES_DEG,
-    cessation_thresholds,
-    thresholds,
 )
+from orchestrator.physics.grain import Grain
+from orchestrator.physics.saltation import cessation_thresholds, thresholds
 
 
 def of_roughness() -> None:

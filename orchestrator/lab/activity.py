@@ -12,8 +12,8 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from scipy.special import erfi, ndtr
 
-from orchestrator.physics import saltation
 from orchestrator.physics.beside import SUSTAINED
+from orchestrator.physics.cessation import cessation
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.measured import MEASURED_BEDS
 from orchestrator.physics.onset import of_grains
@@ -101,7 +101,7 @@ def compare_activity() -> pd.DataFrame:
     of_site = _measured_thresholds().loc[rows["site"]]
     # in gusts that are followed one by one, a threshold is that of a steady stress
     by_model = {
-        "stops": saltation.cessation(grains),
+        "stops": cessation(grains),
         "starts": of_grains(grains, LAW, SUSTAINED, gust=1.0).shields,
     }
     stress = rows["rho_f_kg_m3"] * rows["ustar_m_s"] ** 2

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orchestrator.physics import rolling, saltation
+from orchestrator.physics import rolling
 from orchestrator.physics.beside import ENTRAINED, SUSTAINED
+from orchestrator.physics.cessation import cessation
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.gusts import PEAK
 from orchestrator.physics.laws import LAWS
@@ -80,7 +81,7 @@ class Criteria:
         A grain that hops in the wind keeps the speed that it has won, and goes on below
         the stress that sets it in motion.
         """
-        return np.fmin(saltation.cessation(self.spheres), self.sustained)
+        return np.fmin(cessation(self.spheres), self.sustained)
 
     def columns(self) -> dict[str, Any]:
         """Make the columns of both criteria.

@@ -18,9 +18,7 @@ with the Shields number theta, the viscosity ``sqrt(s)/Ga``. All grains are of s
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, lru_cache
-from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,10 +27,8 @@ from orchestrator.physics import velocity
 from orchestrator.physics.constants import SAND_GRAIN
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import CLIFT_GAUVIN
+from orchestrator.physics.rebound import BEADS, Rebound
 from orchestrator.types import BoolArray, FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from scipy.interpolate import RegularGridInterpolator
 
 ADDED_MASS = 0.5
 """Added mass of a sphere, in masses of the fluid that it displaces."""
@@ -65,141 +61,6 @@ A grain with so many goes on.
 """
 SETTLED = 1e-4
 """Relative difference up to which two hops are as strong as each other."""
-
-
-@dataclass(frozen=True)
-class Rebound:
-    """What happens in the mean where a grain meets a bed of equal grains.
-
-    At an impact of speed v and angle a with the bed the grain leaves with the speed
-    ``(whole[0] - whole[1] sin a) v``, of which ``(normal[0] - normal[1] sin a) v`` is
-    normal to the bed.
-
-    Attributes
-    ----------
-    whole, normal
-        Coefficients of the speed, and of its part normal to the bed, over the speed of
-        impact.
-    trapped
-        Energy below which a grain on its like stays where it is, in weights times
-        diameters.
-    level
-        Height of its centre above the zero level of the flow, d.
-
-    Examples
-    --------
-    >>> speed, normal = BEADS.after(np.array([1.0, 1.0]), np.array([0.0, 0.5]))
-    >>> print(speed, normal)
-    [0.87 0.51] [0.3   0.225]
-    """
-
-    whole: tuple[float, float]
-    normal: tuple[float, float]
-    trapped: float
-    level: float
-
-    def after(
-        self,
-        speed: FloatArray,
-        sine: FloatArray,
-    ) -> tuple[FloatArray, FloatArray]:
-        """Compute the speed after a rebound, and its part normal to the bed.
-
-        Parameters
-        ----------
-        speed
-            Speed of the impact.
-        sine
-            Sine of the angle of the impact with the bed.
-
-        Returns
-        -------
-        whole, normal
-            Speeds of the broadcast shape; neither is negative, and the part is not
-            larger than the whole.
-        """
-        whole = np.maximum(self.whole[0] - self.whole[1] * sine, 0) * speed
-        normal = np.maximum(self.normal[0] - self.normal[1] * sine, 0) * speed
-        return whole, np.minimum(normal, whole)
-
-    def on(self, relative_size: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Compute what traps grains on a bed of others, and how high they lie on it.
-
-        Both change as `on_layer` says from those of a grain on its like. The rebound
-        itself is taken to be alike: no measurement of unlike grains is known.
-
-        Parameters
-        ----------
-        relative_size
-            Diameter of each grain over that of the grains of its bed.
-
-        Returns
-        -------
-        trapped, level
-            Energy below which each stays, in its weights times diameters, and height of
-            its centre above the zero level, in its diameters; of the same shape.
-
-        Examples
-        --------
-        >>> trapped, level = BEADS.on(np.array([0.5, 1.0, 2.0]))
-        >>> print(trapped.round(3), level.round(3))
-        [0.362 0.12  0.037] [0.724 0.7   0.634]
-        """
-        rest, barrier = on_layer(relative_size)
-        of_like, barrier_of_like = on_layer(np.array(1.0))
-        trapped = self.trapped * (barrier / barrier_of_like)
-        level = (self.level + (rest - of_like)) / relative_size
-        return trapped, np.maximum(level, 0.0)
-
-
-def on_layer(relative_size: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Compute where grains lie on a close-packed layer of others, and what holds them.
-
-    A sphere of D on three of K lies ``sqrt((D + K)^2/4 - K^2/3)`` above their centres.
-    On its way out it rises to between the saddle of two, ``sqrt((D + K)^2/4 - K^2/4)``,
-    and the top of one, ``(D + K)/2``; the mean of both is taken.
-
-    Parameters
-    ----------
-    relative_size
-        Diameter of each grain over that of the layer's, D/K.
-
-    Returns
-    -------
-    rest, barrier
-        Height of its centre at rest above those of the layer, in K, and how much higher
-        it must rise, in D; of the same shape.
-
-    Examples
-    --------
-    >>> rest, barrier = on_layer(np.array(1.0))
-    >>> print(rest.round(4), barrier.round(4))
-    0.8165 0.1165
-    """
-    reach = (relative_size + 1) / 2
-    rest = np.sqrt(np.maximum(reach**2 - 1 / 3, 0.0))
-    saddle = np.sqrt(np.maximum(reach**2 - 1 / 4, 0.0))
-    return np.asarray(rest), np.asarray(((saddle + reach) / 2 - rest) / relative_size)
-
-
-BEADS = Rebound(whole=(0.87, 0.72), normal=(0.30, 0.15), trapped=0.12, level=0.7)
-"""Beads of plastic shot at a bed of the same beads.
-
-M. Beladjine, M. Ammi, L. Oger and A. Valance, Phys. Rev. E 75, 2007. Two public codes
-quote its table of angles and speeds, which the law meets within 0.04.
-"""
-
-SIMULATED = {
-    0.9: Rebound(whole=(0.717, 0.484), normal=(0.293, 0.187), trapped=0.12, level=0.7),
-    0.55: Rebound(whole=(0.692, 0.506), normal=(0.252, 0.187), trapped=0.12, level=0.7),
-    0.25: Rebound(whole=(0.682, 0.527), normal=(0.225, 0.178), trapped=0.12, level=0.7),
-}
-"""Spheres thrown at poured beds of the same spheres by LIGGGHTS, by restitution.
-
-The friction coefficient is 0.5. The shots are in ``docs/measured/rebounds.csv``, made
-by ``tools/rebound.py``. Nothing takes these laws by default: they say how much hangs on
-the rebound.
-"""
 
 
 class Gust(NamedTuple):
@@ -603,6 +464,44 @@ def thresholds(
     return HoppingThresholds(least(grains, from_pocket), ceasing)
 
 
+def cessation_thresholds(
+    grains: Grain, *, rebound: Rebound = BEADS, steps: int = STEPS
+) -> FloatArray:
+    """Find the thresholds at which grains in motion stop, without those of starting.
+
+    Parameters
+    ----------
+    grains
+        The grains.
+    rebound
+        What happens where a grain meets the bed.
+    steps
+        Time steps of a hop.
+
+    Returns
+    -------
+    FloatArray
+        Shields numbers, shape (n,), as in `HoppingThresholds`.
+
+    Examples
+    --------
+    >>> print(cessation_thresholds(Grain.of_numbers(127.0, 2.65)).round(4))
+    [0.0327]
+    """
+
+    def from_motion(part: Grain, shields: FloatArray) -> IntArray:
+        return fate(
+            part,
+            shields,
+            speed=_fast(part, shields),
+            angle_deg=GRAZING_DEG,
+            rebound=rebound,
+            steps=steps,
+        )
+
+    return least(grains, from_motion)
+
+
 def under_gust(
     grains: Grain,
     peak: float,
@@ -690,256 +589,3 @@ def least(
     shields[~is_ended] = np.nan
     shields[at_ends[0] == GOES_ON] = 0.0
     return shields
-
-
-TABLE = Path(__file__).with_name("saltation.csv")
-"""Thresholds on beds with z0 = d/30 at nodes, made by ``tools/saltation.py``."""
-GALILEO_NODES = np.geomspace(0.3, 1e5, 51)
-DENSITY_NODES = np.geomspace(1.1, 1e5, 27)
-SLOPE_NODES_DEG = np.linspace(-30.0, 30.0, 13)
-"""Nodes of the table."""
-
-
-ROUGHNESS_TABLE = Path(__file__).with_name("saltation_roughness.csv")
-"""Thresholds of cessation on level beds of other roughness, by the same tool."""
-OTHER_GALILEO_NODES = np.geomspace(0.3, 1e5, 26)
-OTHER_DENSITY_NODES = np.array(
-    [1.1, 1.3, 1.6, 2.0, 2.65, 4, 8, 20, 60, 200, 700, 2200, 7000, 2.5e4, 1e5]
-)
-RATIO_NODES = np.concatenate(
-    [np.geomspace(1e-3, 0.01, 5), np.geomspace(0.01, 0.1, 10)[1:]]
-)
-"""Nodes of that table; the last are of z0/d."""
-
-
-def cessation_thresholds(
-    grains: Grain, *, rebound: Rebound = BEADS, steps: int = STEPS
-) -> FloatArray:
-    """Find the thresholds at which grains in motion stop, without those of starting.
-
-    Parameters
-    ----------
-    grains
-        The grains.
-    rebound
-        What happens where a grain meets the bed.
-    steps
-        Time steps of a hop.
-
-    Returns
-    -------
-    FloatArray
-        Shields numbers, shape (n,), as in `HoppingThresholds`.
-
-    Examples
-    --------
-    >>> print(cessation_thresholds(Grain.of_numbers(127.0, 2.65)).round(4))
-    [0.0327]
-    """
-
-    def from_motion(part: Grain, shields: FloatArray) -> IntArray:
-        return fate(
-            part,
-            shields,
-            speed=_fast(part, shields),
-            angle_deg=GRAZING_DEG,
-            rebound=rebound,
-            steps=steps,
-        )
-
-    return least(grains, from_motion)
-
-
-def cessation(grains: Grain) -> FloatArray:
-    """Find the thresholds of cessation, also on beds of another roughness, at once.
-
-    That of z0 = d/30 is the table's. On others it has the factor of a level bed of that
-    roughness, which is interpolated in logarithms of Galileo number, density ratio and
-    z0/d. Of 230 grains at random on level beds this differs from `thresholds` by 0.1 %
-    in the median, by 1.2 % or less for 95 % and by 7.5 % at most; of 85 on slopes by 4
-    % or less for 95 %, and by 11 % at most. Beyond the tables trajectories are
-    followed.
-
-    Parameters
-    ----------
-    grains
-        The grains.
-
-    Returns
-    -------
-    FloatArray
-        Shields numbers, shape (n,), as in `HoppingThresholds`.
-
-    Examples
-    --------
-    >>> sand = Grain.of_numbers(127.0, 2.65, ratio=[1 / 30, 1 / 10])
-    >>> print(cessation(sand).round(3))
-    [0.033 0.08 ]
-    """
-    usual = grains.changed(roughness=grains.diameter / SAND_GRAIN)
-    points = np.log([grains.galileo, grains.density_ratio, grains.ratio])
-    ends = np.array([[axis[0], axis[-1]] for axis in _OTHER_AXES])
-    is_inside = is_tabulated(usual)
-    is_inside &= ((points >= ends[:, :1]) & (points <= ends[:, 1:])).all(axis=0)
-    found = np.full(len(grains), np.nan)
-    inside = np.flatnonzero(is_inside)
-    if len(inside):
-        of_table = _other_table()
-        here = points[:, inside].T
-        on_usual = here.copy()
-        on_usual[:, 2] = -np.log(SAND_GRAIN)
-        factor = np.exp(of_table(here) - of_table(on_usual))
-        found[inside] = tabulated(usual.at(inside)).cessation * factor
-    outside = np.flatnonzero(~is_inside)
-    if len(outside):
-        found[outside] = tabulated(grains.at(outside)).cessation
-    return found
-
-
-_OTHER_AXES = (
-    np.log(OTHER_GALILEO_NODES),
-    np.log(OTHER_DENSITY_NODES),
-    np.log(RATIO_NODES),
-)
-
-
-@cache
-def _other_table() -> "RegularGridInterpolator":
-    """Logarithms of the thresholds of cessation on level beds of other roughness."""
-    from scipy.interpolate import RegularGridInterpolator  # slow to import
-
-    numbers = np.loadtxt(ROUGHNESS_TABLE, skiprows=1)
-    shape = [len(axis) for axis in _OTHER_AXES]
-    return RegularGridInterpolator(_OTHER_AXES, np.log(numbers).reshape(shape))
-
-
-def tabulated(grains: Grain) -> HoppingThresholds:
-    """Find the thresholds of grains from the table, or by `thresholds` where it ends.
-
-    The thresholds are interpolated linearly: their logarithms over the logarithms of
-    Galileo number and density ratio, themselves over the slope.
-
-    Parameters
-    ----------
-    grains
-        The grains, which rebound as `BEADS`.
-
-    Returns
-    -------
-    HoppingThresholds
-        The thresholds, arrays of shape (n,).
-
-    Examples
-    --------
-    1 mm in water, and 0.25 mm in air:
-
-    >>> sand = Grain.of_numbers([127.0, 38.8], [2.65, 2208.0])
-    >>> print(tabulated(sand).steady.round(3))
-    [0.033 0.028]
-    """
-    is_inside = is_tabulated(grains)
-    found = np.full((2, len(grains)), np.nan)
-    found[:, is_inside] = _interpolated(grains.at(is_inside))
-    outside = np.flatnonzero(~is_inside)
-    if len(outside):
-        beyond = _beyond_table(grains.at(outside))
-        found[0, outside] = beyond.steady
-        found[1, outside] = beyond.cessation
-    return HoppingThresholds(steady=found[0], cessation=found[1])
-
-
-_AXES = (np.log(GALILEO_NODES), np.log(DENSITY_NODES), SLOPE_NODES_DEG)
-"""Axes of the table, in which it is linear."""
-
-
-def _points(grains: Grain) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The places of grains on the axes of the table; NaN where there is none."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        galileo = np.log(grains.galileo)
-        density = np.log(grains.density_ratio)
-    return galileo, density, grains.slope_deg
-
-
-def is_tabulated(grains: Grain) -> BoolArray:
-    """Tell whether the table holds each grain: its bed, its flow and its place.
-
-    Parameters
-    ----------
-    grains
-        The grains.
-
-    Returns
-    -------
-    ndarray
-        Truth values, shape (n,); others take a second for each few grains.
-
-    Examples
-    --------
-    >>> print(is_tabulated(Grain.of_numbers(38.8, 2208.0, ratio=[1 / 30, 0.1])))
-    [ True False]
-    """
-    is_inside = np.isclose(grains.ratio * SAND_GRAIN, 1, rtol=1e-6, atol=0)
-    is_inside &= (grains.fall <= 0) & (grains.relative_size == 1)
-    for nodes, point in zip(_AXES, _points(grains), strict=True):
-        is_inside &= (point >= nodes[0]) & (point <= nodes[-1])
-    return is_inside
-
-
-def _interpolated(grains: Grain) -> FloatArray:
-    """Thresholds of grains that the table holds, of shape (2, n)."""
-    galileo, density, slope = _points(grains)
-    below = np.searchsorted(SLOPE_NODES_DEG, slope, side="right") - 1
-    below = np.minimum(below, len(SLOPE_NODES_DEG) - 2)
-    ends = SLOPE_NODES_DEG[below], SLOPE_NODES_DEG[below + 1]
-    table = _table()
-    gentle, steep = (np.exp(table((galileo, density, end))).T for end in ends)
-    part = (slope - ends[0]) / (ends[1] - ends[0])
-    return np.asarray(gentle + part * (steep - gentle))
-
-
-def _beyond_table(grains: Grain) -> HoppingThresholds:
-    """The thresholds of grains that the table does not hold, of alike ones once."""
-    numbers = (
-        grains.galileo,
-        grains.density_ratio,
-        grains.slope_deg,
-        grains.ratio,
-        grains.fall,
-        grains.relative_size,
-    )
-    rows = [*zip(*(values.tolist() for values in numbers), strict=True)]
-    unlike: dict[tuple[float, ...], int] = {}
-    places = [unlike.setdefault(row, len(unlike)) for row in rows]
-    found = _of_unlike(tuple(unlike))
-    return HoppingThresholds(found.steady[places], found.cessation[places])
-
-
-@lru_cache(maxsize=64)  # tables, cards and pictures ask for the same grains
-def _of_unlike(rows: tuple[tuple[float, ...], ...]) -> HoppingThresholds:
-    """The same of grains by the numbers of each."""
-    galileo, density_ratio, slope_deg, ratio, fall, relative_size = np.array(rows).T
-    grains = Grain.of_numbers(
-        galileo,
-        density_ratio,
-        slope_deg=slope_deg,
-        ratio=ratio,
-        fall=fall,
-        relative_size=relative_size,
-    )
-    return thresholds(grains)
-
-
-LOG_OF_NOTHING = -1e300
-"""Logarithm of a threshold of 0, which any part of makes one of 0."""
-
-
-@cache
-def _table() -> "RegularGridInterpolator":
-    """Logarithms of the thresholds, steady and of cessation, on the table's axes."""
-    from scipy.interpolate import RegularGridInterpolator  # slow to import
-
-    both = np.loadtxt(TABLE, delimiter=",", skiprows=1)
-    with np.errstate(divide="ignore"):  # of 0, below `LEAST`
-        logarithms = np.maximum(np.log(both), LOG_OF_NOTHING)
-    shape = [len(nodes) for nodes in _AXES]
-    return RegularGridInterpolator(_AXES, logarithms.reshape(*shape, 2))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator.calculator.table import Table, thresholds
-from orchestrator.physics import saltation
+from orchestrator.physics import cessation
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.reported import WIDTH
 
@@ -45,7 +45,7 @@ def grains_at_random() -> dict[str, Any]:
         "entrainment_angle_deg": chance.choice([60.0, 60.0, 50.0, 45.0], COUNT),
     }
     of_grain = {name: made[name] for name in made if name != "cohesion"}
-    held = saltation.is_tabulated(Grain(**of_grain))
+    held = cessation.is_tabulated(Grain(**of_grain))
     return {name: column[held] for name, column in made.items()}
 
 

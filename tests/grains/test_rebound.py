@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.physics.saltation import BEADS, SIMULATED
+from orchestrator.physics.rebound import BEADS, SIMULATED
 from orchestrator.runs.case import templates
 from tests.waiting import HANGS_S
 

@@ -8,21 +8,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from orchestrator.physics import saltation
+from orchestrator.physics import cessation, saltation
+from orchestrator.physics.cessation import tabulated
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.laws import CLIFT_GAUVIN
+from orchestrator.physics.rebound import BEADS, Rebound, on_layer
 from orchestrator.physics.saltation import (
-    BEADS,
     ENDLESS,
     GOES_ON,
     STOPS,
     Gust,
-    Rebound,
     fate,
     least,
-    on_layer,
     submerged,
-    tabulated,
     thresholds,
     under_gust,
 )
@@ -333,9 +331,9 @@ def test_the_table_interpolates_within_two_percent() -> None:
 
 def test_the_table_has_the_nodes_that_are_computed() -> None:
     nodes = (
-        saltation.GALILEO_NODES,
-        saltation.DENSITY_NODES,
-        saltation.SLOPE_NODES_DEG,
+        cessation.GALILEO_NODES,
+        cessation.DENSITY_NODES,
+        cessation.SLOPE_NODES_DEG,
     )
     galileo, ratio, slope = (axis[[2, 6, -1, 11]] for axis in nodes)
     grains = Grain.of_numbers(galileo, ratio, slope_deg=slope)
@@ -402,14 +400,14 @@ def test_alike_grains_beyond_the_table_are_followed_once(
         size = np.asarray(grains.galileo)
         return saltation.HoppingThresholds(size, 2 * size)
 
-    monkeypatch.setattr(saltation, "thresholds", followed)
+    monkeypatch.setattr(cessation, "thresholds", followed)
     rough = Grain.of_numbers([40.0, 50.0, 40.0, 40.0], 2208.0, ratio=0.0917)
     for _ in range(2):
-        found = saltation.tabulated(rough)
+        found = cessation.tabulated(rough)
         assert found.steady == pytest.approx([40.0, 50.0, 40.0, 40.0])
         assert found.cessation == pytest.approx([80.0, 100.0, 80.0, 80.0])
     assert counts == [2]
-    saltation._of_unlike.cache_clear()
+    cessation._of_unlike.cache_clear()
 
 
 def test_the_table_knows_zero_from_what_is_not_known() -> None:
@@ -430,16 +428,16 @@ def test_the_table_of_roughness_is_the_trajectories(
     galileo, density, ratio = np.array(
         [
             (
-                saltation.OTHER_GALILEO_NODES[one],
-                saltation.OTHER_DENSITY_NODES[two],
-                saltation.RATIO_NODES[three],
+                cessation.OTHER_GALILEO_NODES[one],
+                cessation.OTHER_DENSITY_NODES[two],
+                cessation.RATIO_NODES[three],
             )
             for one, two, three in places
         ]
     ).T
     nodes = Grain.of_numbers(galileo, density, ratio=ratio)
     written = np.exp(
-        saltation._other_table()(np.log(np.column_stack([galileo, density, ratio])))
+        cessation._other_table()(np.log(np.column_stack([galileo, density, ratio])))
     )
     followed = saltation.cessation_thresholds(nodes)
     np.testing.assert_allclose(written, followed, rtol=2e-3)
@@ -450,15 +448,15 @@ def test_the_table_of_roughness_is_the_trajectories(
     )
     followed = saltation.cessation_thresholds(between)
     monkeypatch.setattr(saltation, "fate", None)  # nothing is followed
-    np.testing.assert_allclose(saltation.cessation(between), followed, rtol=0.03)
+    np.testing.assert_allclose(cessation.cessation(between), followed, rtol=0.03)
 
 
 def test_cessation_is_the_table_of_the_usual_roughness_and_follows_beyond() -> None:
     usual = Grain.of_numbers([40.0, 127.0], [2208.0, 2.65], slope_deg=[0.0, 12.0])
     np.testing.assert_allclose(
-        saltation.cessation(usual), tabulated(usual).cessation, rtol=1e-12
+        cessation.cessation(usual), tabulated(usual).cessation, rtol=1e-12
     )
     rough = Grain.of_numbers(127.0, 2.65, ratio=0.2)
     np.testing.assert_array_equal(
-        saltation.cessation(rough), saltation.cessation_thresholds(rough)
+        cessation.cessation(rough), saltation.cessation_thresholds(rough)
     )
