@@ -7,7 +7,7 @@ a file mean is told by all of them: one cell that can only be the one decides.
 import csv
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from orchestrator.errors import InputError
@@ -281,6 +281,21 @@ class TextTable:
         for line, cells in self.rows:
             yield line, [cells[at] if at < len(cells) else "" for at in places]
 
+    def without_foot(self) -> "TextTable":
+        """Leave out the words behind its last number, such as an end of file.
+
+        Returns
+        -------
+        TextTable
+            The table to its last line that has a digit.
+        """
+        last = len(self.rows)
+        while last and not any(
+            re.search(r"\d", cell) for cell in self.rows[last - 1][1]
+        ):
+            last -= 1
+        return replace(self, rows=self.rows[:last])
+
 
 def read_cells(
     text: str, is_head: Callable[[Sequence[str]], bool], where: str, remedy: str
@@ -360,13 +375,8 @@ def _table(
         cells = split_cells(line, separator)
         if not any(cells):
             continue
-        if not rows and _is_of_units(cells):
-            names = [
-                f"{name} ({cells[at].strip('()[] ')})"
-                if at < len(cells) and cells[at]
-                else name
-                for at, name in enumerate(names)
-            ]
+        if not rows and is_of_units(cells):
+            names = with_units(names, cells)
             continue
         more = cells[len(names) :]
         if any(map(_may_be_number, more)):
@@ -379,10 +389,43 @@ def _table(
     )
 
 
-def _is_of_units(cells: Sequence[str]) -> bool:
-    """Whether a line below the names has units alone."""
+def is_of_units(cells: Sequence[str]) -> bool:
+    """Tell whether a line below the names of columns has units alone.
+
+    Parameters
+    ----------
+    cells
+        Its cells.
+
+    Returns
+    -------
+    bool
+        Whether each that is not empty is a unit.
+    """
     given = [cell for cell in cells if cell]
     return bool(given) and all(UNIT_CELL.fullmatch(cell.lower()) for cell in given)
+
+
+def with_units(names: Sequence[str], cells: Sequence[str]) -> list[str]:
+    """Write units that stand below names behind these.
+
+    Parameters
+    ----------
+    names
+        The names of columns.
+    cells
+        The units below them; some may be empty.
+
+    Returns
+    -------
+    list of str
+        The names with their units in brackets.
+    """
+    units = [*cells, *[""] * len(names)]
+    return [
+        f"{name} ({unit.strip('()[] ')})" if unit else name
+        for name, unit in zip(names, units, strict=False)
+    ]
 
 
 def _may_be_number(cell: str) -> bool:

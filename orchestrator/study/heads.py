@@ -4,6 +4,8 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from orchestrator.study.lengths import UNIT_NAMES
+
 EAST = (
     "x",
     "easting",
@@ -78,20 +80,6 @@ ALONG_LINE = (
 """Columns of the places along a line of levels."""
 ALONG = (*EAST, *NORTH[1:], *ALONG_LINE)
 """Columns of the places along a profile, which goes any way over the ground."""
-METRE = ("m", "metre", "metres", "meter", "meters")
-UNITS = {
-    **dict.fromkeys(METRE, 1.0),
-    **dict.fromkeys(("ft", "foot", "feet", "ift"), 0.3048),
-    **dict.fromkeys(("usft", "ftus", "us-ft", "us_ft", "sft"), 1200 / 3937),
-    **dict.fromkeys(
-        ("um", "µm", "μm", "micron", "microns", "micrometer", "micrometre"), 1e-6
-    ),
-    **dict.fromkeys(("mm", "millimeter", "millimetre", "millimetres"), 1e-3),
-    "cm": 1e-2,
-    "dm": 0.1,
-    "km": 1e3,
-}
-"""Units that a name may end with, m."""
 DATUMS = (
     "nap",
     "aod",
@@ -135,17 +123,19 @@ DATUMS = (
     "dhhn2016",
 )
 """Surfaces from which levels are counted, as they stand behind a unit."""
-_UNIT = "|".join(sorted(map(re.escape, UNITS), key=len, reverse=True))
 _DATUM = "|".join(sorted(map(re.escape, DATUMS), key=len, reverse=True))
-UNIT = re.compile(rf"[ _,/]*[(\[] *({_UNIT}) *[)\]]$|(?: in|[ _,/])[ _,/]*({_UNIT})$")
+UNIT = re.compile(
+    rf"[ _,/]*[(\[] *(?:in )?({UNIT_NAMES}) *[)\]]$|"
+    rf"(?: in|[ _,/])[ _,/]*({UNIT_NAMES})[)\]]?$"
+)
 WITH_DATUM = re.compile(
-    rf"(?:^|[ _,]*[(\[] *|[ _,]+)(?P<unit>{_UNIT})?(?(unit)[ +_,.]*|\+?)"
+    rf"(?:^|[ _,]*[(\[] *|[ _,]+)(?P<unit>{UNIT_NAMES})?(?(unit)[ +_,.]*|\+?)"
     rf"(?:ü\. ?|ue\. ?|über |above |a\. ?|to )?(?P<datum>{_DATUM}) *[)\]]?$"
 )
 """A unit and a datum at the end of a name, or as a whole name."""
 UNIT_CELL = re.compile(
-    rf"[(\[ ]*(?:{_UNIT}|%|mass ?%|wt ?%|g|kg|phi|φ|-|m/s|km/h|kn|kt|kts|knots|mph|"
-    rf"deg|degrees|°|h|hours|(?:{_UNIT})[ +]*(?:{_DATUM}))[)\] ]*"
+    rf"[(\[ ]*(?:{UNIT_NAMES}|%|mass ?%|wt ?%|g|kg|phi|φ|-|m/s|km/h|kn|kt|kts|knots|"
+    rf"mph|deg|degrees|°|h|hours|(?:{UNIT_NAMES})[ +]*(?:{_DATUM}))[)\] ]*"
 )
 """A cell of a line of units below the names."""
 
@@ -166,11 +156,6 @@ class Name(NamedTuple):
     plain: str
     unit: str
     datum: str = ""
-
-    @property
-    def is_in_metres(self) -> bool:
-        """Whether no other unit than the metre stands there."""
-        return not self.unit or self.unit in METRE
 
 
 def name_of(cell: str) -> Name:
@@ -196,13 +181,21 @@ def name_of(cell: str) -> Name:
     name = " ".join(cell.strip().lower().split())
     levelled = WITH_DATUM.search(name)
     if levelled and (levelled["unit"] or levelled.start()):
-        plain = _plain(name[: levelled.start()])
-        plain = "level" if plain in ("", "h") else plain
-        return Name(plain, levelled["unit"] or "", levelled["datum"].upper())
-    unit = UNIT.search(name)
-    if unit is None:
+        return _level(name, levelled, levelled["unit"] or "")
+    found = UNIT.search(name)
+    if found is None:
         return Name(_plain(name), "")
-    return Name(_plain(name[: unit.start()]), unit[1] or unit[2])
+    unit, rest = found[1] or found[2], name[: found.start()]
+    # the datum may stand before the unit: Elevation (NAVD88, ft)
+    levelled = WITH_DATUM.search(rest)
+    return _level(rest, levelled, unit) if levelled else Name(_plain(rest), unit)
+
+
+def _level(name: str, levelled: re.Match[str], unit: str) -> Name:
+    """The name of a column of levels above a datum."""
+    plain = _plain(name[: levelled.start()])
+    plain = "level" if plain in ("", "h") else plain
+    return Name(plain, unit, levelled["datum"].upper())
 
 
 def _plain(name: str) -> str:
@@ -225,26 +218,6 @@ def one_word(names: Sequence[str]) -> str:
         The names between commas.
     """
     return ", ".join(name for name in names if not re.search(r"[ .]", name))
-
-
-def in_metres(names: Sequence[str]) -> str:
-    """Say how columns in another unit are to be given.
-
-    Parameters
-    ----------
-    names
-        Cells of a head.
-
-    Returns
-    -------
-    str
-        The advice; empty where no column has another unit.
-    """
-    for cell in names:
-        unit = name_of(cell).unit
-        if unit and unit not in METRE:
-            return f"multiply {cell.strip()} by {UNITS[unit]:.7g}: lengths are in m"
-    return ""
 
 
 def more_cells(cells: int, of_head: int) -> str:

@@ -19,6 +19,7 @@ from orchestrator.digits import on_grid
 from orchestrator.errors import InputError
 from orchestrator.runs.files import digest_file, digest_text
 from orchestrator.study.cells import Marks, TextTable, marks_of, read_cells
+from orchestrator.study.empty import EMPTY_WORDS, LOWEST_GROUND, looks_empty
 from orchestrator.study.heads import (
     ALONG,
     DEGREES,
@@ -26,10 +27,10 @@ from orchestrator.study.heads import (
     EAST,
     HEIGHT,
     NORTH,
-    in_metres,
     name_of,
     one_word,
 )
+from orchestrator.study.lengths import Lengths, lengths_of
 from orchestrator.study.noise import needed_smoothing
 from orchestrator.study.shapes import SHAPES
 from orchestrator.study.sieve import SieveTable, read_sieve
@@ -473,7 +474,8 @@ def _points_of(text: str, where: str) -> _Points:
     """
     if not text.strip():
         raise InputError("it is empty", f"{where}: line 1", PROFILE_REMEDY)
-    table = read_cells(text, _names_both, where, _remedy_of(text))
+    whole = read_cells(text, _names_both, where, _remedy_of(text))
+    table = whole.without_foot()
     place = f"{where}: line {table.head}"
     try:
         columns = [_column(table, name) for name in COLUMNS]
@@ -481,30 +483,81 @@ def _points_of(text: str, where: str) -> _Points:
     except ValueError as error:
         raise InputError(str(error), place, PROFILE_REMEDY) from None
     names = [table.names[at] for at in columns]
-    remedy = in_metres(names)
-    if remedy:
-        what = f"the columns are {', '.join(table.names)}"
-        raise InputError(what, place, remedy)
+    named = [
+        (axis, name, name_of(name).unit)
+        for axis, name in zip(("x", "z"), names, strict=True)
+    ]
+    units = lengths_of(named, table.before, place)
+    marks, lines, given = _given(table, columns, where)
+    values = _in_metres(given, lines, names, units, where)
+    understood = _understood(names, units, marks, values)
+    foot = len(whole.rows) - len(table.rows)
+    if foot:
+        understood += f"; {counted(foot, 'line')} of words behind its points left out"
+    return _in_order(lines, values, understood)
+
+
+def _given(
+    table: TextTable, columns: Sequence[int], where: str
+) -> tuple[Marks, list[int], list[tuple[float, float]]]:
+    """How numbers are written, the line of each point, and its x and z of the file."""
     try:
         marks = marks_of(cell for at in columns for cell in table.column(at))
     except ValueError as error:
         raise InputError(str(error), where, PROFILE_REMEDY) from None
-    lines, values = [], []
+    names = [table.names[at] for at in columns]
+    lines, given = [], []
     for line, cells in table.cells(columns):
         try:
             x, z = (
-                _number(cell, name, marks, most)
-                for cell, name, most in zip(
-                    cells, names, (LARGEST_X, LARGEST_NUMBER), strict=True
-                )
+                _number(cell, name, marks)
+                for cell, name in zip(cells, names, strict=True)
             )
         except ValueError as error:
-            raise InputError(
-                str(error), f"{where}: line {line}", PROFILE_REMEDY
-            ) from None
+            remedy = _remedy_of_line(cells)
+            raise InputError(str(error), f"{where}: line {line}", remedy) from None
         lines.append(line)
-        values.append((x, z))
-    return _in_order(lines, values, _understood(names, marks, values))
+        given.append((x, z))
+    return marks, lines, given
+
+
+def _remedy_of_line(cells: Sequence[str]) -> str:
+    """What helps a line that is no point."""
+    if any(re.match(r"[+-]?[.,]?\d", cell) for cell in cells):
+        return PROFILE_REMEDY
+    return "remove the line, if it is no point; or write its numbers"
+
+
+def _in_metres(
+    given: Sequence[tuple[float, float]],
+    lines: Sequence[int],
+    names: Sequence[str],
+    units: Lengths,
+    where: str,
+) -> list[tuple[float, float]]:
+    """Points in m; an `InputError` for one that stands for none, or is beyond all."""
+    if not given:
+        return []
+    table = np.array(given)
+    of_x, of_z = units.factors
+    step = float(np.abs(np.diff(table[:, 0])).max(initial=0.0)) * of_x / of_z
+    # of a place along the line no slope says what is far off
+    for at, most, lowest in ((0, 0.0, -np.inf), (1, step, LOWEST_GROUND)):
+        value, count = looks_empty(table[:, at], most, STEEPEST_DEG, lowest)
+        if count:
+            line = lines[int((table[:, at] == value).argmax())]
+            points = counted(count, "point")
+            what = f"{names[at]}: {value:g} in {points} looks like an empty cell"
+            remedy = "remove such lines, or write the numbers"
+            raise InputError(what, f"{where}: line {line}", remedy)
+    table = table * units.factors
+    for at, most in ((0, LARGEST_X), (1, LARGEST_NUMBER)):
+        is_beyond = np.abs(table[:, at]) > most
+        if is_beyond.any():
+            point = int(is_beyond.argmax())
+            what = f"{names[at]}: {given[point][at]:g} is not a number up to {most:g} m"
+            raise InputError(what, f"{where}: line {lines[point]}", PROFILE_REMEDY)
+    return [(float(x), float(z)) for x, z in table]
 
 
 def _in_order(
@@ -519,12 +572,15 @@ def _in_order(
 
 
 def _understood(
-    names: Sequence[str], marks: Marks, values: Sequence[tuple[float, float]]
+    names: Sequence[str],
+    units: Lengths,
+    marks: Marks,
+    values: Sequence[tuple[float, float]],
 ) -> str:
     """What was understood of the points of a profile, in words."""
     along, up = names
     datum = name_of(up).datum
-    words = [f"x from {along!r}, z from {up!r}, in m"]
+    words = [f"x from {along!r}, z from {up!r}, {units.said}"]
     if datum:
         words.append(f"levels above {datum}")
     if marks.said:
@@ -587,29 +643,37 @@ def _check_line(table: TextTable, along: int) -> None:
             raise ValueError(f"{what}? Name that one x_m, or add one of the chainage")
 
 
-def _number(text: str, name: str, marks: Marks, largest: float) -> float:
-    """The number in a cell; a ValueError for any other text."""
-    if not text.strip():
+def _number(text: str, name: str, marks: Marks) -> float:
+    """The number in a cell, in the unit of its column; a ValueError for other texts."""
+    cell = text.strip()
+    if not cell:
         raise ValueError(f"the cell of {name} is empty")
-    station = STATION.fullmatch(text.strip())
+    if cell.lower() in EMPTY_WORDS:
+        raise ValueError(f"{name}: {cell} looks like an empty cell")
+    station = STATION.fullmatch(cell)
     if station:
         return _station(station, name)
     try:
         value = marks.number(text)
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
-    if not abs(value) <= largest:
-        raise ValueError(f"{name}: {text.strip()} is not a number up to {largest:g}")
+    if not np.isfinite(value):
+        raise ValueError(f"{name}: {cell} is not a number up to {LARGEST_X:g}")
     return value
 
 
 def _station(station: re.Match[str], name: str) -> float:
-    """The metres of a station of kilometres, 1+250.5; a ValueError for others."""
+    """The length of a station in the unit of its column.
+
+    1+250.5 is of kilometres. One of hundreds may be of feet: without a unit it is a
+    ValueError.
+    """
     whole, behind = station[1], station[2]
-    if len(behind.partition(".")[0]) != 3:
-        what = f"{name}: {station[0]} may count hundreds of feet or of metres"
-        raise ValueError(f"{what}: write metres")
-    return 1000.0 * int(whole) + float(behind)
+    digits = len(behind.partition(".")[0])
+    if digits == 3 or (digits == 2 and name_of(name).unit):
+        return 10.0**digits * int(whole) + float(behind)
+    what = f"{name}: {station[0]} may count hundreds of feet or of metres"
+    raise ValueError(f"{what}: write the unit behind its name, {name} (ft) or (m)")
 
 
 @dataclass(frozen=True)

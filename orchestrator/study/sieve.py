@@ -17,7 +17,8 @@ from orchestrator.digits import number as counted
 from orchestrator.digits import rounded
 from orchestrator.errors import InputError
 from orchestrator.study.cells import Marks, TextTable, marks_of, read_cells
-from orchestrator.study.heads import UNITS, name_of
+from orchestrator.study.heads import name_of
+from orchestrator.study.lengths import INCH, LENGTHS, UNIT_NAMES, shown_unit
 
 LARGEST_RATIO = 10.0
 """Largest ratio of a mixture's grains: the time of DEM rises with its square."""
@@ -130,13 +131,15 @@ INCHES: Mapping[str, float] = {
 }  # fmt: skip
 """Openings of sieves by inches in ASTM E11, mm."""
 OF_NUMBER = re.compile(r"(?:no\.?|nr\.?|#|mesh) *([\d.]+)|([\d.]+) *(?:mesh)")
+FRACTION = re.compile(r"(?:\d+[ -])?\d+/\d+")
+"""Inches, in which alone openings are written so."""
 OF_INCHES = re.compile(r"([\d ./]+?) *(?:in\.?|inch|inches|\"|″|”)")
 _LENGTH = r"([+-]?[\d.,]+(?:e[+-]?\d+)?)"
-_LONG = "|".join(sorted(map(re.escape, UNITS), key=len, reverse=True))
+_UNIT = rf"({UNIT_NAMES})?"
 RANGE = re.compile(
-    rf"{_LENGTH} *({_LONG})? *(?:-|–|—|to|bis|\.\.\.|…) *{_LENGTH} *({_LONG})?"
+    rf"{_LENGTH} *{_UNIT} *(?:-|–|—|to|bis|\.\.\.|…) *{_LENGTH} *{_UNIT}"
 )
-ONE = re.compile(rf"([<>≥≤]?) *=? *{_LENGTH} *({_LONG})?")
+ONE = re.compile(rf"([<>≥≤]?) *=? *{_LENGTH} *{_UNIT}")
 OPEN_TOP = 10.0
 """Most per cent of the mass on the largest sieve: these grains have no upper end."""
 OFF_TOTAL = 3.0
@@ -318,7 +321,7 @@ def _mm_unit(name: str) -> float | None:
     if is_phi:
         return 0.0
     unit = name_of(bare).unit
-    return rounded(UNITS[unit] / UNITS["mm"]) if unit else None
+    return rounded(LENGTHS[unit] / LENGTHS["mm"]) if unit else None
 
 
 def _value_columns(table: TextTable, size: int) -> dict[int, str]:
@@ -356,7 +359,7 @@ def _of_classes(table: TextTable, size: int, where: str) -> SieveTable:
         place = f"{where}: line {line}"
         one, fraction = _numbers(cells, [table.names[size], CLASSES[1]], marks, place)
         diameter = 1e-3 * (2.0**-one if unit == 0 else unit * one)
-        if unit == UNITS["m"] / UNITS["mm"]:
+        if unit == LENGTHS["m"] / LENGTHS["mm"]:
             diameter = one
         if not diameter > 0:
             what = f"{table.names[size]}: {one:g} is no size"
@@ -479,6 +482,11 @@ class _Sieving:
         in_inches = OF_INCHES.fullmatch(bare)
         if in_inches:
             return self._astm(INCHES, in_inches[1].strip(), cell, place)
+        is_inch = unit == INCH / LENGTHS["mm"]
+        if (unit is None or is_inch) and FRACTION.fullmatch(bare):
+            return self._astm(INCHES, bare.replace("-", " "), cell, place)
+        if is_inch and bare in INCHES:
+            return self._astm(INCHES, bare, cell, place)
         between = (
             RANGE.fullmatch(bare) if unit != 0 or not bare.startswith("-") else None
         )
@@ -519,7 +527,7 @@ class _Sieving:
         except ValueError as error:
             raise InputError(f"{name}: {error}", place, REMEDY) from None
         if unit:
-            return rounded(value * UNITS[unit] / UNITS["mm"])
+            return rounded(value * LENGTHS[unit] / LENGTHS["mm"])
         if of_column is None:
             what = f"{name}: {cell} of which unit"
             remedy = "write it into the first line: Sieve (mm), Sieve (um) or phi"
@@ -699,6 +707,12 @@ class _Sieving:
         )
         return _Class(top.low, high, top.amount), note
 
+    def _said_of_unit(self) -> str:
+        """What is said of the unit of the openings, if it is no usual one."""
+        unit = name_of(_without_phi(self.table.names[self.size])[0]).unit
+        is_usual = not unit or LENGTHS[unit] in (LENGTHS["mm"], LENGTHS["um"])
+        return "" if is_usual else f" in {shown_unit(unit, 'mm')}"
+
     def _said(
         self,
         rows: tuple[tuple[float, float], ...],
@@ -716,7 +730,8 @@ class _Sieving:
         }
         ends = f"{1e3 * rows[0][0]:.3g} to {1e3 * rows[-1][0]:.3g} mm"
         said = (
-            f"openings from {names[self.size]!r}, {kinds[self.values[column]]} from "
+            f"openings from {names[self.size]!r}{self._said_of_unit()}, "
+            f"{kinds[self.values[column]]} from "
             f"{names[column]!r}: {counted(len(rows), 'size')} of {ends}"
         )
         words = [_with_marks(said, self.marks), *notes, *(cut.said for cut in cuts)]

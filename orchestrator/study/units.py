@@ -12,6 +12,7 @@ from typing import NamedTuple
 from orchestrator.errors import InputError
 from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.physics.fluids import ALIKE, NUMBERS_OF_PAPER
+from orchestrator.study.lengths import LENGTHS
 
 NUMBER = re.compile(
     r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?|[+-]?(inf|nan)", re.ASCII | re.I
@@ -19,13 +20,7 @@ NUMBER = re.compile(
 DECIMAL_COMMA = re.compile(r"([+-]?\d+),(\d+(?:e[+-]?\d+)?)", re.ASCII | re.I)
 WITH_UNIT = re.compile(r"([+-]?[\d.]+(?:e[+-]?\d+)?)\s*([^\d\s.+-].*)", re.ASCII | re.I)
 TO_SI: Mapping[str, float] = {
-    "m": 1.0,
-    "km": 1e3,
-    "cm": 1e-2,
-    "mm": 1e-3,
-    "um": 1e-6,
-    "µm": 1e-6,
-    "μm": 1e-6,
+    **LENGTHS,
     "kg/m3": 1.0,
     "kg/m³": 1.0,
     "g/cm3": 1e3,

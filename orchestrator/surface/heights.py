@@ -468,6 +468,8 @@ class Raster:
         Coordinate reference system as well-known text; empty without any.
     understood
         What its file says of its columns, its unit, its system and its empty cells.
+    unit
+        The unit in which its file has the heights, m.
     """
 
     name: str
@@ -476,6 +478,7 @@ class Raster:
     z: FloatArray
     system: str = ""
     understood: tuple[str, ...] = ()
+    unit: float = 1.0
 
     @property
     def steps(self) -> tuple[float, float]:

@@ -15,21 +15,19 @@ from typing import NamedTuple
 import numpy as np
 
 from orchestrator.errors import InputError
-from orchestrator.study.cells import Marks, marks_of
+from orchestrator.study.cells import Marks, is_of_units, marks_of, with_units
 from orchestrator.study.heads import (
     ALONG_LINE,
     DEGREES,
     DEPTHS,
     EAST,
     HEIGHT,
-    METRE,
     NORTH,
-    UNITS,
-    in_metres,
     more_cells,
     name_of,
     one_word,
 )
+from orchestrator.study.lengths import Lengths, lengths_of
 from orchestrator.study.units import number
 from orchestrator.surface.heights import FEWEST, MOST_NODES, Raster
 from orchestrator.types import FloatArray, IntArray
@@ -92,9 +90,11 @@ def read_points(text: str, name: str, where: str) -> Raster:
     if len(points) < FEWEST**2:
         what = f"{len(points)} points are no surface"
         raise InputError(what, where, "x, y and z in m, a point in each line")
+    points *= layout.units.factors
     _check_order(points, layout, where)
     raster = _on_grid(points, lines, layout, name)
-    return replace(raster, understood=(*layout.said, *filter(None, [marks.said])))
+    said = (*layout.said, *filter(None, [marks.said]))
+    return replace(raster, understood=said, unit=layout.units.factors[2])
 
 
 def _numbers(text: str, layout: "_Layout") -> FloatArray | None:
@@ -153,14 +153,16 @@ class _Layout(NamedTuple):
     """The names of all columns; empty without a head."""
     cells: int
     """How many cells a line has at most."""
+    units: Lengths
+    """The units of x, y and z."""
 
     @property
     def said(self) -> tuple[str, ...]:
         """What was understood of its columns, in words."""
         if not self.names:
-            return ("its first three columns are x, y and z, in m",)
+            return (f"its first three columns are x, y and z, {self.units.said}",)
         x, y, z = (self.names[column].strip() for column in self.columns)
-        words = [f"x from {x!r}, y from {y!r}, heights from {z!r}, in m"]
+        words = [f"x from {x!r}, y from {y!r}, heights from {z!r}, {self.units.said}"]
         datum = name_of(z).datum
         if datum:
             words.append(f"levels above {datum}")
@@ -207,13 +209,25 @@ class _Lines:
             likely = is_row and (not is_comment or len(_axes(cells)) > 1)
             if head is None and (likely or (is_row and _degrees(cells)[1:])):
                 raise self._unnamed(place, cells)
-            if head and {*map(str.lower, cells)} <= {*UNITS} - {*METRE} and cells:
-                what = f"the unit is {cells[0]}"
-                raise InputError(what, self.place(place), "give lengths in m")
         if head is None:
             self._check_bare(first, separator, count)
-            return _Layout(separator, first, (0, 1, 2), (), count)
+            bare = [(axis, f"column {at}", "") for at, axis in enumerate(AXES, 1)]
+            units = lengths_of(bare, self.lines[:first], self.place(first))
+            return _Layout(separator, first, (0, 1, 2), (), count, units)
         place, names, _ = head
+        below = next((each for each in heads if each[0] > place and each[1]), None)
+        if below and is_of_units(below[1]):
+            names = with_units(names, below[1])
+        columns = self._columns(place, names)
+        named = [
+            (axis, names[column], name_of(names[column]).unit)
+            for axis, column in zip(AXES, columns, strict=True)
+        ]
+        units = lengths_of(named, self.lines[:place], self.place(place))
+        return _Layout(separator, first, columns, tuple(names), len(names), units)
+
+    def _columns(self, place: int, names: Sequence[str]) -> tuple[int, int, int]:
+        """The columns of x, y and z by their names, which stand in a line."""
         columns = []
         for axis, called in _axes(names).items():
             if len(called) > 1:
@@ -222,12 +236,8 @@ class _Lines:
                 remedy = f"name that one {axis}, and the other otherwise"
                 raise InputError(f"{what}?", self.place(place), remedy)
             columns.append(called[0])
-        remedy = in_metres([names[column] for column in columns])
-        if remedy:
-            what = f"the columns are {', '.join(names)}"
-            raise InputError(what, self.place(place), remedy)
         x, y, z = columns
-        return _Layout(separator, first, (x, y, z), tuple(names), len(names))
+        return x, y, z
 
     def _unnamed(self, place: int, cells: Sequence[str]) -> InputError:
         """The refusal of a head that does not say which columns are x, y and z."""
@@ -246,7 +256,7 @@ class _Lines:
             what = f"{what}: depths go down"
             remedy = "give heights: levels of the water less depths"
             return InputError(what, self.place(place), remedy)
-        remedy = in_metres(cells) or f"{NAMES_REMEDY}, or remove the line"
+        remedy = f"{NAMES_REMEDY}, or remove the line"
         return InputError(what, self.place(place), remedy)
 
     def _check_bare(self, first: int, separator: str | None, count: int) -> None:

@@ -8,7 +8,6 @@ import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
-from math import radians, tan
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,7 +18,8 @@ from orchestrator.digits import number as number_of
 from orchestrator.errors import InputError
 from orchestrator.extras import imported
 from orchestrator.study.cells import Marks, marks_of
-from orchestrator.study.heads import METRE
+from orchestrator.study.empty import EMPTY_WORDS, looks_empty
+from orchestrator.study.lengths import LENGTHS
 from orchestrator.study.source import decoded, read_bytes
 from orchestrator.study.units import number
 from orchestrator.surface.heights import (
@@ -30,6 +30,12 @@ from orchestrator.surface.heights import (
     checked,
 )
 from orchestrator.surface.points import read_points
+from orchestrator.surface.raster_units import (
+    UNIT_OF_ARCINFO,
+    RasterUnits,
+    units_of,
+    units_of_arcinfo,
+)
 from orchestrator.surface.triangles import read_triangles
 from orchestrator.types import BoolArray, FloatArray
 
@@ -69,19 +75,13 @@ GRASS_KEYS = ("north", "south", "east", "west")
 UNNAMED_EMPTY = "-9999"
 """What stands in them by the format where the key is missing."""
 GRID_REMEDY = "numbers with a decimal point, spaces between them"
-WORDS = ("null", "nan", "*", "na")
-"""Words that stand there in place of a number."""
+OF_EMPTY = re.compile(
+    rf"(?<!\S)(?:{'|'.join(map(re.escape, EMPTY_WORDS))})(?!\S)", re.IGNORECASE
+)
+"""The words that stand for no number, in a text."""
 NEAR_EMPTY = 1e-6
 """Largest difference of an empty cell from the number of empty cells, over that: it is
 written in decimal, with fewer digits in the head of a file or in its cells."""
-DEEPEST, HIGHEST = 9000.0, 1e9
-"""Depth below which and height above which no ground lies, m, in whatever unit."""
-UNIT_OF_ARCINFO = re.compile(r"^\s*z?units\s+(\w+)", re.IGNORECASE | re.MULTILINE)
-"""Units in a file .prj of Arc/Info, which is no well-known text."""
-UNSAID = "no"
-"""Its word for no unit of the heights."""
-UNIT_OFF = 1e-4
-"""Largest difference of a unit from the metre, m: the German legal metre."""
 FORMAT_OF = {"GTiff": "GeoTIFF", "AAIGrid": "ESRI grid"}
 """Formats by GDAL's names for them."""
 TEXTS = (".asc", ".xyz", ".csv", ".txt")
@@ -97,11 +97,6 @@ OTHER_ENDINGS = {
 """What helps with files of other endings."""
 FORMATS = ".tif .tiff (GeoTIFF), .asc (ESRI), .xyz .csv .txt (x y z), .stl"
 POINT_REMEDY = "leave such points out"
-MARKS_OF_EMPTY = (99, 999, 9999, 99999, 999999, 9999999, 32767, 32768, 65535)
-"""Numbers of one sign or the other that stand for no height in many files."""
-ISOLATED = 10.0
-"""How many times the range of all other heights one that stands for none is off them,
-if several cells have it."""
 DECLARED = {
     ".tif": "declare it: gdal_edit -a_nodata {:.9g}",
     ".asc": "declare it in the head: NODATA_value {:.9g}",
@@ -188,34 +183,15 @@ def _is_grid(text: str, ending: str) -> bool:
 
 def _check_heights(raster: Raster, remedy: str, where: str) -> None:
     """Refuse heights that no ground has, and that stand for no height."""
-    z = raster.z[np.isfinite(raster.z)]
+    # marks are numbers of the file, which may have another unit
+    z = raster.z[np.isfinite(raster.z)] / raster.unit
     if not z.size:
         return
-    for value in (float(z.min()), float(z.max())):
-        others = z[z != value]
-        count = int(z.size - others.size)
-        if not -DEEPEST <= value <= HIGHEST or _is_isolated(
-            value, count, others, max(raster.steps)
-        ):
-            cells = number_of(count, "cell")
-            what = f"{value:.6g} in {cells} looks like a cell without a height"
-            raise InputError(what, where, remedy.format(value))
-
-
-def _is_isolated(value: float, count: int, others: FloatArray, step: float) -> bool:
-    """Whether a height is so far off all others that it stands for none.
-
-    No slope leads to it, and it is a number that files use so, or several cells have
-    it.
-    """
-    if not others.size:
-        return False
-    off = min(abs(value - float(others.min())), abs(value - float(others.max())))
-    spread = float(np.ptp(others))
-    if off <= max(spread, step * tan(radians(STEEPEST_DEG))):
-        return False
-    is_mark = abs(value) in MARKS_OF_EMPTY
-    return is_mark or (count > 1 and off > ISOLATED * spread)
+    value, count = looks_empty(z, max(raster.steps) / raster.unit, STEEPEST_DEG)
+    if count:
+        cells = number_of(count, "cell")
+        what = f"{value:.6g} in {cells} looks like a cell without a height"
+        raise InputError(what, where, remedy.format(value))
 
 
 @contextmanager
@@ -248,7 +224,8 @@ def opened_raster(path: Path, where: str) -> Iterator["OpenedRaster"]:
             yield opened
     elif ending in (".tif", ".tiff"):
         with _opened(path, "GTiff", where) as dataset:
-            yield OpenedRaster(dataset, dataset.crs, dataset.nodata)
+            units = units_of(dataset.crs, where)
+            yield OpenedRaster(dataset, dataset.crs, dataset.nodata, units)
     else:
         what = f"the ending {ending!r} is of no raster"
         raise InputError(what, where, "endings: .tif .tiff (GeoTIFF), .asc (ESRI)")
@@ -265,6 +242,8 @@ class OpenedRaster(NamedTuple):
         Its coordinate reference system; None without one.
     empty
         The number of its empty cells; None where no number stands for them.
+    units
+        The units of its axes and of its heights, as far as it says them.
     said
         What was understood of a text, in words.
     """
@@ -272,6 +251,7 @@ class OpenedRaster(NamedTuple):
     dataset: Any
     system: Any
     empty: float | None
+    units: RasterUnits
     said: tuple[str, ...] = ()
 
 
@@ -297,9 +277,10 @@ def read_raster(path: Path, where: str) -> Raster:
     """
     with opened_raster(path, where) as opened:
         _check_band(opened.dataset, where)
-        _check_system(opened.system, where)
-        of_file = (opened.dataset, path.name, opened.system, opened.empty)
-        return _raster(*of_file, where)
+        units = opened.units.with_band(opened.dataset.units[0], where)
+        # what is no height has its own unit, or the metre
+        raster = _raster(opened, path.name, units, units.heights or "m", where)
+        return replace(raster, understood=units.said)
 
 
 def is_empty(values: FloatArray, empty: float | None) -> BoolArray:
@@ -324,20 +305,17 @@ def is_empty(values: FloatArray, empty: float | None) -> BoolArray:
 
 def _of_geotiff(path: Path, where: str) -> Raster:
     """The raster of a GeoTIFF of one band."""
-    with _opened(path, "GTiff", where) as dataset:
+    with opened_raster(path, where) as opened:
+        dataset = opened.dataset
         _check_band(dataset, where)
-        _check_system(dataset.crs, where)
-        unit = dataset.units[0] or ""
-        if unit.lower() not in ("", *METRE):
-            what = f"its heights are in {unit}"
-            raise InputError(what, where, "they must be in m: gdal_calc")
-        empty = dataset.nodata
-        words = [f"a GeoTIFF of {dataset.dtypes[0]}, {_said_of_empty(empty)}"]
+        units = opened.units.with_band(dataset.units[0], where)
+        words = [f"a GeoTIFF of {dataset.dtypes[0]}, {_said_of_empty(dataset.nodata)}"]
         if (dataset.scales[0], dataset.offsets[0]) != (1.0, 0.0):
             scale, offset = dataset.scales[0], dataset.offsets[0]
             words.append(f"its numbers times {scale:g} plus {offset:g} are heights")
-        raster = _raster(dataset, path.name, dataset.crs, empty, where)
-    return replace(raster, understood=(*words, _said_of_system(dataset.crs)))
+        raster = _raster(opened, path.name, units, units.of_heights(where), where)
+    said = _said_of_system(dataset.crs)
+    return replace(raster, understood=(*words, said, *units.said))
 
 
 def _said_of_empty(empty: float | str | None) -> str:
@@ -354,7 +332,7 @@ def _said_of_system(system: Any) -> str:
         return "no coordinate system: lengths taken for m"
     code = system.to_epsg()
     name = f"EPSG:{code}" if code else system.to_dict(projjson=True)["name"]
-    return f"in {name}, in m"
+    return f"in {name}"
 
 
 def _opened(path: Path | str, driver: str, where: str, **options: str) -> Any:
@@ -390,9 +368,10 @@ def _check_band(dataset: Any, where: str) -> None:
 
 
 def _raster(
-    dataset: Any, name: str, system: Any, empty: float | None, where: str
+    opened: OpenedRaster, name: str, units: RasterUnits, of_cells: str, where: str
 ) -> Raster:
-    """The raster of a band, its rows from south to north."""
+    """The raster of a band in m, its rows from south to north."""
+    dataset = opened.dataset
     x, y = _axes(dataset, where)
     library = rasterio(where)
     try:
@@ -401,14 +380,17 @@ def _raster(
         what = f"its heights are not readable: {error}"
         raise InputError(what, where, "is the file cut off?") from None
     values = np.ma.getdata(stored).astype(float)
-    lacks = np.ma.getmaskarray(stored) | is_empty(values, empty)
+    lacks = np.ma.getmaskarray(stored) | is_empty(values, opened.empty)
     heights = values * dataset.scales[0] + dataset.offsets[0]
     heights[lacks] = np.nan
-    return Raster(name, x, y, heights[::-1], system.to_wkt() if system else "")
+    step = units.of_axes(where)
+    system = opened.system.to_wkt() if opened.system else ""
+    unit = LENGTHS[of_cells]
+    return Raster(name, step * x, step * y, unit * heights[::-1], system, unit=unit)
 
 
 def _axes(dataset: Any, where: str) -> tuple[FloatArray, FloatArray]:
-    """The axes of a raster, to the middles of its cells, m."""
+    """The axes of a raster, to the middles of its cells, in its unit."""
     step_x, turn_x, west, turn_y, down, north = dataset.transform[:6]
     if dataset.transform.is_identity:
         what = "it says nothing of the size of its pixels"
@@ -424,59 +406,25 @@ def _axes(dataset: Any, where: str) -> tuple[FloatArray, FloatArray]:
     return x, south - down * (np.arange(dataset.height) + 0.5)
 
 
-def _check_system(system: Any, where: str) -> None:
-    """Refuse a coordinate reference system that is not in metres."""
-    if system is None:
-        return
-    described = system.to_dict(projjson=True)
-    code = system.to_epsg()
-    name = f"EPSG:{code}" if code else described["name"]
-    for quantity, unit, metres in _units(described):
-        if metres is None:
-            what = f"its {quantity} are degrees of longitude and latitude"
-            remedy = (
-                "project it to metres, with gdalwarp -t_srs EPSG:326NN, NN the zone"
-            )
-            raise InputError(what, where, remedy)
-        if abs(metres - 1) > UNIT_OFF:
-            what = f"it is in {name}, whose {quantity} are in {unit}"
-            remedy = f"multiply them by {metres:.7g}: they must be in m"
-            raise InputError(what, where, remedy)
-
-
-def _units(described: Mapping[str, Any]) -> Iterator[tuple[str, str, float | None]]:
-    """What the axes of a system measure, their units, and these in m; None of angles.
-
-    The system is described by PROJJSON.
-    """
-    parts = described.get("components") or [described.get("source_crs", described)]
-    for part in parts:
-        quantity = "heights" if part["type"] == "VerticalCRS" else "axes"
-        for axis in part["coordinate_system"]["axis"]:
-            unit = axis["unit"]
-            if isinstance(unit, str):
-                yield quantity, unit, 1.0 if unit == "metre" else None
-            else:
-                is_angle = unit["type"] == "AngularUnit"
-                metres = None if is_angle else unit["conversion_factor"]
-                yield quantity, unit["name"], metres
-
-
 def _of_grid(path: Path, text: str, where: str) -> Raster:
     """The raster of an ESRI ASCII grid, or of one of GRASS."""
     with _grid(path, text, where) as opened:
-        raster = _raster(opened.dataset, path.name, opened.system, opened.empty, where)
-    return replace(raster, understood=opened.said)
+        units = opened.units
+        raster = _raster(opened, path.name, units, units.of_heights(where), where)
+    return replace(raster, understood=(*opened.said, *units.said))
 
 
 @contextmanager
 def _grid(path: Path, text: str, where: str) -> Iterator[OpenedRaster]:
     """An ESRI ASCII grid, or one of GRASS, as rasterio opens it."""
-    system = _system_beside(path.with_suffix(".prj"), where)
+    system, units = _system_beside(path.with_suffix(".prj"), where)
     text, marks = _with_points(text, where)
     grid = _check_grid(text, where)
     by = "" if grid.is_declared else " by the format"
-    said = [f"a grid with {_said_of_empty(grid.empty)}{by}", _said_of_system(system)]
+    marks_of_empty = f"{_said_of_empty(grid.empty)}{by}"
+    if grid.words:
+        marks_of_empty = f"{marks_of_empty}, and {', '.join(grid.words)}"
+    said = [f"a grid with {marks_of_empty}", _said_of_system(system)]
     if marks.said:
         said.insert(1, marks.said)
     empty = None if isinstance(grid.empty, str) else grid.empty
@@ -484,7 +432,7 @@ def _grid(path: Path, text: str, where: str) -> Iterator[OpenedRaster]:
     # numbers as they are written: 32-bit ones have seven digits
     precise = {"DATATYPE": "Float64"}
     with memory, _opened(memory.name, "AAIGrid", where, **precise) as dataset:
-        yield OpenedRaster(dataset, system, empty, tuple(said))
+        yield OpenedRaster(dataset, system, empty, units, tuple(said))
 
 
 def _with_points(text: str, where: str) -> tuple[str, Marks]:
@@ -516,11 +464,14 @@ class _Grid(NamedTuple):
         The number of empty cells, or a word.
     is_declared
         Whether the head has it.
+    words
+        Words in cells that stand for no number, and are not that of the head.
     """
 
     text: str
     empty: float | str
     is_declared: bool
+    words: tuple[str, ...]
 
 
 def _check_grid(text: str, where: str) -> _Grid:
@@ -534,23 +485,31 @@ def _check_grid(text: str, where: str) -> _Grid:
     given = dict(head)
     is_declared = EMPTY in head
     empty = head.pop(EMPTY, UNNAMED_EMPTY)
+    sizes = _sizes_in_head(head, where)
+    is_word = empty.lower() in EMPTY_WORDS
+    widths = _widths(lines[before:], before, where)
+    _check_counts(widths, sizes["ncols"], sizes["nrows"], where)
+    body = "\n".join(lines[before:])
+    found = dict.fromkeys(OF_EMPTY.findall(body))
+    if is_word or found:
+        body = OF_EMPTY.sub("nan", body)
+    if is_word:
+        given[EMPTY] = "nan"
+    written = "".join(f"{key} {value}\n" for key, value in given.items())
+    mark = empty if is_word else _number(empty, f"{where}: {EMPTY}")
+    words = tuple(word for word in found if word.lower() != empty.lower())
+    return _Grid(f"{written}{body}\n", mark, is_declared, words)
+
+
+def _sizes_in_head(head: Mapping[str, str], where: str) -> dict[str, float]:
+    """The numbers of a head by their keys."""
     sizes = {key: _number(word, f"{where}: {key}") for key, word in head.items()}
     for key, value in sizes.items():
         is_step = key in STEPS
         if not np.isfinite(value) or (is_step and value <= 0):
-            remedy = "it is in m, above 0" if is_step else "it is in m"
+            remedy = "a length above 0" if is_step else "a number"
             raise InputError(f"{key} {value:g}", where, remedy)
-    is_word = empty.lower() in WORDS
-    word = empty if is_word else "nan"
-    widths = _widths(lines[before:], before, word, where)
-    _check_counts(widths, sizes["ncols"], sizes["nrows"], where)
-    body = "\n".join(lines[before:])
-    if is_word:
-        given[EMPTY] = "nan"
-        body = re.sub(rf"(?<!\S){re.escape(empty)}(?!\S)", "nan", body)
-    written = "".join(f"{key} {value}\n" for key, value in given.items())
-    mark = empty if is_word else _number(empty, f"{where}: {EMPTY}")
-    return _Grid(f"{written}{body}\n", mark, is_declared)
+    return sizes
 
 
 def _check_counts(widths: list[int], columns: float, rows: float, where: str) -> None:
@@ -578,7 +537,7 @@ def _head_of_grid(lines: list[str], where: str) -> tuple[dict[str, str], int]:
         if not words[0]:
             before += 1
             continue
-        is_mark = words[0].lower() in WORDS and ":" not in line
+        is_mark = words[0].lower() in EMPTY_WORDS and ":" not in line
         if not words[0][0].isalpha() or is_mark or len(words) != 2:
             break
         key = _key_of(words[0])
@@ -625,16 +584,13 @@ def _of_edges(head: Mapping[str, str], where: str) -> dict[str, str]:
     return made | ({EMPTY: head[EMPTY]} if EMPTY in head else {"nodata_value": "*"})
 
 
-def _widths(lines: list[str], before: int, word: str, where: str) -> list[int]:
-    """How many heights each line has; `before` lines stand before them in the file.
-
-    The word is that of empty cells.
-    """
+def _widths(lines: list[str], before: int, where: str) -> list[int]:
+    """How many heights each line has; `before` lines stand before them in the file."""
     widths = []
     for place, line in enumerate(lines, before + 1):
         words = line.split()
         for each in words:
-            if each != word:
+            if each.lower() not in EMPTY_WORDS:
                 _number(each, f"{where}: line {place}")
         if words:
             widths.append(len(words))
@@ -650,32 +606,25 @@ def _number(word: str, where: str) -> float:
         raise InputError(f"{word!r} is no number", where, remedy) from None
 
 
-def _system_beside(path: Path, where: str) -> Any:
-    """The coordinate reference system in the file .prj beside a grid.
+def _system_beside(path: Path, where: str) -> tuple[Any, RasterUnits]:
+    """The coordinate reference system in the file .prj beside a grid, and its units.
 
-    It is None without the file, and where the file is of the old kind of Arc/Info. One
-    in another unit than metres is refused.
+    It is None without the file, and where the file is of the old kind of Arc/Info.
     """
     if not path.is_file():
-        return None
+        return None, RasterUnits()
     library = rasterio(where)
     where = f"{where}: {path.name}"
     text = decoded(read_bytes(path, LARGEST_PROJECTION, where), where)
-    units = UNIT_OF_ARCINFO.findall(text)
-    for unit in units:
-        if unit.lower() not in (UNSAID, *METRE):
-            what = f"its lengths are in {unit}"
-            raise InputError(what, where, "project it to metres, with gdalwarp -t_srs")
-    if units:
-        return None
+    if UNIT_OF_ARCINFO.search(text):
+        return None, units_of_arcinfo(text, path.name, where)
     try:
         with library.Env():  # what PROJ says goes nowhere else
             system = library.crs.CRS.from_wkt(text, morph_from_esri_dialect=True)
     except library.errors.CRSError:
         what = "it is no coordinate system in well-known text"
         raise InputError(what, where, "remove it, if all lengths are in m") from None
-    _check_system(system, where)
-    return system
+    return system, units_of(system, where, path.name)
 
 
 def geotiff(x: FloatArray, y: FloatArray, values: ArrayLike, system: str) -> bytes:
@@ -697,6 +646,11 @@ def geotiff(x: FloatArray, y: FloatArray, values: ArrayLike, system: str) -> byt
     """
     library = rasterio("maps")
     rows = np.asarray(values, np.float32)[::-1]
+    # the axes of a map have the unit of its system
+    unit = 1.0
+    if system:
+        unit = units_of(library.crs.CRS.from_wkt(system), "maps").of_axes("maps")
+    x, y = x / unit, y / unit
     step_x = float(np.ptp(x)) / (len(x) - 1)
     step_y = float(np.ptp(y)) / (len(y) - 1)
     west, north = float(x[0]) - step_x / 2, float(y[-1]) + step_y / 2

@@ -214,7 +214,7 @@ def _sizes(opened: OpenedRaster) -> tuple[FloatArray, str]:
         sines = np.sin(np.radians(np.clip(edges, -90, 90)))
         width = float(np.radians(abs(transform.a)))
         return np.abs(np.diff(sines)) * width * EARTH_M**2, "m2"
-    metres = 1.0 if system is None else float(system.linear_units_factor[1])
+    metres = opened.units.axes or 1.0
     return np.full(count, across * metres**2), "m2"
 
 

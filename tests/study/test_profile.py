@@ -83,9 +83,10 @@ BAD: dict[str, tuple[str | bytes, str]] = {
             f"line 3: {message}",
         )
         for cell, message in {
-            "nan": "z_m: nan is not a number up to",
+            "nan": "z_m: nan looks like an empty cell",
+            "NA": "z_m: NA looks like an empty cell",
             "inf": "z_m: inf is not a number up to",
-            "1e6": "z_m: 1e6 is not a number up to",
+            "1e6": "z_m: 1e.06 is not a number up to",
             "high": "z_m: 'high' is no number",
             "1_0": "z_m: '1_0' is no number",
             "٣": "z_m: '٣' is no number",
@@ -269,7 +270,7 @@ def test_surveyors_may_call_the_columns_as_they_do(header: str, tmp_path: Path) 
     ("header", "message"),
     [
         ("easting,northing,z", "which column is x_m: easting or northing. Name that"),
-        ("x_mm,z_mm,n", "the columns are x_mm, z_mm, n .multiply x_mm by 0.001"),
+        ("x_mm,z,n", r"x_mm is in mm, and z names no unit .*: z \(m\), z \(ft\)"),
     ],
 )
 def test_a_column_that_may_be_another_is_asked_about(
@@ -447,13 +448,107 @@ def test_a_northing_is_told_to_the_centimetre(
         scene_of(tmp_path, points(*filter(None, rows)))
 
 
-def test_columns_in_feet_are_refused_with_their_factor(tmp_path: Path) -> None:
-    with pytest.raises(
-        InputError, match=r"line 1: .*multiply x_ft by 0\.3048: lengths"
-    ):
-        scene_of(tmp_path, GOOD.replace("x_m,z_m", "x_ft,z_ft"))
+IN_UNITS = {
+    "x_ft,z_ft": (0.3048, 0.3048, "in ft (1 ft = 0.3048 m)"),
+    "Station (ft),Elevation (ft NAVD88)": (0.3048, 0.3048, "levels above NAVD88"),
+    "Distance [in],Height [in]": (0.0254, 0.0254, "in in (1 in = 0.0254 m)"),
+    "x_m,z_mm": (1.0, 1e-3, "x in m, z in mm (1 mm = 0.001 m)"),
+    "Abstand in cm;Höhe in cm": (0.01, 0.01, "in cm (1 cm = 0.01 m)"),
+    "Chainage (km),Level (mAOD)": (1000.0, 1.0, "x in km (1 km = 1000 m), z in m"),
+    "x (us ft),Elevation (NAVD88 us ft)": (1200 / 3937, 1200 / 3937, "0.3048006"),
+    "# Units: US survey feet\nx,z": (1200 / 3937, 1200 / 3937, "0.3048006 m)"),
+    "all lengths in mm\nx,z": (1e-3, 1e-3, "in mm (1 mm = 0.001 m)"),
+    "x,z\nft,in": (0.3048, 0.0254, "x in ft (1 ft = 0.3048 m), z in in"),
+}
+
+
+@pytest.mark.parametrize("head", IN_UNITS)
+def test_units_of_columns_are_applied_and_said(head: str, tmp_path: Path) -> None:
+    along, up, said = IN_UNITS[head]
+    places = ((0.0, 0.0), (0.05, 0.01), (0.1, 0.02), (0.14, 0.0))
+    mark = ";" if ";" in head else ","
+    rows = [f"{x / along!r}{mark}{z / up!r}" for x, z in places]
+    bed = scene_of(tmp_path, "\n".join([head, *rows, ""])).bed
+    assert isinstance(bed, PileBed)
+    assert bed.profile
+    assert bed.profile.x == pytest.approx([x for x, _ in places], abs=1e-9)
+    assert bed.profile.z == pytest.approx([z for _, z in places], abs=1e-9)
+    assert said in bed.profile.understood
+    assert "x 0 to 0.14 m, z 0 to 0.02 m" in bed.profile.understood
+
+
+@pytest.mark.parametrize(
+    ("head", "message"),
+    [
+        ("x_ft,z", r"line 1: x_ft is in ft, and z names no unit"),
+        ("# Units: feet\nx (m),z (m)", "line 2: which unit: feet and m stand in"),
+        ("# Units: feet\n# Units: m\nx,z", "line 3: which unit: feet and m stand"),
+        ("# heights in feet\nx,z", "line 2: a line above speaks of feet"),
+    ],
+)
+def test_units_that_are_not_certain_are_asked_about(
+    head: str, message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        scene_of(tmp_path, f"{head}\n0,0\n5,1\n10,2\n14,0\n")
+    assert "behind its name" in str(caught.value)
+
+
+def test_lengths_in_lines_above_that_are_no_units_change_nothing(
+    tmp_path: Path,
+) -> None:
+    plain = scene_of(tmp_path, GOOD)
+    assert scene_of(tmp_path, "# flown 120 ft above sand of 0.3 mm\n" + GOOD) == plain
+
+
+def test_stations_of_hundreds_are_read_in_the_unit_of_their_column(
+    tmp_path: Path,
+) -> None:
+    text = "Station (ft),z (ft)\n0+00,0\n0+50,5\n1+00.5,0\n"
+    bed = scene_of(tmp_path, text).bed
+    assert isinstance(bed, PileBed)
+    assert bed.profile
+    assert bed.profile.x == pytest.approx([0, 15.24, 30.6324])
+
+
+def test_names_of_surveyors_in_metres_are_no_other_bed(tmp_path: Path) -> None:
     turned = GOOD.replace("x_m,z_m", "Hochwert (m),Höhe [m]")
     assert scene_of(tmp_path, turned).id == scene_of(tmp_path, GOOD).id
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({20: "0.1,-9999"}, "line 22: z_m: -9999 in 1 point looks like an empty cell"),
+        ({20: "-9999,0.01"}, "line 22: x_m: -9999 in 1 point looks like an empty cell"),
+        ({20: "-9999,-9999"}, "line 22: x_m: -9999 in 1 point looks"),
+        ({20: "0.1,99", 21: "0.105,99"}, "line 22: z_m: 99 in 2 points looks"),
+        ({20: "0.1,-32768"}, "line 22: z_m: -32768 in 1 point"),
+    ],
+)
+def test_numbers_that_stand_for_none_are_named(
+    change: dict[int, str], message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        scene_of(tmp_path, long(*change.items()))
+    assert "remove such lines" in str(caught.value)
+
+
+@pytest.mark.parametrize("foot", ["EOD", "End of file", "---", "NA,NA"])
+def test_words_behind_the_points_are_left_out_and_said(
+    foot: str, tmp_path: Path
+) -> None:
+    scene = scene_of(tmp_path, GOOD + foot + "\n")
+    assert scene == scene_of(tmp_path, GOOD)
+    (tmp_path / "scan.csv").write_text(GOOD + foot + "\n")
+    profile_of = study.parse(STUDY, name="a", where=str(tmp_path / "a.toml"))
+    said = profile_of.understood["scan.csv"]
+    assert said.endswith("1 line of words behind its points left out")
+
+
+def test_a_foot_with_numbers_is_to_be_removed(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"line 8: .*remove the line, if it is no"):
+        scene_of(tmp_path, GOOD + "Surveyed 2024-05-01\n")
 
 
 READ = {

@@ -12,6 +12,7 @@ from orchestrator.calculator.asked import thresholds_and_questions
 from orchestrator.calculator.cli import OPTIONS
 from orchestrator.errors import InputError
 from orchestrator.study import study, units
+from orchestrator.study.lengths import LENGTHS
 from orchestrator.study.parts import PileBed
 from orchestrator.study.source import presets
 
@@ -256,6 +257,7 @@ KNOWN_UNITS = {
 
 
 def test_every_unit_has_the_factor_of_its_definition() -> None:
-    assert pytest.approx(KNOWN_UNITS, rel=1e-15) == units.TO_SI
+    assert {*units.TO_SI} == {*KNOWN_UNITS} | {*LENGTHS}
     for unit, factor in KNOWN_UNITS.items():
+        assert units.TO_SI[unit] == pytest.approx(factor, rel=1e-15)
         assert units.meant(f"2.5 {unit}").startswith(f"write {2.5 * factor:.9g}, ")

@@ -18,7 +18,8 @@ from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
 from orchestrator.errors import InputError
 from orchestrator.surface.heights import Surface
-from orchestrator.surface.raster import read_surface
+from orchestrator.surface.raster import geotiff, read_surface
+from orchestrator.surface.raster_units import RasterUnits
 from orchestrator.types import FloatArray
 
 EAST, NORTH = 512_300.0, 5_640_800.0
@@ -118,8 +119,10 @@ def test_columns_are_read_by_their_names(tmp_path: Path, head: str, form: str) -
     ("head", "form", "message"),
     [
         ("lat,lon,height", "{y},{x},{z}", "line 1: lat and lon are degrees"),
-        ("x_ft,y_ft,z_ft", "{x},{y},{z}", r"line 1: .*x_ft.*multiply x_ft by 0\.3048"),
-        ("x,y,z_mm", "{x},{y},{z}", "multiply z_mm by 0.001"),
+        ("x_ft,y_ft,z", "{x},{y},{z}", r"line 1: x_ft is in ft, and z names no unit"),
+        ("x,y,z_mm", "{x},{y},{z}", r"z_mm is in mm, and x names no unit .*: x \(m\)"),
+        ("# in feet\nx,y,z", "{x},{y},{z}", "line 2: a line above speaks of feet"),
+        ("# in feet", "{x},{y},{z}", "line 2: a line above speaks of feet"),
         ("easting,northing,x,z", "{x},{y},1,{z}", "line 1: .*x: easting or x"),
         (
             "a,b,c",
@@ -129,7 +132,6 @@ def test_columns_are_read_by_their_names(tmp_path: Path, head: str, form: str) -
         ("x,y,height_of_plant", "{x},{y},{z}", "name them x, y and z"),
         ("x y z", "{x} {y} {z} 25", "line 2: 4 cells, the head has 3"),
         ("y,x,z,code", "{y},{x}", "line 2: .* is no point"),
-        ("x y z\nft ft ft", "{x} {y} {z}", "line 2: the unit is ft"),
         (
             "@File: 4\n# a comment\nEOD",
             "A1 {x} {y} {z}",
@@ -388,17 +390,61 @@ def test_packed_heights_use_all_numbers_of_their_type(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("items", "message"),
     [
-        ({"unittype": "ft"}, "its heights are in ft"),
-        ({"unittype": "US survey foot"}, "its heights are in US survey foot"),
+        ({"unittype": "fathom"}, "its heights are in fathom, of unknown length"),
         ({"scale": "0"}, "its scale is 0"),
         ({"offset": "nan"}, "its offset nan"),
     ],
 )
-def test_metadata_in_which_no_metre_stands_is_refused(
+def test_metadata_in_which_no_length_stands_is_refused(
     tmp_path: Path, items: dict[str, str], message: str
 ) -> None:
     content = tif(heights().astype(np.float32), None, 0.5, **items)
     assert message in refused(tmp_path, content, "heap.tif")
+
+
+@pytest.mark.parametrize(
+    ("unit", "metres"),
+    [("ft", 0.3048), ("US survey foot", 1200 / 3937), ("cm", 0.01), ("feet", 0.3048)],
+)
+def test_the_unit_of_a_band_is_applied_and_said(
+    tmp_path: Path, unit: str, metres: float
+) -> None:
+    content = tif((heights() / metres).astype(np.float32), unittype=unit)
+    found = read(tmp_path, content, "heap.tif")
+    assert found.z == pytest.approx(heights(), abs=1e-4)
+    assert (found.x[0], found.y[0]) == (EAST, NORTH)
+    assert f"heights in {unit.lower()} (1 " in found.understood
+
+
+@pytest.mark.parametrize(
+    ("head", "form"),
+    [
+        ("x_ft,y_ft,z_ft", "{x},{y},{z}"),
+        ("x y z\nft ft ft", "{x} {y} {z}"),
+        ("# Units: ft\n# x y z", "{x} {y} {z}"),
+        ("# all coordinates in feet", "{x} {y} {z}"),
+        ("Northing (ft),Easting (ft),Elevation (NAVD88 ft)", "{y},{x},{z}"),
+    ],
+)
+def test_points_in_feet_become_metres(tmp_path: Path, head: str, form: str) -> None:
+    text = f"{head}\n{points(form)}"
+    found = read(tmp_path, text)
+    assert found.z == pytest.approx(0.3048 * heights(), abs=1e-9)
+    assert found.x[0] == pytest.approx(0.3048 * EAST)
+    assert found.y[-1] == pytest.approx(0.3048 * (NORTH + ROWS - 1))
+    assert "(1 f" in found.understood
+    assert "= 0.3048 m)" in found.understood
+    # a mark of empty cells is a number of the file
+    said = refused(
+        tmp_path, text.replace(",0.0\n", ",-9999\n", 1).replace(" 0.0\n", " -9999\n", 1)
+    )
+    assert "-9999 in 1 cell looks like a cell without a height" in said
+
+
+def test_columns_of_points_may_differ_in_their_units(tmp_path: Path) -> None:
+    found = read(tmp_path, "x_m,y_m,z_mm\n" + points("{x},{y},{z}"))
+    assert found.z == pytest.approx(1e-3 * heights(), abs=1e-9)
+    assert "x in m, y in m, z in mm (1 mm = 0.001 m)" in found.understood
 
 
 def test_metres_of_gdals_metadata_are_metres(tmp_path: Path) -> None:
@@ -409,19 +455,55 @@ def test_metres_of_gdals_metadata_are_metres(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
-        ({PROJECTED: 2277}, "EPSG:2277, whose axes are in US survey foot.*0.3048006"),
-        ({PROJECTED: 6494}, r"EPSG:6494, whose axes are in foot.*by 0\.3048:"),
-        ({PROJECTED: 22300}, "EPSG:22300, whose axes are in kilometre.* by 1000:"),
-        ({PROJECTED: 32632, VERTICAL: 6360}, "its heights are in US survey foot"),
-        ({PROJECTED: 32632, LENGTH_UNIT: 9036}, "whose axes are in kilometre"),
+        ({PROJECTED: 2277}, "axes are in US survey foot by EPSG:2277, and nothing"),
+        ({PROJECTED: 6494}, "axes are in foot by EPSG:6494, and nothing says"),
+        ({PROJECTED: 22300}, "axes are in kilometre by EPSG:22300, and nothing"),
     ],
 )
-def test_a_coordinate_system_in_another_unit_is_refused(
+def test_a_system_in_another_unit_says_nothing_of_heights(
     tmp_path: Path, keys: dict[int, int], message: str
 ) -> None:
     content = tif(heights().astype(np.float32), {MODEL: 1, **keys})
-    with pytest.raises(InputError, match=message):
-        read(tmp_path, content, "heap.tif")
+    said = refused(tmp_path, content, "heap.tif")
+    assert message in said
+    assert "gdal_edit -units ft, or m" in said
+
+
+@pytest.mark.parametrize(
+    ("keys", "unit", "axes", "up"),
+    [
+        ({PROJECTED: 2277}, "US survey foot", 1200 / 3937, 1200 / 3937),
+        ({PROJECTED: 6494}, "m", 0.3048, 1.0),
+        ({PROJECTED: 22300}, "m", 1000.0, 1.0),
+        ({PROJECTED: 32632, VERTICAL: 6360}, "", 1.0, 1200 / 3937),
+        ({PROJECTED: 2277, VERTICAL: 6360}, "", 1200 / 3937, 1200 / 3937),
+    ],
+)
+def test_units_of_a_coordinate_system_are_applied(
+    tmp_path: Path, keys: dict[int, int], unit: str, axes: float, up: float
+) -> None:
+    items: dict[str, str | float] = {"unittype": unit} if unit else {}
+    values = (heights() * axes / up).astype(np.float32)
+    content = tif(values, {MODEL: 1, **keys}, 0.5, **items)
+    found = read(tmp_path, content, "heap.tif")
+    assert found.z == pytest.approx(axes * heights(), rel=1e-5)
+    assert found.x[0] == pytest.approx(axes * EAST)
+    assert found.y[0] == pytest.approx(axes * NORTH)
+    # a map of it lies where the raster lies, in the unit of its system
+    with (
+        rasterio.MemoryFile(geotiff(found.x, found.y, found.z, found.system)) as memory,
+        memory.open() as dataset,
+    ):
+        assert dataset.crs.to_wkt() == found.system
+        corner = (dataset.bounds.left, dataset.bounds.top)
+    assert corner == pytest.approx((EAST - 0.5, NORTH + ROWS - 0.5), abs=1e-3)
+
+
+def test_a_band_that_contradicts_its_system_is_asked_about() -> None:
+    units = RasterUnits("EPSG:32632+6360", 1.0, "metre", "us survey foot")
+    with pytest.raises(InputError, match=r"in m, by EPSG:32632\+6360 in us survey"):
+        units.with_band("m", WHERE)
+    assert units.with_band("US survey foot", WHERE) == units
 
 
 @pytest.mark.parametrize("code", [32632, 25832, 2056, 2154, 6493, 27700, 5514, 3857])
@@ -552,6 +634,17 @@ def test_a_grid_with_decimal_commas_is_read(tmp_path: Path) -> None:
     assert "-9999 in empty cells;" in found.understood
 
 
+@pytest.mark.parametrize("head", ["", "NODATA_value -9999\n"])
+@pytest.mark.parametrize("word", ["NA", "nan", "null", "*"])
+def test_words_in_empty_cells_need_no_declaration(
+    tmp_path: Path, head: str, word: str
+) -> None:
+    found = read(tmp_path, grid(f"cellsize 1\n{head}", word), "heap.asc")
+    check_is_the_heap(found)
+    assert f", and {word};" in found.understood
+    assert "3 cells without a height" in found.understood
+
+
 @pytest.mark.parametrize(
     ("mark", "count"),
     [(-99.0, 1), (999.0, 1), (9999.0, 2), (-999.0, 1), (32767.0, 1), (-500.0, 3)],
@@ -658,13 +751,21 @@ def projection(code: int, version: str = "WKT1_ESRI") -> str:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (projection(2277), "heap.prj: .*in US survey foot.*0.3048006"),
-        (projection(2277, "WKT2_2019"), "heap.prj: it is in EPSG:2277.*survey foot"),
-        (projection(4326), "heap.prj: .*are degrees"),
-        (projection(4326, "WKT2_2019"), "heap.prj: .*are degrees"),
+        (
+            projection(2277),
+            "in US survey foot by .*heap.prj, and nothing says the unit",
+        ),
+        (projection(2277, "WKT2_2019"), "survey foot by EPSG:2277 in heap.prj, and"),
+        (projection(4326), "heap.prj its axes are degrees"),
+        (projection(4326, "WKT2_2019"), "heap.prj its axes are degrees"),
         (projection(32632)[:90], "heap.prj: it is no coordinate system"),
-        ("Projection STATEPLANE\nUnits FEET\n", "heap.prj: .*in FEET"),
-        ("Projection UTM\nZunits CENTIMETERS\nUnits METERS\n", "in CENTIMETERS"),
+        ("Projection STATEPLANE\nUnits FEET\n", "in FEET by heap.prj, and nothing"),
+        ("Projection STATEPLANE\nUnits FEET\nZunits NO\n", "in FEET by heap.prj, and"),
+        ("Projection UTM\nUnits FATHOMS\n", "heap.prj: .*in FATHOMS"),
+        (
+            "Projection GEOGRAPHIC\nUnits DD\nZunits METERS\n",
+            "heap.prj its axes are deg",
+        ),
     ],
 )
 def test_a_projection_beside_a_grid_is_not_overlooked(
@@ -673,6 +774,41 @@ def test_a_projection_beside_a_grid_is_not_overlooked(
     (tmp_path / "heap.prj").write_text(text)
     with pytest.raises(InputError, match=message):
         read(tmp_path, grid("cellsize 1\n"), "heap.asc")
+
+
+@pytest.mark.parametrize(
+    ("text", "axes", "up"),
+    [
+        ("Projection STATEPLANE\nZunits FEET\nUnits FEET\n", 0.3048, 0.3048),
+        ("Projection UTM\nZunits CENTIMETERS\nUnits METERS\n", 1.0, 0.01),
+        (
+            projection(2277, "WKT2_2019").join(
+                [
+                    'COMPOUNDCRS["both",',
+                    ',VERTCRS["NAVD88 height (ftUS)",VDATUM["North American Vertical Datum 1988"],CS[vertical,1],AXIS["up",up],LENGTHUNIT["US survey foot",0.304800609601219]]]',
+                ]
+            ),
+            1200 / 3937,
+            1200 / 3937,
+        ),
+    ],
+)
+def test_units_beside_a_grid_are_applied(
+    tmp_path: Path, text: str, axes: float, up: float
+) -> None:
+    (tmp_path / "heap.prj").write_text(text)
+    content = grid("cellsize 1\n")
+    if axes != up:
+        head, body = content.split("cellsize 1\n")
+        body = "\n".join(
+            " ".join(f"{100 * float(z):.0f}" for z in row.split())
+            for row in body.splitlines()
+        )
+        content = f"{head}cellsize 1\n{body}\n"
+    found = read(tmp_path, content, "heap.asc")
+    assert found.z == pytest.approx(axes * heights(), rel=1e-6)
+    assert found.x[0] == pytest.approx(axes * EAST)
+    assert found.steps == pytest.approx((axes, axes))
 
 
 @pytest.mark.parametrize(
