@@ -80,12 +80,42 @@ def suggestion(word: str, known: Iterable[str]) -> str:
 
     Examples
     --------
-    >>> suggestion("watr", ["air", "water"])
-    'did you mean water?'
+    >>> suggestion("watr", ["air", "water"]), suggestion("AIR", ["air", "water"])
+    ('did you mean water?', 'did you mean air?')
     """
-    for near in difflib.get_close_matches(word, known, n=1):
-        return f"did you mean {near}?"
+    spelt = {one.casefold(): one for one in known}
+    for near in difflib.get_close_matches(word.casefold(), spelt, n=1):
+        return f"did you mean {spelt[near]}?"
     return ""
+
+
+def shown(value: object) -> str:
+    """Write a value as a study file has it.
+
+    Parameters
+    ----------
+    value
+        The value.
+
+    Returns
+    -------
+    str
+        Its text.
+
+    Examples
+    --------
+    >>> shown(True), shown({"a": [1, "x"]}), shown("x")
+    ('true', "{ a = [1, 'x'] }", "'x'")
+    """
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, dict):
+        items = ", ".join(f"{key} = {shown(each)}" for key, each in value.items())
+        return f"{{ {items} }}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(shown, value))}]"
+    # TOML has dates, too
+    return repr(value) if isinstance(value, str | int | float) else str(value)
 
 
 def one_line(text: str) -> str:

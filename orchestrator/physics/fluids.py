@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from orchestrator.errors import InputError, suggestion
+from orchestrator.errors import InputError, shown, suggestion
 from orchestrator.physics.constants import GAS_BELOW
 
 PAPER = "paper"
@@ -235,11 +235,12 @@ def _check_kind(kind: object) -> None:
     """Refuse a fluid that has no formulas."""
     if kind in [*KINDS]:
         return
-    what = f"no formulas of {kind!r} are here"
+    what = f"{shown(kind)} is no fluid that is known by its name"
     if kind is None:
         what = "a temperature needs it"
-    names = suggestion(str(kind), KINDS) or f"choose {', '.join(KINDS)}"
-    remedy = f"{names}; of others give density and viscosity"
+    near = suggestion(str(kind), KINDS) if isinstance(kind, str) else ""
+    names = near or f"write one of {', '.join(KINDS)}."
+    remedy = f"{names} Of another fluid give density and viscosity"
     raise InputError(what, "fluid.kind", remedy)
 
 

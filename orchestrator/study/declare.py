@@ -58,6 +58,8 @@ class Info:
         Meanings of its words.
     read
         Property of a scene with the value in use, where the field may be left open.
+    also
+        What a study file may write in place of its value, in words.
     """
 
     label: str = ""
@@ -67,6 +69,7 @@ class Info:
     scope: str = "every scene"
     choices: Mapping[str, str] = dataclasses.field(default_factory=dict)
     read: str = ""
+    also: str = ""
 
 
 WORDS = tuple(one.name for one in dataclasses.fields(Info))

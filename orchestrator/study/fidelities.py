@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, suggestion
 from orchestrator.study.fields import FIDELITY
 
 AUTO = "auto"
@@ -123,8 +123,10 @@ def fields_of(name: str, bed: Mapping[str, Any], where: str) -> Fields:
     """
     place = f"{where}: {FIDELITY}"
     if name not in WRITTEN:
-        known = ", ".join([AUTO, *WRITTEN])
-        raise InputError(f"{name!r} is no fidelity", place, known)
+        known = [AUTO, *WRITTEN]
+        near = suggestion(str(name), known)
+        remedy = f"{near} Else write one of {', '.join(known)}".strip()
+        raise InputError(f"{name!r} is no fidelity", place, remedy)
     written = WRITTEN[name]
     packing = packing_of(bed)
     if packing in written.not_on:

@@ -193,7 +193,7 @@ class GrainPart(Sphere):
     cohesion: float = field(0.0, unit="N/m", column="cohesion_n_m", ge=0, le=1e3)
     """pull of a contact over the diameter, of two sizes over their harmonic mean; by
     pivots and peeling alone"""
-    sizes: Sizes | None = _poured(None)
+    sizes: Sizes | None = _poured(None, also="the name of a file, in quotes")
     """mixture of a poured bed, by mass, in one plane by area: a sieve table, rows of
     diameter (m, rising) and fraction or a file of these or of what passes or stays on
     sieves (docs/your-files.md), whose d50 is the diameter; or log-normal,
@@ -351,7 +351,12 @@ class Bed(Part):
     )
     """angle at which a grain leaves its pocket, between neighbours 2 d cos β apart"""
     roughness: Roughness = field(
-        ..., symbol="z_0", unit="m", column="z0_m", label="roughness length"
+        ...,
+        symbol="z_0",
+        unit="m",
+        column="z0_m",
+        label="roughness length",
+        also='a part of the diameter, "d/30"',
     )
     """roughness length of the bed, or a part of the diameter of its grains, "d/30" """
     # a smaller grain falls through the pores of a bed, a larger one lies on many grains

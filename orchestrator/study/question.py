@@ -10,7 +10,7 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from orchestrator.digits import SLACK, rounded
+from orchestrator.digits import SLACK, metres, rounded
 from orchestrator.physics.grain import Grain as PhysicalGrain
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import DEFAULT, LAWS
@@ -261,8 +261,11 @@ def _check_roughness(question: Question) -> None:
     size = d / question.bed.relative_size * largest
     roughness = question.bed.roughness
     if roughness > ROUGHEST * size * (1 + 1e-9) or roughness >= d:
-        what = f"above d, or a third of the bed's grains of {size:g} m"
-        raise UnfitError("bed.roughness", what, "typical: d/30")
+        what = f"{metres(roughness)} is above a third of the bed's grains of "
+        what += metres(size)
+        if roughness <= ROUGHEST * size * (1 + 1e-9):
+            what = f"{metres(roughness)} is not below the diameter of {metres(d)}"
+        raise UnfitError("bed.roughness", what, 'usual is "d/30"')
 
 
 def _check_forces(question: Question) -> None:

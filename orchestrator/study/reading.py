@@ -16,9 +16,11 @@ from typing import Annotated, Any, NamedTuple, Protocol, TypeVar
 
 from pydantic import Field, ValidationError
 
-from orchestrator.errors import InputError
+from orchestrator.digits import enumerated
+from orchestrator.errors import InputError, shown, suggestion
 from orchestrator.physics import fluids
 from orchestrator.study import units
+from orchestrator.study.accepted import Taken, at_path
 from orchestrator.study.declare import Part, UnfitError
 from orchestrator.study.fields import FIDELITY, PARTS, default_of, table_of
 from orchestrator.study.keys import Table, Tables
@@ -55,8 +57,6 @@ class Point(Protocol):
 
 
 Made = TypeVar("Made", bound=Point)
-TAGS = ("", "rows", "float", "str")
-"""Names of the members of unions, which are no keys."""
 Hint = Callable[[Sequence[str], str], tuple[str, str] | None]
 """Says of the path of an unknown key, and of the kind of its bed, what is wrong and
 what to do; None where it is no more than unknown."""
@@ -383,10 +383,12 @@ def explained(
     error: ValidationError,
     where: str,
     tables: Mapping[str, type[Part]],
-    keys: Mapping[str, Sequence[str]],
+    tops: Mapping[str, type[Part]],
     hint: Hint,
 ) -> InputError:
     """Refuse a file's tables, for the first thing that is wrong in them.
+
+    Other fields that are not accepted are named behind it.
 
     Parameters
     ----------
@@ -396,7 +398,7 @@ def explained(
         The file, for messages.
     tables
         The tables that a file may have.
-    keys
+    tops
         The keys at its top under the empty name, and those of a ``group``.
     hint
         What is said of an unknown key.
@@ -407,60 +409,86 @@ def explained(
         The refusal.
     """
     # a misspelt key says more than the field that is missing because of it
-    first = min(
+    found = sorted(
         error.errors(),
         key=lambda e: e["type"] != "extra_forbidden" and "sizes" not in e["loc"],
     )
+    first = found[0]
     cause = first.get("ctx", {}).get("error")
     if isinstance(cause, UnfitError):
         return InputError(cause.what, f"{where}: {cause.field}", cause.remedy)
-    path = [*first["loc"]]
-    own = keys[""]
+    path, top = [*first["loc"]], tops[""]
     if path[0] == "group" and len(path) > 2:
         where = place_of(where, int(path[1]))
-        path = path[2:]
-        own = keys["group"]
-    branch = ""
-    if path[0] == "bed" and path[1:] and path[1] in ("grain", "pile"):
-        branch = str(path.pop(1))
-    names = [str(step) for step in path if step not in TAGS]
-    name = ".".join(names)
+        path, top = path[2:], tops["group"]
     value = first.get("input")
-    place = f"{where}: {name}"
+    if first["type"] == "extra_forbidden":
+        name, within = at_path(top, tables, path[:-1])
+        key = f"{name}.{path[-1]}" if name else str(path[-1])
+        known = hint(key.split("."), _branch(path))
+        what, remedy = known or ("", _meant(key, value, within, top, tables))
+        return InputError(what or "unknown key", f"{where}: {key}", remedy)
+    name, taken = at_path(top, tables, path)
     if first["type"] == "missing":
-        return InputError("is missing", place, "add it to the file")
-    if first["type"] != "extra_forbidden":
-        return _not_accepted(value, first["msg"], place)
-    known = hint(names, branch)
-    if known is not None:
-        what, remedy = known
-        return InputError(what, place, remedy)
-    return InputError("unknown key", place, _meant(names, value, own, tables))
+        return InputError("is missing", f"{where}: {name}", "add it to the file")
+    others = dict.fromkeys(_other(each, name, top, tables) for each in found)
+    others.pop("", None)
+    remedy = _remedy(value, taken, first["msg"])
+    if others:
+        remedy += f"; not accepted either: {enumerated([*others])}"
+    return InputError(f"{shown(value)} is not accepted", f"{where}: {name}", remedy)
 
 
-def _not_accepted(value: Any, message: str, place: str) -> InputError:
-    """The refusal of a value, in the words of a study file."""
-    remedy = message.lower().replace("dictionary", "table").replace("tuple", "list")
-    if "an instance of" in remedy:
-        remedy = "write the name of a file, in quotes"
-    if isinstance(value, str):
-        remedy = units.meant(value) or remedy
-    return InputError(f"{value!r} is not accepted", place, remedy)
+def _branch(path: Sequence[str | int]) -> str:
+    """The kind of bed that a path leads through, if any."""
+    is_named = path[:1] == ["bed"] and path[1:2] and path[1] in ("grain", "pile")
+    return str(path[1]) if is_named else ""
+
+
+def _remedy(value: object, taken: Taken | None, message: str) -> str:
+    """What to write in place of a value that is not accepted."""
+    said = f"write {taken.said}" if taken and taken.said else message
+    if not isinstance(value, str):
+        return said
+    near = suggestion(value, taken.words) if taken else ""
+    if near:
+        said = f"{near} Else {said}"
+    return units.meant(value) or said
+
+
+def _other(
+    error: Mapping[str, Any], first: str, top: type[Part], tables: Mapping[str, Any]
+) -> str:
+    """The field of another value that is not accepted; empty for what is none."""
+    path = error["loc"]
+    if error["type"] in ("missing", "extra_forbidden", "value_error"):
+        return ""
+    if path[:1] == ("group",):
+        return ""
+    name, taken = at_path(top, tables, path)
+    if taken and taken.also and isinstance(error["input"], str):
+        return ""  # it was not worked out, for want of what it is a part of
+    name = name.partition("[")[0]
+    return "" if name == first.partition("[")[0] else name
 
 
 def _meant(
-    names: Sequence[str],
+    unknown: str,
     value: Any,
-    keys: Sequence[str],
+    within: Taken | None,
+    top: type[Part],
     tables: Mapping[str, type[Part]],
 ) -> str:
-    """The key that an unknown one is nearest to, or the page that lists all.
+    """The key that an unknown one is nearest to, or those that there are.
 
     Of an unknown table its name is compared first, then the keys in it.
     """
-    here = ".".join(names[:-1])
+    here, _, last = unknown.rpartition(".")
+    if within and here not in tables:
+        keys = within.keys
+        return suggestion(last, keys) or f"known keys: {enumerated(keys)}"
     written = {}
-    for key in keys:
+    for key in top.model_fields:
         if key not in tables:
             written[key] = f"{key}, above the first table"
     for table in reversed([*tables]):
@@ -468,11 +496,9 @@ def _meant(
             written[key] = f"{table}.{key}"
     if "method" in tables:
         written["fidelity"] = FIDELITY
-    if here in tables:
-        keys = [*tables[here].model_fields]
-    for key in keys:
+    for key in tables.get(here, top).model_fields:
         written[key] = key
-    words = [names[-1], *(value if isinstance(value, dict) else ())]
+    words = [last, *(value if isinstance(value, dict) else ())]
     for word in words:
         for near in difflib.get_close_matches(word, written, n=1):
             return f"did you mean {written[near]}?"

@@ -11,6 +11,7 @@ from orchestrator.digits import rounded
 from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.runs.files import canonical_json, digest_text
+from orchestrator.study import units
 from orchestrator.study.declare import UnfitError
 from orchestrator.study.method import LEAST_FLOWS, Method
 from orchestrator.study.methods import ThresholdMethod
@@ -305,7 +306,8 @@ def roughness_length(text: str, diameter: float, mixture: Sizes | None = None) -
     match = re.fullmatch(form, text, re.ASCII)
     if not match or float(match[2]) == 0:
         what = f"{text!r} is not a length"
-        raise UnfitError("bed.roughness", what, 'write metres, or "d/30"')
+        remedy = units.meant(text) or 'write metres, or a part of the diameter, "d/30"'
+        raise UnfitError("bed.roughness", what, remedy)
     size = diameter
     if match[1]:
         size = percentile(mixture, diameter, int(match[1]) / 100)

@@ -20,7 +20,7 @@ from typing import Annotated, Any, Generic
 from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
 from typing_extensions import TypeVar
 
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, shown, suggestion
 from orchestrator.study import units
 from orchestrator.study.closed_form import resolved
 from orchestrator.study.declare import List, Part, UnfitError
@@ -215,8 +215,8 @@ class Kind(Generic[S]):
         InputError
             The refusal.
         """
-        keys = {"": [*self.file.model_fields], "group": [*_Group.model_fields]}
-        return explained(error, where, self.tables, keys, self.hint)
+        tops: dict[str, type[Part]] = {"": self.file, "group": _Group}
+        return explained(error, where, self.tables, tops, self.hint)
 
 
 Beds = Mapping[str, Callable[[], Kind[Any]]]
@@ -691,7 +691,11 @@ def _name_shape(bed: Table, where: str) -> None:
         raise InputError(what, f"{where}: bed.kind", "see docs/surface.md")
     elif kind not in ("grain", "pile"):
         remedy = f"write grain, pile, or a shape: {', '.join(SHAPES)}"
-        raise InputError(f"{kind!r} is no bed", f"{where}: bed.kind", remedy)
+        near = suggestion(str(kind), ["grain", "pile", "surface", *SHAPES])
+        if near:
+            remedy = f"{near} Else {remedy}"
+        what = f"{shown(kind)} is no kind of bed"
+        raise InputError(what, f"{where}: bed.kind", remedy)
 
 
 def _write_method(tables: Tables, is_level: bool, where: str) -> None:

@@ -117,19 +117,23 @@ BAD = [
     ("[grian]\ndiameter = 1e-3\n", "grian", "did you mean grain"),
     ("[grain]\ndiametre = 1e-3\n", "grain.diametre", "did you mean diameter"),
     ("[grain]\n", "grain.diameter", "missing"),
-    ("[grain]\ndiameter = nan\n", "grain.diameter", "finite"),
+    ("[grain]\ndiameter = nan\n", "grain.diameter", "write a number from 1e-07 to"),
     (GRAIN + "density = 0.5\n", "grain.density", "not above the fluid's"),
     (GRAIN + "[bed]\nroughness = 'd'\n", "bed.roughness", "d/30"),
     (GRAIN + "[bed]\nkind = 'flatt'\n", "bed.kind", "write grain, pile, or a shape: "),
     ("fluid = { kind = 'air', density = 1.2 }\n", "fluid.density", "air has its own"),
-    ("fluid.temperature_deg_c = 5\n", "fluid.kind", "choose water, seawater, air"),
+    (
+        "fluid.temperature_deg_c = 5\n",
+        "fluid.kind",
+        "write one of water, seawater, air",
+    ),
     (
         "fluid = { kind = 'air', temperature_deg_c = 288 }\n",
         "fluid.temperature_deg_c",
         "-80",
     ),
     (GRAIN + "[bed]\nheight = 0.02\n", "bed.height", 'kind = "pile"'),
-    (GRAIN + "[forces]\nlaw = 'bridge'\n", "forces.law", "'bridged', "),
+    (GRAIN + "[forces]\nlaw = 'bridge'\n", "forces.law", "did you mean bridged?"),
     (
         "[threshold]\ngravity = 3.7\n",
         "threshold.gravity",
@@ -159,7 +163,7 @@ BAD = [
     (
         f'{PILE}[axes]\n"method.flow.model" = ["hill"]\n',
         "method.flow.model",
-        "'solve', 'waves' or 'flat'",
+        'one of "solve", "waves", "flat"',
     ),
     (PILE + "height = 2e-3\n", "bed.height", "at least 0.005 m"),
     (
@@ -188,12 +192,12 @@ BAD = [
     ("[axes]\ndiameter = [1e-3]\n", "axes.diameter", "grain.diameter"),
     ("[axes]\n'grain.diameter' = 1e-3\n", "axes.grain.diameter", "list"),
     *((f"[axes]\n{axes}", "axes", "are one scene") for axes in AXES),
-    (f"time_limit = nan\n{GRAIN}", "time_limit", "should be"),
-    ("group = []\n", "group", "at least 1"),
+    (f"time_limit = nan\n{GRAIN}", "time_limit", "write a number above 0 to"),
+    ("group = []\n", "group", "write a list of one or more tables"),
     ("[[group]]\ncolour = 1\n", "group 1: colour", "known keys"),
     ("[[group]]\n[group.grain]\ndiametre = 1\n", "group 1: grain.diametre", "diameter"),
     *(
-        (f"seeds = {seeds}\n{PILE}", "seeds", "should be")
+        (f"seeds = {seeds}\n{PILE}", "seeds", "a whole number from 0 to 1000")
         for seeds in ("-1", "true", "2000")
     ),
 ]
