@@ -18,7 +18,8 @@ from orchestrator.fidelity.decision import with_criterion, written
 from orchestrator.pipeline import Finished
 from orchestrator.plan import Plan
 from orchestrator.report import page, style
-from orchestrator.report.page import Section
+from orchestrator.report.page import Paragraphs, Section
+from orchestrator.report.remarks import NOT_AS_PLANNED
 from orchestrator.runs import case, reuse, workspace
 from orchestrator.runs.engine import Display
 from orchestrator.runs.files import Folder
@@ -309,8 +310,22 @@ class Experiment(ABC):
                     folder.put(path, content)
                 solvers = case.programs(cases, self.planned.cases)
                 name = space.page.name
-                page.write_experiment(self.title, made.page, folder, name, solvers)
-        return made.page
+                sections = _with_caveats(made.page, runs)
+                page.write_experiment(self.title, sections, folder, name, solvers)
+        return sections
+
+
+def _with_caveats(sections: Sequence[Section], runs: Runs) -> Sequence[Section]:
+    """Put what runs say of themselves behind the answer."""
+    told = []
+    for name in runs.done:
+        said = case.said_of(runs.cases / name)
+        if said:
+            told.append(f"{NOT_AS_PLANNED} {name}: {said}.")
+    if not told:
+        return sections
+    answer, *others = sections
+    return [answer, Section("", [Paragraphs("\n\n".join(told))]), *others]
 
 
 def piles(study: Study) -> dict[Scene, PileBed]:

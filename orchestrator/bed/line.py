@@ -389,7 +389,9 @@ def of_bed(bed: PileBed) -> BedLine:
         corners = np.column_stack([bed.profile.x, bed.profile.z])
     else:
         corners = _train(bed.form.corners(bed), bed.forms, bed.spacing)
-    for obstacle in bed.obstacles:
+    # the line of a bed does not depend on which obstacle is written first
+    in_order = sorted(bed.obstacles, key=lambda obstacle: obstacle.x)
+    for obstacle in in_order:
         start = obstacle.x - obstacle.reach
         end = obstacle.x + obstacle.reach
         if start < corners[0, 0]:
@@ -397,7 +399,7 @@ def of_bed(bed: PileBed) -> BedLine:
         if end > corners[-1, 0]:
             corners = np.vstack([corners, [end, corners[-1, 1]]])
     line = between_flats(corners, bed.relief)
-    for obstacle in sorted(bed.obstacles, key=lambda obstacle: obstacle.x):
+    for obstacle in in_order:
         add = _with_porous if obstacle.is_porous else _with_obstacle
         line = add(line, obstacle)
     return line

@@ -42,6 +42,8 @@ PAPER_FLUID = Remark(
     "The gas is that of the article, of 1 kg/m³, in which a grain counts as entrained "
     'when it leaves its pocket. For real air write `fluid.kind = "air"`.',
 )
+NOT_AS_PLANNED = "A run did not go as planned."
+"""Before what such a run says of itself."""
 ROUGHER_M = (1e-4, 1e-3)
 """Roughness lengths of ground over which the wind is told, too, m: of rippled sand, and
 of stones or low plants."""
@@ -295,7 +297,7 @@ def _of_runs(results: Results) -> Iterator[Remark]:
     for name in results.plan.cases:
         told = said_of(results.cases / name)
         if told:
-            yield Remark("A run did not go as planned.", f"{name}: {told}.")
+            yield Remark(NOT_AS_PLANNED, f"{name}: {told}.")
 
 
 def _of_piles(results: Results, piles: pd.DataFrame) -> Iterator[Remark]:

@@ -7,7 +7,7 @@ are about the question.
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from operator import attrgetter
-from typing import Any
+from typing import Any, get_args
 
 from pydantic.fields import FieldInfo
 
@@ -167,6 +167,27 @@ def default_of(name: str) -> Any:
     """
     table, _, field = name.rpartition(".")
     return PARTS[table].model_fields[field].default
+
+
+def inner_fields(name: str) -> Mapping[str, FieldInfo]:
+    """Find the fields of a field that is a table itself, such as those of gusts.
+
+    Parameters
+    ----------
+    name
+        The name of the field in a study file.
+
+    Returns
+    -------
+    dict of str to FieldInfo
+        Their declarations by their names; none of a field that is no table.
+    """
+    table, _, field = name.rpartition(".")
+    found: dict[str, FieldInfo] = {}
+    for kind in get_args(PARTS[table].model_fields[field].annotation):
+        if isinstance(kind, type) and issubclass(kind, Part):
+            found |= kind.model_fields
+    return found
 
 
 def plain(value: Any) -> Any:

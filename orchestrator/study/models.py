@@ -88,6 +88,14 @@ class Flat(FlowModel):
     meaning = "log law of a flat bed, u* = u*₀"
     follows_bed = False
 
+    def misfit(self, question: Question) -> UnfitError | None:
+        """Say why nothing stands in an undisturbed flow."""
+        assert isinstance(question.bed, PileBed)
+        if question.bed.obstacles:
+            what = "the undisturbed flow knows no obstacle"
+            return UnfitError("method.flow.model", what, f'choose "{SOLVE.name}"')
+        return None
+
 
 SOLVE, WAVES, FLAT = Solve(), Waves(), Flat()
 MODELS: dict[str, FlowModel] = {each.name: each for each in (SOLVE, WAVES, FLAT)}

@@ -253,7 +253,7 @@ class Gusts(Part):
     """standard deviation of the stress over its mean"""
     events: Annotated[int, Field(ge=2, le=10**9)]
     """how many independent events there are while the bed is watched"""
-    duration: Annotated[float, Field(ge=0.05, le=1e4)] = 1.0
+    duration: float = field(1.0, scope="DEM of piles", ge=0.05, le=1e4)
     """how long each lasts, √(d/g′); by default as an eddy of 3 d takes to pass in
     water"""
 

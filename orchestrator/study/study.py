@@ -23,7 +23,7 @@ from typing_extensions import TypeVar
 from orchestrator.errors import InputError, shown, suggestion
 from orchestrator.study import units
 from orchestrator.study.closed_form import resolved
-from orchestrator.study.declare import List, Part, UnfitError
+from orchestrator.study.declare import List, Part, UnfitError, info_of
 from orchestrator.study.fidelities import AUTO, fields_of
 from orchestrator.study.fields import (
     FIELDS,
@@ -32,6 +32,7 @@ from orchestrator.study.fields import (
     SEED,
     Quantity,
     default_of,
+    inner_fields,
 )
 from orchestrator.study.hints import HINTS
 from orchestrator.study.keys import Table, Tables, by_name, nested
@@ -54,7 +55,7 @@ from orchestrator.study.reading import (
     tables_of,
 )
 from orchestrator.study.scene import Scene, roughness_length
-from orchestrator.study.scopes import BY
+from orchestrator.study.scopes import APPLIES, BY
 from orchestrator.study.shapes import SHAPES
 from orchestrator.study.sieve import SieveTable
 from orchestrator.study.source import Source, presets
@@ -596,9 +597,24 @@ def _check_effect(
         if isinstance(value, list):
             value = tuple(value)
         if value != default_of(each.name) and not any(map(each.applies, scenes)):
-            what = f"it has an effect on {each.info.scope} alone"
-            remedy = f"leave it out, or {BY[each.info.scope]}"
-            raise InputError(what, f"{where}: {each.name}", remedy)
+            raise _without_effect(f"{where}: {each.name}", each.info.scope)
+        if isinstance(value, dict):
+            _check_inner(each.name, value, scenes, where)
+
+
+def _check_inner(name: str, table: Table, scenes: Sequence[Any], where: str) -> None:
+    """Refuse a key of a field that is a table, if it has an effect on no scene."""
+    for key, declared in inner_fields(name).items():
+        scope = info_of(declared).scope
+        is_written = table.get(key, declared.default) != declared.default
+        if is_written and not any(map(APPLIES[scope], scenes)):
+            raise _without_effect(f"{where}: {name}.{key}", scope)
+
+
+def _without_effect(place: str, scope: str) -> InputError:
+    """The refusal of what has an effect on other scenes alone."""
+    what = f"it has an effect on {scope} alone"
+    return InputError(what, place, f"leave it out, or {BY[scope]}")
 
 
 def _axes(file: File, table: "_Group", where: str) -> dict[str, list[Any]]:

@@ -83,6 +83,17 @@ def test_a_flat_beds_height_moves_nothing_behind_a_fence() -> None:
     assert len({scene.first_cell_height for scene in scenes}) == 1
 
 
+@pytest.mark.parametrize("kind", ["fence", "block", "half-cylinder"])
+def test_no_obstacle_stands_in_an_undisturbed_flow(kind: str) -> None:
+    """It would change nothing, and be told beside the answer."""
+    obstacle = f'obstacles = [{{ kind = "{kind}", x = -0.1, height = 0.02 }}]'
+    text = TEXT.replace('"d/30"', f'"d/30", {obstacle}')
+    refused = r'method\.flow\.model: the undisturbed flow .* \(choose "solve"\)'
+    with pytest.raises(InputError, match=refused):
+        study.parse(f'{text}model = "flat"', name="t", where="t")
+    assert study.parse(f'{text}model = "waves"', name="t", where="t").scenes
+
+
 def test_a_slow_solve_keeps_its_first_cells() -> None:
     """Its viscosity is lowered instead: the wall is rough, and the stress scales with the speed."""
     for pile in piles('[axes]\n"method.flow.speed" = [0.5, 1.0, 10.0]\n'):

@@ -288,3 +288,59 @@ def test_every_field_changes_a_study(outcomes: dict[str, dict[str, str]]) -> Non
     effects = chain.from_iterable(of_study.items() for of_study in outcomes.values())
     changing = {field for field, outcome in effects if outcome == "another"}
     assert changing == {field.name for field in FIELDS}
+
+
+INNER: Mapping[str, tuple[Asked, Asked]] = {
+    "flow.gusts": (
+        {"intensity": 0.4, "events": 100, "duration": 1.0},
+        {"intensity": 0.5, "events": 50, "duration": 2.0},
+    ),
+    "bed.obstacles": (
+        {"kind": "block", "x": -0.1, "height": 0.01, "length": 0.02},
+        {"kind": "half-cylinder", "x": -0.12, "height": 0.012, "length": 0.03},
+    ),
+    "grain.sizes": (
+        {"sigma_g": 1.3, "smallest": 0.7, "largest": 1.5},
+        {"sigma_g": 1.2, "smallest": 0.65, "largest": 1.4},
+    ),
+}
+"""Tables that are fields, and another value for each of their keys."""
+
+
+def _inner_outcomes(name: str, fields: Asked) -> Iterator[tuple[str, str]]:
+    """What becomes of a study by each key of a table, where it takes the table."""
+    table, others = INNER[name]
+
+    def with_(keys: Asked) -> Asked:
+        return {**fields, name: [keys] if name == "bed.obstacles" else keys}
+
+    try:
+        before = _found(_study(with_(table)))
+    except InputError:
+        return
+    for key, other in others.items():
+        changed = {**table, key: other}
+        if other == "half-cylinder":
+            del changed["length"]
+        try:
+            after = _found(_study(with_(changed)))
+        except InputError:
+            yield key, "refused"
+        else:
+            yield key, "the same" if after == before else "another"
+
+
+@pytest.mark.parametrize("name", INNER)
+def test_a_key_that_is_changed_alone_changes_a_run_or_an_answer_or_is_refused(
+    name: str,
+) -> None:
+    found: dict[str, set[str]] = {}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for fields in STUDIES.values():
+            for key, outcome in _inner_outcomes(name, fields):
+                found.setdefault(key, set()).add(outcome)
+    assert not [key for key, of_key in found.items() if "the same" in of_key]
+    assert [key for key, of_key in found.items() if "another" in of_key] == [
+        *INNER[name][1]
+    ]

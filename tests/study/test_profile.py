@@ -191,7 +191,7 @@ def surveyed(mirrored: bool = False) -> str:
 TOWARDS = """
 grain = {{ diameter = 1e-3 }}
 flow.towards = "{towards}"
-method.flow.model = "flat"
+method.flow.model = "waves"
 [bed]
 kind = "pile"
 profile = "scan.csv"
@@ -401,7 +401,9 @@ AWAY = points(
 def test_what_is_not_on_a_profile_is_refused_in_one_line(
     field: str, message: str, method: str, towards: str, tmp_path: Path
 ) -> None:
-    text = STUDY.replace('"scan.csv"', f'"scan.csv", {field}')
+    # an obstacle stands in no undisturbed flow
+    text = STUDY.replace('"flat"', '"waves"')
+    text = text.replace('"scan.csv"', f'"scan.csv", {field}')
     text += f'method.kind = "{method}"\nflow.towards = "{towards}"\n'
     scene = scene_of(tmp_path, AWAY, text)
     with pytest.raises(InputError, match=re.escape(message)):
