@@ -191,11 +191,19 @@ def check(question: Question) -> None:
         what = "each update is a solve of the flow"
         raise UnfitError("threshold.update", what, f"0, or at least {LEAST_UPDATE:g}")
     _check_top(question.flow)
+    _check_fractions(question.threshold.fractions)
     _check_criterion(question)
     if isinstance(question.bed, PileBed):
         _check_pile(question, question.bed)
     else:
         _check_single_grain(question)
+
+
+def _check_fractions(fractions: tuple[float, ...]) -> None:
+    for one, other in pairwise(sorted(fractions)):
+        if rounded(one) == rounded(other):
+            what = f"{one:g} stands twice"
+            raise UnfitError("threshold.fractions", what, "list each value once")
 
 
 def why_not_sustained(question: Question) -> str:

@@ -441,15 +441,19 @@ class _Sieving:
 
     def _lines(self) -> list[_Line]:
         """Number, openings and amounts of each line, the coarsest first."""
-        found = []
+        found: list[_Line] = []
+        totals: list[tuple[int, dict[int, str]]] = []
         first = next(iter(self.values))
         columns = [*self.values, self.size, *self.other_sizes]
         for line, cells in self.table.cells(columns):
             amounts = [cell.rstrip("% ") for cell in cells[: len(self.values)]]
             size = next(filter(None, cells[len(self.values) :]), "")
-            if size.lower().strip(" :") in TOTALS or not any([size, *amounts]):
+            if not any([size, *amounts]):
                 continue
             place = f"{self.where}: line {line}"
+            if size.lower().strip(" :") in TOTALS:
+                totals.append((line, dict(zip(self.values, amounts, strict=True))))
+                continue
             opening = self._opening(size, place)
             given = {}
             for at, cell in zip(self.values, amounts, strict=True):
@@ -463,11 +467,34 @@ class _Sieving:
             what = "one class lies between two sieves"
             raise InputError(what, self.where, "give two sieves at least")
         found.sort(key=lambda each: (-each[1][1], -each[1][0]))
+        for line, of in totals:
+            self._check_total(found, line, of)
         for (_, one, _), (line, other, _) in pairwise(found):
             if one == other:
                 what = f"{other[1]:g} mm stands twice"
                 raise InputError(what, f"{self.where}: line {line}", "leave one line")
         return found
+
+    def _check_total(
+        self, lines: Sequence[_Line], line: int, totals: Mapping[int, str]
+    ) -> None:
+        """Refuse a total that is not the sum of what stays on the sieves."""
+        place = f"{self.where}: line {line}"
+        for at, cell in totals.items():
+            if self.values[at] != "retained" or not cell:
+                continue
+            name = self.table.names[at]
+            (total,) = _numbers([cell], [name], self.marks, place)
+            amounts = [given[at] for _, _, given in lines if at in given]
+            if [*amounts] == sorted(amounts) and total == amounts[-1]:
+                continue  # the column has sums, which end with the total
+            off = abs(sum(amounts) - total)
+            if off > OFF_COLUMNS / 100 * abs(total):
+                what = f"{name}: the total is {total:g}, and the lines add up to "
+                what = f"{what}{sum(amounts):.6g}"
+                raise InputError(
+                    what, place, "mend a line, or remove that of the total"
+                )
 
     def _opening(self, cell: str, place: str) -> tuple[float, float]:
         """The openings that a cell names, mm; 0 of the pan."""

@@ -185,11 +185,12 @@ def decoded(content: bytes, where: str, *, is_data: bool = False) -> str:
     for mark, (what, remedy) in NO_TEXT.items():
         if content.startswith(mark):
             raise InputError(what, where, remedy)
+    encoding = _encoding(content)
     try:
-        text = content.decode(_encoding(content))
-    except ValueError as error:
+        text = content.decode(encoding)
+    except UnicodeDecodeError as error:
         if not is_data or b"\0" in content:
-            raise _unreadable(error, where) from None
+            raise _undecoded(content, error.start, where) from None
         text = content.decode("cp1252", errors="replace")
     if "\0" in text:
         raise _unreadable(ValueError("binary, not text"), where)
@@ -207,6 +208,18 @@ def _encoding(content: bytes) -> str:
             return encoding
     # some editors begin with a mark of the encoding
     return "utf-8-sig"
+
+
+def _undecoded(content: bytes, place: int, where: str) -> InputError:
+    """The refusal of a content in which a place is no letter of its encoding."""
+    encoding = _encoding(content)
+    is_marked = encoding == "utf-16"
+    if b"\0" in content and not is_marked:
+        return _unreadable(ValueError("binary, not text"), where)
+    name = "UTF-16" if is_marked else "UTF-8"
+    line = content[:place].decode(encoding, errors="replace").count("\n") + 1
+    what = f"its text has a letter that is not in {name}"
+    return InputError(what, f"{where}: line {line}", "save the file as UTF-8")
 
 
 def _unreadable(error: Exception, where: str) -> InputError:

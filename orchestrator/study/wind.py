@@ -19,6 +19,8 @@ from orchestrator.digits import percent, rounded
 from orchestrator.errors import InputError
 from orchestrator.study import compass
 from orchestrator.study.cells import Marks, TextTable, marks_of, read_cells
+from orchestrator.study.heads import name_of
+from orchestrator.study.lengths import FEET, FOOT, LENGTHS, METRE
 from orchestrator.types import FloatArray
 
 USUAL_HEIGHT = 10.0
@@ -44,8 +46,14 @@ MISSING = (
 )
 """Words for no observation."""
 NO_SPEED = (99.9, 99.99, 999.0, 999.9, 999.99, 9999.0, 9999.9, 32767.0)
-NO_DIRECTION = (990.0, 999.0, 999.9, 9999.0, 32767.0)
-"""Numbers for none; 990 is a variable direction."""
+"""Numbers for none, where no wind is so strong in the unit of the file."""
+STRONGEST = 40.0
+"""Mean speed above which such a number is no wind, m/s."""
+VARIABLE = (990.0, 999.0)
+"""Numbers for a wind of no direction. Airports write 999 for a variable direction as
+for one that was not observed (ISD, NOAA)."""
+NO_DIRECTION = (999.9, 9999.0, 32767.0)
+"""Numbers for a direction that was not observed, as all below -900."""
 FIELDS: Mapping[str, tuple[str, ...]] = {
     "direction": (
         "from",
@@ -177,15 +185,20 @@ SPEEDS: Mapping[str, float] = {
     "kt": 1852 / 3600,
     "kn": 1852 / 3600,
     "mph": 0.44704,
-    "ft/s": 0.3048,
+    "ft/s": FOOT,
+    "fps": FOOT,
 }
 """Units of speeds, m/s."""
 _UNIT = "|".join(map(re.escape, SPEEDS))
 UNIT = re.compile(rf"(?<![a-z0-9])[(\[]?({_UNIT})[)\]]?(?![a-z0-9])", re.IGNORECASE)
 HEIGHT = re.compile(
-    r"(?:at|in|@|h ?=)? ?(?<![\d.,])(\d+(?:[.,]\d+)?) ?m(?![a-z/_])", re.IGNORECASE
+    rf"(?:at|in|@|h ?=)? ?(?<![\d.,])(\d+(?:[.,]\d+)?) ?"
+    rf"({'|'.join((*FEET, *METRE))})(?![a-z/]|_s\b)",
+    re.IGNORECASE,
 )
-"""A height in the name of a column: wind_speed_10m, WS50M, speed at 2 m."""
+"""A height in the name of a column: wind_speed_10m, WS50M, speed at 33 ft."""
+HEIGHTS = ("z", "height", "höhe", "hoehe", "hoogte")
+"""Columns of the height of winds."""
 CLASS = re.compile(
     r"([<>≥≤]?)=? ?(\d+(?:[.,]\d+)?)(?: ?(?:-|–|to|bis|\.\.\.|…|_) ?(<?)"
     r"(\d+(?:[.,]\d+)?))? ?(\+?)"
@@ -310,7 +323,7 @@ def _column(name: str) -> _Column:
     bare = words.replace("_m_s", " m_s").replace("_km_h", " km_h")
     if unit:
         bare = bare[: unit.start()] + " " + bare[unit.end() :]
-    height = HEIGHT.search(bare) or re.search(r"\b[uv]_?(10|100)\b()", bare)
+    height = HEIGHT.search(bare) or re.search(r"\b[uv]_?(10|100)\b(())", bare)
     if height:
         bare = bare[: height.start()] + " " + bare[height.end() :]
         if height.re is not HEIGHT:
@@ -318,7 +331,10 @@ def _column(name: str) -> _Column:
     bare = re.sub(r"\b(deg|degrees|grad|°|degn)\b|°", " ", bare.replace("_", " "))
     plain = " ".join(re.findall(r"[^\W\d]+", bare))
     of_unit = "%" if re.search(r"%|percent|pct", words) else unit[1] if unit else ""
-    at = float(height[1].replace(",", ".")) if height else None
+    at = None
+    if height:
+        metres = LENGTHS[height[2]] if height[2] else 1.0
+        at = rounded(metres * float(height[1].replace(",", ".")))
     found = next((key for key, names in FIELDS.items() if plain in names), "")
     if plain in EASTWARD:
         found = "u"
@@ -386,6 +402,7 @@ class _Reading:
         """Its winds."""
         self.sums = _Sums()
         self.said: list[str] = []
+        self.notes: dict[str, int] = {}
         self.is_knmi = self._has("yyyymmdd") and self._has("fh")
         fields = {column.field: at for at, column in enumerate(self.columns)}
         if _is_dwd(self.table.names):
@@ -454,12 +471,15 @@ class _Reading:
         told = (self.columns[at].height for at in columns)
         named = {height for height in told if height is not None}
         for at, name in enumerate(self.table.names):
-            if name.strip().lower() in ("z", "height", "z_m", "height_m", "höhe"):
+            called = name_of(name)
+            if called.plain in HEIGHTS and not called.datum:
                 cells = {cell for cell in self.table.column(at) if cell}
                 if len(cells) > 1:
                     what = f"{name}: heights from {min(cells)} to {max(cells)}"
                     raise InputError(what, self.where, "give winds of one height")
-                named |= {self._number(cell, name, self.where) for cell in cells}
+                metres = LENGTHS[called.unit or "m"]
+                found = {self._number(cell, name, self.where) for cell in cells}
+                named |= {rounded(metres * height) for height in found}
         if len(named) > 1:
             listed = " and ".join(
                 f"{height:g} m" for height in sorted(named, key=float)
@@ -489,7 +509,9 @@ class _Reading:
         if cell.lower() in MISSING:
             return None
         value = self._number(cell, name, place)
-        if value in NO_SPEED or value <= -9 or math.isnan(value):
+        is_mark = value in NO_SPEED and factor * value > STRONGEST
+        if is_mark or value <= -9 or math.isnan(value):
+            self._note(name, f"{value:g}", "no speed")
             return None
         speed = rounded(factor * value)
         if not 0 <= speed <= FASTEST:
@@ -505,7 +527,11 @@ class _Reading:
         if bare in self.ways:
             return self.ways[bare]
         value = self._number(cell, name, place)
-        if value in NO_DIRECTION or value <= -900 or math.isnan(value):
+        if value in VARIABLE:
+            self._note(name, f"{value:g}", "a variable or unknown direction")
+            return None
+        if _is_no_direction(value):
+            self._note(name, f"{value:g}", "no observation of a direction")
             return None
         if self.is_knmi and value == 0:
             return None  # a calm at the end of an hour
@@ -513,6 +539,11 @@ class _Reading:
             what = f"{name} {value:g}"
             raise InputError(what, place, "degrees from north over east, 0 to 360")
         return value % 360
+
+    def _note(self, name: str, cell: str, what: str) -> None:
+        """Take note of a number that stands for something else."""
+        key = f"{cell} in {name!r} stands for {what}"
+        self.notes[key] = self.notes.get(key, 0) + 1
 
     def _named_ways(self, cells: Sequence[str]) -> None:
         """Find what the names of sectors mean, whose letters depend on the language."""
@@ -648,10 +679,11 @@ class _Reading:
         order = np.argsort(hours, kind="stable")
         weights, step, span = self._weights(hours, order)
         covered = variable = 0.0
-        for (_, _, direction, speed), weight in zip(
+        for (_, cells, direction, speed), weight in zip(
             (winds[at] for at in order), weights, strict=True
         ):
-            if speed is None:
+            is_unknown = direction is None and self._lacks_direction(cells, fields)
+            if speed is None or (speed > 0 and is_unknown):
                 continue
             covered += weight
             variable += weight if direction is None and speed > 0 else 0.0
@@ -668,6 +700,13 @@ class _Reading:
             told.append(f"{part} without a direction, spread over all directions")
         self.said += told
         return self._made()
+
+    def _lacks_direction(self, cells: Sequence[str], fields: Mapping[str, int]) -> bool:
+        """Whether the cell of a direction is a number for none that was observed."""
+        try:
+            return _is_no_direction(self.marks.number(cells[fields["direction"]]))
+        except (KeyError, ValueError):
+            return False
 
     def _weights(
         self, hours: FloatArray, order: "np.ndarray[tuple[int], np.dtype[np.intp]]"
@@ -758,11 +797,19 @@ class _Reading:
         most = max(blows, default=0.0)
         if self.marks.said:
             self.said.append(self.marks.said)
+        self.said += [
+            f"{note}, {counted(count, 'line')}" for note, count in self.notes.items()
+        ]
         self.said.append(
             f"calm {percent(calms)} of the time, mean {mean:.3g} m/s, at most "
             f"{most:.3g} m/s"
         )
         return Winds(rows, self.height, "; ".join(self.said))
+
+
+def _is_no_direction(value: float) -> bool:
+    """Whether a number stands for a direction that was not observed."""
+    return value in NO_DIRECTION or value <= -900 or math.isnan(value)
 
 
 def _unit_of(cell: str) -> str:

@@ -113,6 +113,10 @@ BAD: dict[str, tuple[str | bytes, str]] = {
 }
 UNFIT = [
     (
+        '"scan.csv" }\nthreshold = { fractions = [0.1, 0.3, 0.1]',
+        r"threshold.fractions: 0.1 stands twice .list each value once",
+    ),
+    (
         '"scan.csv", height = 0.1',
         r"bed.profile: it has its own height \(leave out bed.height",
     ),
@@ -642,5 +646,10 @@ def test_a_study_file_may_be_of_any_unicode_and_no_other(tmp_path: Path) -> None
     source.write_bytes(STUDY.encode("utf-16"))
     assert study.load(str(source)).scenes[0].id == scene_of(tmp_path, GOOD).id
     source.write_bytes(f"title = 'Düne'\n{STUDY}".encode("cp1252"))
-    with pytest.raises(InputError, match=r"not a readable text file.*UTF-8"):
+    message = r"s.toml: line 1: its text has a letter that is not in UTF-8 .save the file as UTF-8"
+    with pytest.raises(InputError, match=message):
+        study.load(str(source))
+    source.write_bytes(STUDY.encode("utf-16")[:-1])
+    message = r"a letter that is not in UTF-16 .save the file as UTF-8"
+    with pytest.raises(InputError, match=message):
         study.load(str(source))

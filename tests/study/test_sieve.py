@@ -87,6 +87,26 @@ def test_sieves_have_the_openings_of_their_numbers() -> None:
     assert table.cuts == (Cut(0.0, 0.00085, 0.2),)
 
 
+@pytest.mark.parametrize("head", ["Sieve (in)", "Sieve"])
+def test_fractions_are_sieves_of_inches(head: str) -> None:
+    table = read_sieve(f"{head},% passing\n1 1/2,100\n3/4,60\n3/8,0\n", "s")
+    means = [(9.5 * 19.0) ** 0.5, (19.0 * 37.5) ** 0.5]
+    assert [1e3 * size for size, _ in table.rows] == pytest.approx(means)
+
+
+def test_openings_in_inches_become_millimetres_and_are_said() -> None:
+    table = read_sieve("Opening (in),% passing\n0.08,100\n0.04,50\n0.02,0\n", "s")
+    sizes = [25.4 * (0.02 * 0.04) ** 0.5, 25.4 * (0.04 * 0.08) ** 0.5]
+    assert [1e3 * size for size, _ in table.rows] == pytest.approx(sizes)
+    assert "'Opening (in)' in in (1 in = 25.4 mm)" in table.said
+
+
+@pytest.mark.parametrize("total", ["100.4", "99.7"])
+def test_a_total_within_the_losses_of_a_sieving_is_taken(total: str) -> None:
+    text = f"Sieve (mm),Retained (g)\n4,0\n2,40\n1,60\nTotal,{total}\n"
+    assert len(read_sieve(text, "s").rows) == 2
+
+
 def test_fines_below_the_last_sieve_are_cut_and_said() -> None:
     table = read_sieve("Sieve (mm),Passing (%)\n4,100\n2,60\n1,3\n", "s")
     assert [part for _, part in table.rows] == pytest.approx([57 / 97, 40 / 97])
@@ -119,6 +139,14 @@ def test_little_on_the_largest_sieve_goes_on_as_the_sieves_do() -> None:
 
 
 REFUSED = {
+    "Sieve (mm),Retained (g)\n4,0\n2,40\n1,60\nTotal,120\n": (
+        r"line 5: Retained \(g\): the total is 120, and the lines add up to 100"
+    ),
+    "Sieve (mm);Retained (%);Passing (%)\n4;0;100\n2;40;60\n1;60;0\nSumme;90;\n": (
+        r"line 5: Retained \(%\): the total is 90, and the lines add up to 100"
+    ),
+    "Sieve (in),Passing (%)\n3/7,100\nNo. 20,0\n": "'3/7' is no sieve of ASTM",
+    "Sieve (mm),Passing (%)\n3/8,100\n2,0\n": "'3/8' is no sieve",
     "Sieve size,Passing (%)\n4,100\n2,0\n": r"line 2: Sieve size: 4 of which unit .*Sieve \(mm\)",
     "Sieve (mm),Retained (%)\n4,0\n2,20\n1,30\n": "add up to 50, not to 100",
     "Sieve (mm),Passing (%)\n4,60\n2,0\n": "60 % pass the largest sieve, not 100",

@@ -7,6 +7,7 @@ import pytest
 
 from orchestrator.errors import InputError
 from orchestrator.study import compass
+from orchestrator.study.source import decoded
 from orchestrator.study.wind import Winds, read_winds
 
 WHERE = "pile.toml: erosion.wind"
@@ -181,6 +182,67 @@ def test_gaps_calms_and_variable_winds_count_for_what_they_are() -> None:
     other = read_winds(head + "\n".join(f"2020-01-01 {row}" for row in lines), WHERE)
     assert other.rows == found.rows
     assert "4 hours with a wind, 2 without" in other.understood
+
+
+def test_numbers_for_no_observation_count_for_nothing_and_are_said() -> None:
+    """ISD writes 9999 for no speed, and 999 for a direction that varies or is none."""
+    rows = ["00:00,4,270", "01:00,9999,90", "02:00,2,999", "03:00,6,9999", "04:00,4,90",
+            "05:00,99.9,90", "06:00,4,-999", "07:00,0,9999"]  # fmt: skip
+    text = "date,ws,wd\n" + "\n".join(f"2020-01-01 {row}" for row in rows)
+    found = read_winds(text, WHERE)
+    shares = {(way, speed): share for way, speed, share in found.rows}
+    assert shares == {
+        (270.0, 4.0): 0.25,
+        (90.0, 4.0): 0.25,
+        (270.0, 2.0): 0.125,
+        (90.0, 2.0): 0.125,
+        (0.0, 0.0): 0.25,
+    }
+    for said in (
+        "4 hours with a wind, 4 without",
+        "9999 in 'ws' stands for no speed, 1 line",
+        "99.9 in 'ws' stands for no speed, 1 line",
+        "999 in 'wd' stands for a variable or unknown direction, 1 line",
+        "9999 in 'wd' stands for no observation of a direction, 2 lines",
+        "-999 in 'wd' stands for no observation of a direction, 1 line",
+        "25 % without a direction",
+    ):
+        assert said in found.understood
+
+
+def test_a_usual_wind_is_no_mark_of_its_unit() -> None:
+    text = "date,ws (km/h),wd\n2020-01-01 00:00,99.9,270\n2020-01-01 01:00,999.9,90\n"
+    found = read_winds(text, WHERE)
+    assert [(way, round(speed, 6), share) for way, speed, share in found.rows] == [
+        (270.0, 27.75, 1.0)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("head", "unit"),
+    [
+        ("time,wind speed 33 ft (mph),wd", 0.44704),
+        ("time,ws_33ft_mph,wd", 0.44704),
+        ("time,Wind Speed at 33 feet (ft/s),wd", 0.3048),
+        ("time,ws,wd,z (ft)", 1.0),
+    ],
+)
+def test_heights_in_feet_and_the_unit_of_speeds_are_both_read(
+    head: str, unit: float
+) -> None:
+    more = ",33" if "z (ft)" in head else ""
+    rows = [f"2020-01-01 {hour:02d}:00,10,270{more}" for hour in range(3)]
+    found = read_winds("\n".join([head, *rows]), WHERE)
+    assert found.height == pytest.approx(10.0584)
+    ((way, speed, share),) = found.rows
+    assert (way, share) == (270.0, 1.0)
+    assert speed == pytest.approx(10 * unit)
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "utf-8", "utf-8-sig", "utf-16"])
+def test_winds_are_read_in_each_encoding(encoding: str) -> None:
+    text = series("Zeit;Windgeschwindigkeit (m/s);Windrichtung (°)", lambda t, d, u: f"{t:%Y-%m-%d %H:%M};{u},0;{d}")  # fmt: skip
+    check(read_winds(decoded(text.encode(encoding), WHERE, is_data=True), WHERE))
 
 
 def test_observations_between_the_hours_do_not_count_twice() -> None:
