@@ -15,6 +15,7 @@ from orchestrator.flow.fence import fence_cells, write_fences
 from orchestrator.flow.foam import (
     INTERPOLATED_DIGITS,
     SolvedFlow,
+    flow_in,
     ordered,
     patch_types,
     start_from,
@@ -29,6 +30,7 @@ from orchestrator.flow.mesh import (
     growth_far,
     made_by_gmsh,
 )
+from orchestrator.flow.profiles import PROFILES, profiles, write_profiles
 from orchestrator.flow.run import Approach, OpenFoamCase, set_values
 from orchestrator.flow.stress import (
     MEAN_SPEED_ERROR,
@@ -105,6 +107,7 @@ class FlowCase(OpenFoamCase[WallStress]):
     above: Flow = field(default_factory=Flow)
 
     kind: ClassVar[str] = "flow"
+    derived: ClassVar[tuple[str, ...]] = (*OpenFoamCase.derived, PROFILES)
     needs_bulky: ClassVar[bool] = True
     mesher: ClassVar[str] = "gmsh"
 
@@ -377,11 +380,17 @@ class FlowCase(OpenFoamCase[WallStress]):
 
     def stress(self, directory: Path) -> tuple[WallStress, float]:
         """Read the stress on the bed, as every flow's."""
-        solved = SolvedFlow(directory)
+        solved = flow_in(directory)
         solved.check()
         stress = solved.stress(self.roughness_m)
         self._check_first_cells(stress, directory)
         return stress, solved.ustar0
+
+    def collect(self, directory: Path) -> None:
+        """Check the run and write its tables, as every flow's, and its profiles."""
+        super().collect(directory)
+        found = profiles(flow_in(directory), self.bed_line)
+        write_profiles(found, directory / PROFILES)
 
     def own_diagnostics(
         self, stress: WallStress, ustar0: float, directory: Path
@@ -391,7 +400,7 @@ class FlowCase(OpenFoamCase[WallStress]):
             "reattachment_over_h": reattachment(stress, self.slope_deg, self.height_m)
         }
         if self.above.depth:
-            speed = SolvedFlow(directory).column_speed()
+            speed = flow_in(directory).column_speed()
             ratio = self.mean_speed_over_log_law(speed, ustar0)
             found["mean_speed_over_log_law"] = near_one(ratio, MEAN_SPEED_ERROR)
         return found

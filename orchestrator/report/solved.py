@@ -1,20 +1,19 @@
 """Solved flows of a study: which are kept, their stress and velocity, their beds."""
 
-from functools import lru_cache
 from itertools import groupby
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from orchestrator.flow.foam import SolvedFlow
+from orchestrator.flow.foam import flow_in
 from orchestrator.grains.pile import Pile
 from orchestrator.report import labels, style
 from orchestrator.report.results import Results
 from orchestrator.report.style import Look
 from orchestrator.report.subjects import place_of_file
-from orchestrator.runs.files import state_of
 from orchestrator.study import fields
 from orchestrator.types import FloatArray
 
@@ -34,21 +33,25 @@ REVERSED: Look = {
     "lw": 0,
 }
 USTAR = "u*/u*₀"
+SMALL_M = 0.5
+"""Height of a bed up to which its lengths are in mm, m."""
+OF_LINE = (
+    "bed_shape",
+    "windward",
+    "lee_slope_deg",
+    "brink_radius",
+    "length",
+    "forms",
+    "spacing",
+    "profile",
+    "towards",
+    "obstacles",
+    "flow_top",
+    "depth_m",
+)
+"""Fields of a scene, besides its slope and height, that shape the flow over its bed."""
 Window = tuple[float, float, float, float]
 """Left, right, bottom, top."""
-
-
-def _solved(directory: Path) -> SolvedFlow:
-    """The flow in the directory of a case, as it is now."""
-    mesh = directory / "constant" / "polyMesh"
-    states = tuple(state_of(mesh / name) for name in ("points", "faces", "owner"))
-    return _solved_once(directory, states)
-
-
-@lru_cache(maxsize=16)
-def _solved_once(directory: Path, mesh: tuple[tuple[int, ...], ...]) -> SolvedFlow:
-    """The flow in the directory; its mesh is read once, in a fifth of a second."""
-    return SolvedFlow(directory)
 
 
 def title(results: Results, pile: Pile) -> str:
@@ -59,7 +62,7 @@ def title(results: Results, pile: Pile) -> str:
     str
         The title of its panel; that of a profile says where its x/h is zero.
     """
-    names = ["alpha_deg", "h_m", "z0_m", *results.flow_fields]
+    names = ["alpha_deg", "h_m", "z0_m", *varied(results)]
     values = [fields.COLUMNS[name].used(pile.scene) for name in names]
     title = labels.panel(pd.Series(values, names, dtype=object), names)
     profile = pile.bed.profile
@@ -69,20 +72,32 @@ def title(results: Results, pile: Pile) -> str:
     return f"{title}, {zero} towards {profile.towards}"
 
 
+def varied(results: Results) -> list[str]:
+    """List the fields, of the bed line and of the solve, in which flows differ.
+
+    Returns
+    -------
+    list of str
+        The columns.
+    """
+    beds = results.beds("pile")
+    lines = [name for name in OF_LINE if beds[name].nunique(dropna=False) > 1]
+    return [*lines, *results.flow_fields]
+
+
 def piles_by_kind(results: Results) -> list[list[Pile]]:
-    """List piles with flows by slope, height and fields that vary.
+    """List piles with flows by slope, height and the fields in which flows differ.
 
     Returns
     -------
     list of list of Pile
         The piles of each kind, by rising z0.
     """
+    differing = varied(results)
 
     def kind(pile: Pile) -> tuple[float, float, str]:
-        varied = [
-            str(fields.COLUMNS[name].used(pile.scene)) for name in results.flow_fields
-        ]
-        return pile.bed.slope_deg, pile.bed.height, ", ".join(varied)
+        texts = [str(fields.COLUMNS[name].used(pile.scene)) for name in differing]
+        return pile.bed.slope_deg, pile.bed.height, ", ".join(texts)
 
     def by_kind_and_roughness(pile: Pile) -> tuple[float, float, str, float]:
         return *kind(pile), pile.bed.roughness
@@ -189,9 +204,49 @@ def over_u_e(
     is_outside = (above < 0) | (z > lid) | is_beside[:, None]
     # a height of 1 stands for those that are not used
     heights = np.where(is_outside, 1.0, np.maximum(above, 1e-12))
-    values = _solved(cases / pile.flow.name).at("U", x, heights, bed)
+    values = flow_in(cases / pile.flow.name).at("U", x, heights, bed)
     grid = np.where(is_outside[..., None], np.nan, values.reshape(*above.shape, 3))
     return np.asarray(grid.swapaxes(0, 1) / pile.scene.method.flow.speed)
+
+
+class Lengths(NamedTuple):
+    """The unit of the lengths of a page: mm of a small bed, else m, or heights.
+
+    Attributes
+    ----------
+    name
+        The unit.
+    scale
+        What a length in m is multiplied with; 0 where the unit is the height.
+    """
+
+    name: str
+    scale: float
+
+    @classmethod
+    def of(cls, pile: Pile) -> "Lengths":
+        """Find the unit of a bed.
+
+        Returns
+        -------
+        Lengths
+            mm of a bed below half a metre; a profile has the metres of its file.
+        """
+        is_small = pile.bed.height < SMALL_M and not pile.bed.profile
+        return cls("mm", 1e3) if is_small else cls("m", 1.0)
+
+    def of_height(self, pile: Pile) -> float:
+        """Find the height of a pile in the unit.
+
+        Returns
+        -------
+        float
+            The height.
+        """
+        return self.scale * pile.bed.height if self.scale else 1.0
+
+
+OVER_H = Lengths("h", 0.0)
 
 
 def draw_bed(ax: Axes, pile: Pile) -> None:

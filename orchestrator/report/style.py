@@ -129,6 +129,12 @@ ARROW = 36.0
 UP, RIGHT = (Path(points, _STROKES) for points in (_ARROW, _ARROW[:, ::-1]))
 """Markers of intervals that are open above, or to the right: arrows of one length."""
 NOTE: Look = {"color": "0.35", "gid": "note"}
+OTHERS: tuple[Look, ...] = (
+    {"color": FLOW, "ls": (0, (5, 2))},
+    {"color": INK, "ls": (0, (1.5, 1.5))},
+    {"color": NONE, "ls": (0, (6, 2, 1.5, 2))},
+)
+"""Looks of what stands beside a solid line in the colour of the answer."""
 
 
 Place = Literal["lead", "under", "", "folded"]

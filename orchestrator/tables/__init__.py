@@ -110,6 +110,10 @@ TABLES: Mapping[str, Listed] = {
     "form": Listed("a form of a train and a fraction: its threshold", (rows.FORM,)),
     "flow": Listed("a solved flow", (rows.FLOW,)),
     "wall_stress": Listed("a place on the bed of a solved flow", (rows.WALL_STRESS,)),
+    "speed_profile": Listed(
+        "a height over a place of the bed of a solved flow: the speed",
+        (rows.SPEED_PROFILE,),
+    ),
     "paired": Listed(
         "a bed with shelter and a fraction: its threshold over that without shelter",
         (paired.PAIRED,),
@@ -198,6 +202,9 @@ def make_tables(study: Study, plan: Plan, cases: Path, done: Container[str]) -> 
         "single_grain": lone.table,
         "wall_stress": _stacked(
             rows.wall_stress(pile, cases) for pile in flows.values()
+        ),
+        "speed_profile": _stacked(
+            rows.speed_profile(pile, cases) for pile in flows.values()
         ),
         "flow": pd.DataFrame([rows.flow(pile, cases) for pile in flows.values()]),
         "pile_grain": _stacked(each.grains for each in told),

@@ -9,9 +9,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from orchestrator.bed.deck import read_texts
 from orchestrator.errors import InputError
 from orchestrator.fidelity import limits, smoothing, spread
 from orchestrator.fidelity.decision import Decision
+from orchestrator.flow.profiles import PROFILES
 from orchestrator.flow.stress import bubble
 from orchestrator.grains import threshold
 from orchestrator.grains.cells import SingleGrainCase
@@ -22,7 +24,7 @@ from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold
 from orchestrator.physics import measured
 from orchestrator.physics.reported import every_unit
-from orchestrator.physics.velocity import outer_roughness
+from orchestrator.physics.velocity import log_law_speed, outer_roughness
 from orchestrator.plan import Plan
 from orchestrator.study import fields
 from orchestrator.study.closed_form import closed_form, law_holds
@@ -399,6 +401,52 @@ def wall_stress(pile: Pile, cases: Path) -> Row:
         "z_m": pile.bed.level(stress.z_m),
         "ustar_over_ustar0_wall": stress.ustar_over_ustar0_wall,
         "ustar_over_ustar0_eq10": stress.ustar_over_ustar0_eq10,
+    }
+
+
+SPEED_PROFILE: Mapping[str, str] = {
+    **several("flow_case"),
+    "profile_at": (
+        "place of a profile of speeds: upstream, in the column before the inlet; toe, "
+        "of the first form; crest, the highest; lee, where the bed behind the crest is "
+        "first within h/100 of its lowest"
+    ),
+    **several("x_m"),
+    "height_over_h": "height over the bed of a speed, over h",
+    "u_over_u_e": "speed downstream over that of the approaching flow at 10 h",
+    "u_over_u_e_log_law": (
+        "speed of the logarithmic law at this height over that at 10 h"
+    ),
+}
+"""Columns of `speed_profile`."""
+
+
+def speed_profile(pile: Pile, cases: Path) -> Row:
+    """List the speeds over a few places of the bed, for the solved flow of a pile.
+
+    Parameters
+    ----------
+    pile
+        The pile.
+    cases
+        The directory of the finished cases.
+
+    Returns
+    -------
+    dict
+        The case, and columns of shape (n,) for n heights over the places.
+    """
+    flow = pile.flow
+    read = read_texts(cases / flow.name / PROFILES)
+    height = read["height_m"].astype(float)
+    law = log_law_speed(flow.ustar0_m_s, height, flow.roughness_m)
+    return {
+        "flow_case": flow.name,
+        "profile_at": read["place"],
+        "x_m": pile.bed.place(read["x_m"].astype(float)),
+        "height_over_h": height / flow.height_m,
+        "u_over_u_e": read["u_m_s"].astype(float) / flow.approach.speed_m_s,
+        "u_over_u_e_log_law": law / flow.approach.speed_m_s,
     }
 
 

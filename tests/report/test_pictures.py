@@ -11,7 +11,7 @@ from orchestrator.bed import packing
 from orchestrator.grains.pile import Pile
 from orchestrator.physics.threshold import thresholds_of
 from orchestrator.report import answers, single, solved, units
-from orchestrator.report.figures import bed, flow, where
+from orchestrator.report.figures import bed, flow, profiles, where
 from orchestrator.report.figures import hills as measured_hills
 from orchestrator.report.figures.bed import Steps
 from orchestrator.report.results import FRACTION, Results
@@ -325,9 +325,11 @@ def test_the_card_of_a_hill_has_the_bubble_or_that_there_is_none(
 
 
 def test_computed_stands_beside_measured(hills: Results) -> None:
-    (figure,) = measured_hills.FIGURE.draw(hills)
-    assert figure.canvas
-    lines = [line for axes in figure.canvas.axes for line in axes.lines]
+    lead, along = measured_hills.FIGURE.draw(hills)
+    assert lead.place == "lead"
+    assert lead.canvas
+    assert along.canvas
+    lines = [line for axes in lead.canvas.axes for line in axes.lines]
     (measured_,) = (line for line in lines if line.get_gid() == "measured")
     np.testing.assert_array_equal(np.asarray(measured_.get_xdata()), 6.5)
     ends = [
@@ -338,7 +340,60 @@ def test_computed_stands_beside_measured(hills: Results) -> None:
     np.testing.assert_allclose(ends, hills.tables["flow"]["reattachment_over_h"])
     tops = [
         np.max(np.asarray(one.get_ydata()))
-        for one in lines
+        for axes in along.canvas.axes
+        for one in axes.lines
         if one.get_gid() == "stress"
     ]
     np.testing.assert_allclose(tops, hills.tables["flow"]["ustar_largest"])
+    said = {str(text.get_text()) for axes in lead.canvas.axes for text in axes.texts}
+    assert said == {"half-length 3 h; measured: to 6.5 h"}
+
+
+def test_models_differ_by_dash_as_well_as_by_colour(hills: Results) -> None:
+    for figure in measured_hills.FIGURE.draw(hills):
+        assert figure.canvas
+        drawn = [
+            (str(line.get_color()), str(line.get_linestyle()))
+            for line in figure.canvas.axes[0].lines
+            if line.get_gid() in ("speed", "stress")
+        ]
+        assert len(drawn) == 2
+        assert drawn[0][0] != drawn[1][0]
+    looks = [(look["color"], str(look["ls"])) for look in profiles.LOOKS]
+    assert len({dash for _, dash in looks}) == len(looks)
+
+
+def test_profiles_stand_over_toe_crest_and_lee_beside_the_law(train: Results) -> None:
+    """Of the first ripple's toe, in the units of the table times the height."""
+    (figure,) = profiles.FIGURE.draw(train)
+    assert figure.canvas
+    assert [axes.get_title(loc="left") for axes in figure.canvas.axes] == [
+        "toe",
+        "crest",
+        "lee",
+    ]
+    assert figure.canvas.axes[0].get_ylabel() == "height above the bed, mm"
+    table = train.tables["speed_profile"]
+    for axes in figure.canvas.axes:
+        rows = table[table["profile_at"] == axes.get_title(loc="left")]
+        (speed,) = (line for line in axes.lines if line.get_gid() == "speed")
+        (law,) = (line for line in axes.lines if line.get_gid() == "log law")
+        np.testing.assert_allclose(np.asarray(speed.get_xdata()), rows["u_over_u_e"])
+        height = np.asarray(speed.get_ydata())
+        np.testing.assert_allclose(height, 10.0 * rows["height_over_h"])
+        expected = np.log1p(height / 0.0333333333) / np.log1p(100.0 / 0.0333333333)
+        np.testing.assert_allclose(np.asarray(law.get_xdata()), expected, rtol=1e-6)
+    # one more place of the flow upstream, beside the same law
+    ahead = table[table["profile_at"] == "upstream"]
+    off = ahead["u_over_u_e"] / ahead["u_over_u_e_log_law"] - 1
+    assert np.abs(off).max() < 0.05
+
+
+def test_a_caption_says_what_the_speeds_do(train: Results, hills: Results) -> None:
+    rows = train.tables["speed_profile"]
+    assert profiles.speeds_up(rows)
+    ahead = rows["profile_at"] == "upstream"
+    slowed = rows.assign(u_over_u_e=rows["u_over_u_e"].where(ahead, -1.0))
+    assert not profiles.speeds_up(slowed)
+    # hills have a figure of their own
+    assert list(profiles.FIGURE.draw(hills)) == []

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,12 +20,12 @@ from orchestrator.report.figures import FigureKind
 from orchestrator.report.figures.fractions import curves_of_card
 from orchestrator.report.page import filled
 from orchestrator.report.results import Results
-from orchestrator.report.solved import FELT, REVERSED, stress_on
+from orchestrator.report.solved import FELT, REVERSED, Lengths, stress_on
 from orchestrator.report.style import (
     ANSWER,
     EDGE,
     FLOW,
-    INK,
+    OTHERS,
     PALE,
     Figure,
     Look,
@@ -46,13 +46,6 @@ GAP = 5.0
 """Two places this many times the middle distance apart are of two stretches."""
 LONG = 0.5
 """Least length of a stretch of reversed flow whose ends are marked, heights."""
-SMALL_M = 0.5
-"""Height of a bed up to which its lengths are in mm, m."""
-OTHERS: tuple[Look, ...] = (
-    {"color": FLOW, "ls": (0, (5, 2))},
-    {"color": INK, "ls": (0, (1.5, 1.5))},
-)
-"""Looks of the beds beside the first on one line."""
 WIDTHS = (style.WIDE, style.NARROW)
 """Widths of the drawings for a wide and for a narrow page, inches."""
 CAPTION = """\
@@ -157,7 +150,7 @@ def _bed(results: Results, beds: Sequence[Bed], panels: tuple[Axes, ...]) -> Non
     top, middle, below = panels
     row, pile = beds[0]
     told = single.quantity_of_row(row)
-    unit = _Unit.of(pile)
+    unit = Lengths.of(pile)
     table = results.tables["pile_grain"].sort_values("x_m")
     limits = []
     for place, (each, other) in enumerate(beds):
@@ -177,19 +170,6 @@ def _bed(results: Results, beds: Sequence[Bed], panels: tuple[Axes, ...]) -> Non
         ax.tick_params(labelbottom=False)
     if np.isfinite(row["first_x_m"]) and row["first_ustar0_m_s"] > 0:
         _first(panels, row, pile, told, unit)
-
-
-class _Unit(NamedTuple):
-    """The unit of the lengths of a bed: mm of a small one, else m."""
-
-    name: str
-    scale: float
-
-    @classmethod
-    def of(cls, pile: Pile) -> "_Unit":
-        """The unit of a bed; a profile has that of its file."""
-        is_small = pile.bed.height < SMALL_M and not pile.bed.profile
-        return cls("mm", 1e3) if is_small else cls("m", 1.0)
 
 
 def _name(beds: Sequence[Bed], place: int) -> str:
@@ -224,7 +204,7 @@ def _thresholds(
     row: pd.Series,
     grains: pd.DataFrame,
     told: ReportedQuantity,
-    unit: _Unit,
+    unit: Lengths,
     place: int,
     name: str,
 ) -> tuple[float, float]:
@@ -292,7 +272,7 @@ def _stress(
     results: Results,
     pile: Pile,
     grains: pd.DataFrame,
-    unit: _Unit,
+    unit: Lengths,
     place: int,
 ) -> None:
     """The signed u* over the undisturbed one: of the flow, and as grains feel it."""
@@ -354,7 +334,7 @@ def _line(
     beds: Sequence[Bed],
     grains: pd.DataFrame,
     told: ReportedQuantity,
-    unit: _Unit,
+    unit: Lengths,
 ) -> None:
     """The bed with its obstacles, and what has moved at the fraction of the row."""
     row, pile = beds[0]
@@ -393,7 +373,7 @@ def _entrained(row: pd.Series, told: ReportedQuantity) -> str:
     return f"; thick: {percent(row['fraction'])} entrained at {flow:#.3g} {told.unit}"
 
 
-def _obstacles(ax: Axes, beds: Sequence[Bed], unit: _Unit) -> None:
+def _obstacles(ax: Axes, beds: Sequence[Bed], unit: Lengths) -> None:
     """The obstacles of all beds on a line, in the colours of these."""
     for place, (_, pile) in enumerate(beds):
         look: Look = OTHERS[place - 1] if place else {"color": ANSWER}
@@ -411,7 +391,7 @@ def _first(
     row: pd.Series,
     pile: Pile,
     told: ReportedQuantity,
-    unit: _Unit,
+    unit: Lengths,
 ) -> None:
     """Mark the place where motion starts, with its flow."""
     x = unit.scale * float(row["first_x_m"])
