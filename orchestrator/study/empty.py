@@ -6,7 +6,7 @@ import numpy as np
 
 from orchestrator.types import FloatArray
 
-EMPTY_WORDS = ("null", "nan", "*", "na", "n/a", "none")
+EMPTY_WORDS = ("null", "nan", "*", "na", "n/a", "none", "-", "--", "---")
 """Words that stand in place of a number."""
 EMPTY_MARKS = (99, 999, 9999, 99999, 999999, 9999999, 32767, 32768, 65535)
 """Numbers of one sign or the other that stand for no number in many files."""

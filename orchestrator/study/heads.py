@@ -45,6 +45,11 @@ HEIGHT = (
     "ground level",
     "ground elevation",
     "surface elevation",
+    "ground",
+    "grade",
+    "existing grade",
+    "terrain",
+    "thalweg",
     "höhe",
     "hoehe",
     "geländehöhe",
@@ -126,7 +131,7 @@ DATUMS = (
 _DATUM = "|".join(sorted(map(re.escape, DATUMS), key=len, reverse=True))
 UNIT = re.compile(
     rf"[ _,/]*[(\[] *(?:in )?({UNIT_NAMES}) *[)\]]$|"
-    rf"(?: in|[ _,/])[ _,/]*({UNIT_NAMES})[)\]]?$"
+    rf"(?: in|[ _,/-])[ _,/]*({UNIT_NAMES})[)\]]?$"
 )
 WITH_DATUM = re.compile(
     rf"(?:^|[ _,]*[(\[] *|[ _,]+)(?P<unit>{UNIT_NAMES})?(?(unit)[ +_,.]*|\+?)"

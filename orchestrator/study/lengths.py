@@ -34,6 +34,8 @@ FEET = (
     "international foot",
     "international feet",
     "fuß",
+    "'",
+    "′",
     "pieds",
     "pies",
 )
@@ -56,7 +58,7 @@ SURVEY_FEET = (
     "u.s. survey foot",
     "u.s. survey feet",
 )
-INCHES = ("in", "inch", "inches", "zoll", "pouces", "pulgadas")
+INCHES = ("in", "inch", "inches", "zoll", "pouces", "pulgadas", '"', "″", "''")
 MICRONS = ("um", "µm", "μm", "micron", "microns", "micrometer", "micrometre")
 MILLIMETRES = ("mm", "millimeter", "millimeters", "millimetre", "millimetres")
 CENTIMETRES = ("cm", "centimeter", "centimeters", "centimetre", "centimetres")
@@ -86,7 +88,11 @@ OF_ALL = re.compile(
 """Words above a table that name the unit of all its lengths."""
 OF_SOME = re.compile(r"vertical|horizontal|height|elev|level|depth|\b[xyz]\b")
 """Words of a line that is of some lengths alone."""
-OTHERS = sorted({*LENGTHS} - {*METRE, "in"}, key=len, reverse=True)
+OTHERS = sorted(
+    (unit for unit in LENGTHS if unit not in (*METRE, "in") and unit[0].isalpha()),
+    key=len,
+    reverse=True,
+)
 MENTIONED = re.compile(
     rf"(?<![\w.%])(?<!\d )({'|'.join(map(re.escape, OTHERS))})(?![\w/])"
 )

@@ -523,6 +523,8 @@ def _given(
 
 def _remedy_of_line(cells: Sequence[str]) -> str:
     """What helps a line that is no point."""
+    if any(cell.lower() in EMPTY_WORDS for cell in cells):
+        return "remove such lines, or write the numbers"
     if any(re.match(r"[+-]?[.,]?\d", cell) for cell in cells):
         return PROFILE_REMEDY
     return "remove the line, if it is no point; or write its numbers"

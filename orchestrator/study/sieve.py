@@ -262,7 +262,15 @@ def _is_head(cells: Sequence[str]) -> bool:
 def _is_size(cell: str) -> bool:
     """Whether a column has the openings of sieves."""
     name = _without_phi(cell)[0]
+    if _bare_unit(name):
+        return True
     return name_of(name).plain in SIZE and not PERCENT.search(cell.lower())
+
+
+def _bare_unit(cell: str) -> str:
+    """The unit that a column of openings has for a name; empty for another name."""
+    unit = cell.strip(" ()[]").lower()
+    return unit if LENGTHS.get(unit, 1.0) < 1 and unit.isalpha() else ""
 
 
 def _without_phi(cell: str) -> tuple[str, bool]:
@@ -320,7 +328,7 @@ def _mm_unit(name: str) -> float | None:
     bare, is_phi = _without_phi(name)
     if is_phi:
         return 0.0
-    unit = name_of(bare).unit
+    unit = name_of(bare).unit or _bare_unit(bare)
     return rounded(LENGTHS[unit] / LENGTHS["mm"]) if unit else None
 
 

@@ -8,7 +8,7 @@ hours count for what they are.
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -96,6 +96,8 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
         "velocity",
         "geschwindigkeit",
         "windgeschwindigkeit",
+        "windgeschw",
+        "windgeschw.",
         "snelheid",
         "windsnelheid",
         "vitesse",
@@ -161,6 +163,10 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
     ),
 }
 """Names of columns, without units, heights and marks."""
+ZONES = ("utc", "gmt", "cet", "mez", "local", "lst", "lt", "z", "")
+"""Words for the zone of a time."""
+WORDS_OF_TIME = {name for name in FIELDS["time"] if " " not in name} | {*ZONES}
+"""Words of which the name of a column of times may be made."""
 COUNTS = ("count", "counts", "occurrences", "observations", "anzahl")
 OF_HOURS = ("hours", "hrs", "stunden", "uren")
 EASTWARD, NORTHWARD = ("u", "u wind", "ugrd"), ("v", "v wind", "vgrd")
@@ -211,6 +217,14 @@ REMEDY = (
     "name the columns: from_deg, speed_m_s and share or hours; or a time, a speed and "
     "a direction, as date,ws,wd; or a direction and classes of speeds, 0-2,2-4,>4"
 )
+WND = "WND"
+"""Column of winds in the hourly files of NOAA."""
+ISD_SPEED = "speed (0.1 m/s)"
+ISD_LITE = re.compile(r"(1[89]|20)\d\d +\d{1,2} +\d{1,2} +\d{1,2}(?: +-?\d+){8}")
+"""A line of ISD-Lite."""
+ISD_NAMES = ("year", "month", "day", "hour", "temperature", "dew point", "pressure",
+             "direction", ISD_SPEED, "sky", "rain 1 h", "rain 6 h")  # fmt: skip
+"""Columns of ISD-Lite, which has no head."""
 MANY = 20
 """Directions from which on they may be told to be radians."""
 TWICE = 1e-3
@@ -309,7 +323,9 @@ def read_winds(text: str, where: str) -> Winds:
     found = _of_wasp(text, where)
     if found is not None:
         return found
-    table = read_cells(text, _is_head, where, REMEDY)
+    table = _of_isd_lite(text) or _without_wnd(
+        read_cells(text, _is_head, where, REMEDY), where
+    )
     if not table.rows:
         raise InputError("its shares add up to 0: no line has a wind", where, REMEDY)
     columns = [_column(name) for name in table.names]
@@ -340,6 +356,8 @@ def _column(name: str) -> _Column:
         found = "u"
     elif plain in NORTHWARD:
         found = "v"
+    elif not found and {*plain.split()} <= WORDS_OF_TIME and plain not in ZONES:
+        found = "time"
     elif not found and words.strip() == "%":
         found = "share"
     return _Column(found, of_unit, at, plain)
@@ -354,7 +372,7 @@ def _is_head(cells: Sequence[str]) -> bool:
         return True
     if "direction" in fields and ("speed" in fields or _classes(cells[1:])):
         return True
-    if {"u", "v", "time"} <= fields:
+    if {"u", "v", "time"} <= fields or ("time" in fields and WND in cells):
         return True
     ways = compass.degrees_of([cell for cell in cells[1:] if cell])
     return "speed" in fields and ways is not None
@@ -827,6 +845,8 @@ def _long(hours: float) -> str:
 
 DIGITS = {8: "%Y%m%d", 10: "%Y%m%d%H", 12: "%Y%m%d%H%M", 14: "%Y%m%d%H%M%S"}
 """Times that are written in digits alone, by their number."""
+UNIX = 10
+"""Digits of the seconds since 1970 that a Unix time is."""
 PARTS_OF_TIME: Mapping[str, tuple[str, ...]] = {
     "year": ("year", "yr", "jahr"),
     "month": ("month", "mo", "monat"),
@@ -914,6 +934,9 @@ def _times(cells: Sequence[str], table: TextTable, where: str) -> pd.DatetimeInd
     options: dict[str, object] = {"errors": "coerce", "utc": True}
     if all(re.fullmatch(r"\d+", cell) for cell in cells) and len(first) in DIGITS:
         made = pd.to_datetime(cells, format=DIGITS[len(first)], **options)  # type: ignore[call-overload]
+        if len(first) == UNIX and made.isna().any():
+            seconds = np.array(cells, float)
+            made = pd.to_datetime(seconds, unit="s", **options)  # type: ignore[call-overload]
     elif re.match(r"\d{4}-\d{1,2}-\d{1,2}|\d{4}/\d{1,2}", first):
         made = pd.to_datetime(cells, format="mixed", **options)  # type: ignore[call-overload]
     else:
@@ -944,6 +967,39 @@ def _order_of_days(cells: Sequence[str], where: str) -> bool:
         return False
     what = f"{cells[0]!r}: does the day or the month stand first?"
     raise InputError(what, where, TIME_REMEDY)
+
+
+def _of_isd_lite(text: str) -> TextTable | None:
+    """A table of ISD-Lite (NOAA), which has no head; None for another text."""
+    lines = text.splitlines()
+    first = next((line for line in lines if line.strip()), "")
+    if not ISD_LITE.fullmatch(first.strip()):
+        return None
+    rows = tuple((at, line.split()) for at, line in enumerate(lines, 1) if line.strip())
+    return TextTable(ISD_NAMES, 1, rows, None)
+
+
+def _without_wnd(table: TextTable, where: str) -> TextTable:
+    """A table with a direction and a speed in place of the column WND of ISD (NOAA).
+
+    Its cells have the direction, its quality, the type, the speed, and its quality.
+    """
+    if WND not in table.names:
+        return table
+    at = table.names.index(WND)
+    rows = []
+    for line, cells in table.rows:
+        parts = cells[at].split(",") if at < len(cells) else []
+        if len(parts) != 5:
+            what = f"{WND} has a direction, a speed and three marks in a cell"
+            raise InputError(what, f"{where}: line {line}", 'as "270,1,N,0046,1"')
+        way, _, kind, speed, _ = parts
+        is_calm = kind == "C"
+        way = "VRB" if kind == "V" else way.replace("999", "9999")
+        of_wind = ["", "0"] if is_calm else [way, speed]
+        rows.append((line, [*cells[:at], *cells[at + 1 :], *of_wind]))
+    names = (*table.names[:at], *table.names[at + 1 :])
+    return replace(table, names=(*names, "direction", ISD_SPEED), rows=tuple(rows))
 
 
 def _of_wasp(text: str, where: str) -> Winds | None:

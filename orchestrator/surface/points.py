@@ -15,7 +15,14 @@ from typing import NamedTuple
 import numpy as np
 
 from orchestrator.errors import InputError
-from orchestrator.study.cells import Marks, is_of_units, marks_of, with_units
+from orchestrator.study.cells import (
+    COMMENT,
+    Marks,
+    is_of_units,
+    marks_of,
+    with_units,
+)
+from orchestrator.study.empty import EMPTY_WORDS
 from orchestrator.study.heads import (
     ALONG_LINE,
     DEGREES,
@@ -43,7 +50,6 @@ OFF_GRID = 0.1
 """Largest distance of a point from its place on a grid, in steps."""
 NORTHINGS, EASTINGS = 1e6, 1e5
 """Northings of maps lie above the one, eastings between the two, m."""
-COMMENT = re.compile(r"^\s*(#|//|%|!)+\s*")
 POINT_REMEDY = "x, y and z in m, with a decimal point"
 NAMES_REMEDY = (
     "name them x, y and z, or easting, northing and height, all in m; known are "
@@ -124,9 +130,15 @@ def _with_marks(
         if points is not None:
             return points, Marks(",")
     cells = [each for _, each in lines.points(layout)]
-    if any(len(each) <= max(layout.columns) for each in cells):
+    x, y, z = layout.columns
+    if any(len(each) <= max(x, y) for each in cells):
         raise lines.wrong(layout)
-    rows = [[each[column] for column in layout.columns] for each in cells]
+    if any(len(each) <= z and layout.separator is None for each in cells):
+        raise lines.wrong(layout)  # which of the cells is missing nobody knows
+    rows = [[each[x], each[y], each[z] if len(each) > z else ""] for each in cells]
+    for row in rows:
+        if row[2].lower() in ("", *EMPTY_WORDS):
+            row[2] = "nan"  # a place without a height
     try:
         marks = marks_of(cell for row in rows for cell in row)
     except ValueError as error:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from orchestrator.digits import number as number_of
 from orchestrator.errors import InputError
 from orchestrator.extras import imported
-from orchestrator.study.cells import Marks, marks_of
+from orchestrator.study.cells import COMMENT, Marks, marks_of
 from orchestrator.study.empty import EMPTY_WORDS, looks_empty
 from orchestrator.study.lengths import LENGTHS
 from orchestrator.study.source import decoded, read_bytes
@@ -170,7 +170,14 @@ def read_surface(path: Path, where: str) -> Surface:
 
 def _is_grid(text: str, ending: str) -> bool:
     """Whether a text is a grid, and no list of points."""
-    first = next((line for line in text.splitlines() if line.strip()), "")
+    first = next(
+        (
+            line
+            for line in text.splitlines()
+            if line.strip() and not COMMENT.match(line)
+        ),
+        "",
+    )
     words = re.split(r"[\s:=]+", first.strip())
     if _key_of(words[0]) in (*GRID_KEYS, *GRASS_KEYS) and len(words) == 2:
         return True
@@ -534,7 +541,7 @@ def _head_of_grid(lines: list[str], where: str) -> tuple[dict[str, str], int]:
     before = 0
     for line in lines:
         words = re.split(r"[\s:=]+", line.strip().strip(":="))
-        if not words[0]:
+        if not words[0] or COMMENT.match(line):
             before += 1
             continue
         is_mark = words[0].lower() in EMPTY_WORDS and ":" not in line

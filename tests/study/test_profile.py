@@ -84,7 +84,8 @@ BAD: dict[str, tuple[str | bytes, str]] = {
         )
         for cell, message in {
             "nan": "z_m: nan looks like an empty cell",
-            "NA": "z_m: NA looks like an empty cell",
+            "NA": "z_m: NA looks like an empty cell .remove such lines",
+            "-": "z_m: - looks like an empty cell .remove such lines",
             "inf": "z_m: inf is not a number up to",
             "1e6": "z_m: 1e.06 is not a number up to",
             "high": "z_m: 'high' is no number",
@@ -464,6 +465,8 @@ IN_UNITS = {
     "x (us ft),Elevation (NAVD88 us ft)": (1200 / 3937, 1200 / 3937, "0.3048006"),
     "# Units: US survey feet\nx,z": (1200 / 3937, 1200 / 3937, "0.3048006 m)"),
     "all lengths in mm\nx,z": (1e-3, 1e-3, "in mm (1 mm = 0.001 m)"),
+    "Station-ft,Existing Grade-ft": (0.3048, 0.3048, "in ft (1 ft = 0.3048 m)"),
+    "Distance (″);Height (″)": (0.0254, 0.0254, "in ″ (1 ″ = 0.0254 m)"),
     "x,z\nft,in": (0.3048, 0.0254, "x in ft (1 ft = 0.3048 m), z in in"),
 }
 

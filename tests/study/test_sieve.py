@@ -42,6 +42,7 @@ ALIKE = {
     "French": "Tamis (mm);Passant cumulé (%)\n4;100\n2;60\n1;10,0\n0,5;0\n",
     "tabs": "sieve_mm\tpassing_percent\n4\t100\n2\t60\n1\t10\n0.5\t0\n",
     "blanks": "sieve_mm passing_percent\n4 100\n2 60\n1 10\n0.5 0\n",
+    "a unit alone": "mm,passing (%)\n4,100\n2,60\n1,10\n0.5,0\n",
     "a title above": (
         "Particle size distribution\nSample: A 3\n\nSieve (mm),Passing (%)\n"
         "4,100\n2,60\n1,10\n0.5,0\n"

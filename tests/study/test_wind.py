@@ -136,6 +136,44 @@ SERIES = {
 }  # fmt: skip
 
 
+SERIES |= {
+    "ISD-Lite": (
+        "\n".join(
+            f"{t:%Y %m %d %H}   -11   -56 10123 {d:5d} {10 * u:5d}     8     0 -9999"
+            for t, (d, u) in ((time, wind(hour)) for hour, time in enumerate(TIMES))
+        ),
+        1.0,
+        None,
+    ),
+    "NOAA by the hour": (
+        series(
+            '"STATION","DATE","WND"',
+            lambda t, d, u: f'"012","{t:%Y-%m-%dT%H:%M:%S}","{d:03d},1,N,{10 * u:04d},1"',
+        ),
+        1.0,
+        None,
+    ),
+    "seconds since 1970": (
+        series("timestamp,ws,wd", lambda t, d, u: f"{(t - datetime(1970, 1, 1)).total_seconds():.0f},{u},{d}"),
+        1.0,
+        None,
+    ),
+    "a zone beside the time": (
+        series("valid(UTC),drct,sknt", lambda t, d, u: f"{t:%Y-%m-%d %H:%M},{d},{u}"),
+        1852 / 3600,
+        None,
+    ),
+    "words of a logger": (
+        series(
+            "Datum/Uhrzeit (MEZ);Windgeschw. (m/s);Richtung (°)",
+            lambda t, d, u: f"{t:%d.%m.%Y %H:%M};{u},0;{d}",
+        ),
+        1.0,
+        None,
+    ),
+}  # fmt: skip
+
+
 @pytest.mark.parametrize("name", SERIES)
 def test_series_of_services_are_read(name: str) -> None:
     text, unit, height = SERIES[name]
@@ -208,6 +246,24 @@ def test_numbers_for_no_observation_count_for_nothing_and_are_said() -> None:
         "25 % without a direction",
     ):
         assert said in found.understood
+
+
+def test_marks_of_noaa_are_calm_variable_or_none() -> None:
+    cells = ["270,1,N,0040,1", "999,9,C,0000,1", "999,9,V,0020,1", "999,9,9,0050,1",
+             "090,1,N,9999,9", "090,1,N,0040,1"]  # fmt: skip
+    rows = [f'2020-01-01T{hour:02d}:00:00,"{cell}"' for hour, cell in enumerate(cells)]
+    found = read_winds("\n".join(["DATE,WND", *rows]), WHERE)
+    shares = {(way, speed): share for way, speed, share in found.rows}
+    assert shares == {
+        (270.0, 4.0): 0.25,
+        (0.0, 0.0): 0.25,
+        (270.0, 2.0): 0.125,
+        (90.0, 2.0): 0.125,
+        (90.0, 4.0): 0.25,
+    }
+    assert "4 hours with a wind, 2 without" in found.understood
+    with pytest.raises(InputError, match=r"line 2: WND has a direction, a speed and"):
+        read_winds("DATE,WND\n2020-01-01T00:00:00,270\n", WHERE)
 
 
 def test_a_usual_wind_is_no_mark_of_its_unit() -> None:

@@ -441,6 +441,21 @@ def test_points_in_feet_become_metres(tmp_path: Path, head: str, form: str) -> N
     assert "-9999 in 1 cell looks like a cell without a height" in said
 
 
+@pytest.mark.parametrize("cell", ["", "NA", "nan", "null", "-"])
+def test_a_place_without_a_height_is_one(tmp_path: Path, cell: str) -> None:
+    text = "x,y,z\n" + points("{x},{y},{z}").replace(",0.0\n", f",{cell}\n", 2)
+    found = read(tmp_path, text)
+    check_is_the_heap(found)
+    assert "2 cells without a height" in found.understood
+    assert "continued as level ground over 2 cells" in found.said[-1]
+
+
+def test_comments_above_a_grid_are_no_keys(tmp_path: Path) -> None:
+    text = "# Höhen in m\n" + grid("cellsize 1\n")
+    check_is_the_heap(read(tmp_path, text.encode("cp1252"), "heap.asc"))
+    check_is_the_heap(read(tmp_path, text, "heap.txt"))
+
+
 def test_columns_of_points_may_differ_in_their_units(tmp_path: Path) -> None:
     found = read(tmp_path, "x_m,y_m,z_mm\n" + points("{x},{y},{z}"))
     assert found.z == pytest.approx(1e-3 * heights(), abs=1e-9)
