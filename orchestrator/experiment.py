@@ -295,7 +295,8 @@ class Experiment(ABC):
         """
         cases = space.cases
         with style.settings():
-            runs = Runs(self.planned, cases, reuse.done(self.planned.cases, cases))
+            done = reuse.done(self.planned.cases, cases)
+            runs = Runs(self.planned, cases, done)
             made = self.results(runs)
             if made is None and failed:
                 raise next(iter(failed.values()))
@@ -311,7 +312,10 @@ class Experiment(ABC):
                 solvers = case.programs(cases, self.planned.cases)
                 name = space.page.name
                 sections = _with_caveats(made.page, runs)
-                page.write_experiment(self.title, sections, folder, name, solvers)
+                wall_s = sum(float(state["wall_s"]) for state in done.values())
+                page.write_experiment(
+                    self.title, sections, folder, name, solvers, wall_s
+                )
         return sections
 
 

@@ -1,18 +1,19 @@
 """One page over several studies: a card each, with its answer and its picture."""
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 import pandas as pd
 
-from orchestrator import face
+from orchestrator import __version__, face
 from orchestrator.digits import number
 from orchestrator.errors import InputError, OrchestratorError
-from orchestrator.report import LIST, PAGE, page
+from orchestrator.report import LIST, PAGE, noted, page
 from orchestrator.runs.files import Folder
-from orchestrator.runs.workspace import STUDY
+from orchestrator.runs.workspace import STUDY, now
 
 NAME = "gallery.html"
 VIEW = re.compile(r'viewBox="\S+ \S+ (\S+) (\S+)"')
@@ -50,30 +51,47 @@ def write_gallery(directory: Path) -> Path:
     folder = Folder(directory.absolute())
     counted = number(len(cards), "result page")
     title = "Studies: what each found"
+    foot = page.page_text(
+        "foot",
+        date=now(),
+        version=__version__,
+        programs={},
+        run="",
+        command="orchestrator gallery DIR",
+        reading=page.page_text("reading", of={"cards"}),
+    )
     folder.note(
-        NAME, page.fill("gallery.html.j2", title=title, counted=counted, cards=cards)
+        NAME,
+        page.fill(
+            "gallery.html.j2", title=title, counted=counted, cards=cards, foot=foot
+        ),
     )
     return folder.root / NAME
 
 
 def _card(study: Path) -> dict[str, Any]:
     """What the page shows of a study."""
-    try:
-        opened = face.open(study)
-        title = opened.title
-        answer = opened.card
+    noted_ = noted.read(study)
+    if noted_ is not None:
+        title, answer, figures = noted_
         says = [answer.question]
-    except OrchestratorError as error:
-        title = study.name
-        says = [error.what]
-        answer = None
+    else:
+        figures = _leading(study / LIST)
+        try:
+            opened = face.open(study)
+            title, answer = opened.title, opened.card
+            says = [answer.question]
+        except OrchestratorError as error:
+            title, answer = study.name, None
+            says = [error.what]
+    image = _picture((study / LIST).parent, figures)
     return {
         "title": title,
         "directory": study.name,
         "link": quote(f"{study.name}/{PAGE}"),
         "says": says,
         "answer": answer,
-        "image": (image := _picture(study / LIST)),
+        "image": image,
         "is_wide": _is_wide(image),
     }
 
@@ -87,13 +105,18 @@ def _is_wide(image: bytes) -> bool:
     return width > WIDE * height
 
 
-def _picture(listed: Path) -> bytes:
-    """The first figure that leads a page, of its list; empty if there is none."""
+def _leading(listed: Path) -> Sequence[str]:
+    """The figures that lead the page of a study, of their list."""
     if not listed.is_file():
-        return b""
+        return ()
     figures = pd.read_csv(listed)
-    for name in figures.loc[figures["place"] == "lead", "name"]:
-        path = listed.with_name(f"{name}.svg")
+    return [*figures.loc[figures["place"] == "lead", "name"]]
+
+
+def _picture(folder: Path, figures: Sequence[str]) -> bytes:
+    """The first of some figures that there is; empty if there is none."""
+    for name in figures:
+        path = folder / f"{name}.svg"
         if path.is_file():
             return path.read_bytes()
     return b""

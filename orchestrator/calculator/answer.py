@@ -46,9 +46,10 @@ def as_row(row: "Row") -> "Row":
     Returns
     -------
     dict
-        With the kind of its bed, and the flow over it.
+        With the kind of its bed, the flow over it, and its force law.
     """
-    return {**row, "bed": "grain", "ustar0_m_s": row["ustar_m_s"]}
+    more = {"ustar0_m_s": row["ustar_m_s"], "force_law": row["law"]}
+    return {**row, "bed": "grain", **more}
 
 
 def nearest(rows: Sequence["Row"]) -> str:

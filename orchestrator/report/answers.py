@@ -364,7 +364,7 @@ def _of_several(rows: pd.DataFrame, results: Results) -> Card:
         f"{', and where' if first is not None else ''}, by {_axes(telling)}?",
         _scene_of_several(results),
         tuple(numbers),
-        single.source(shown.iloc[0]),
+        single.source(shown.iloc[0], shown.iloc[-1]),
         replace(worth, advice=advice),
     )
 
@@ -486,7 +486,9 @@ def _of_unlike(
         numbers.append(share(row, told, _name_of(row, rows, telling)))
     shown = [each for each in numbers if each is not None]
     left = len(shown) - MOST_NUMBERS
-    source = single.source(rows.iloc[0])
+    taken_count = len(shown) - len(order)
+    of_card = order[: MOST_NUMBERS - taken_count]
+    source = single.source(*(row for _, row in of_card.iterrows()))
     if left > 0:
         source += f" The table has {number_of(left, 'more bed')}."
     what = "these beds"
@@ -513,7 +515,7 @@ def _name_of(row: pd.Series, rows: pd.DataFrame, telling: Sequence[str]) -> str:
 
 def _axes(telling: Sequence[str]) -> str:
     """What several beds or grains differ in, in words."""
-    return enumerated([labels.info_of(name).label for name in telling[:3]])
+    return enumerated([labels.head_of(name) for name in telling[:3]])
 
 
 def _first_of_several(
@@ -733,17 +735,17 @@ def _of_grains(grains: pd.DataFrame) -> Card:
     telling = labels.varying(grains, "bed")
     fluids = [name for name in FLUIDS if grains[name].nunique() > 1]
     numbers = _range(shown, told, telling)
+    ends = [shown.iloc[0], shown.iloc[-1]]
     if fluids:
         # fluids are never put into one range
         of_fluids = grains.drop_duplicates(fluids)[:MOST_NUMBERS]
-        numbers = [
-            _end_of_range(row, told, telling, "") for _, row in of_fluids.iterrows()
-        ]
+        ends = [row for _, row in of_fluids.iterrows()]
+        numbers = [_end_of_range(row, told, telling, "") for row in ends]
     return Card(
         f"At what {told.flow} does a grain start to move, by {_axes(telling)}?",
         _span_of(grains),
         tuple(numbers),
-        single.source(shown.iloc[0]),
+        single.source(*ends),
         _worth_of_many(grains, grains),
     )
 

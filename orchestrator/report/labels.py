@@ -10,6 +10,7 @@ import pandas as pd
 
 from orchestrator.digits import metres, plain_number
 from orchestrator.report.card import apart
+from orchestrator.report.subjects import name_of_fluid
 from orchestrator.study import fields
 from orchestrator.study.declare import Info
 
@@ -25,6 +26,8 @@ OTHERS = {
     "asked": Info("method asked for"),
 }
 """Words of columns of tables that are no fields."""
+FLUID = "rho_f_kg_m3"
+"""The column that tells fluids apart; air and water are told by their names."""
 NAMED = ("obstacles",)
 """Columns whose texts say themselves what they are."""
 OF_METHODS = {"DEM", "DEM of piles", "DEM and peeling", "DEM and peeling of piles"}
@@ -47,6 +50,22 @@ def info_of(column: str) -> Info:
     if column in OTHERS:
         return OTHERS[column]
     return fields.COLUMNS[column].info
+
+
+def head_of(column: str) -> str:
+    """Name a column in the head of a table and in a question.
+
+    Parameters
+    ----------
+    column
+        Name of the column.
+
+    Returns
+    -------
+    str
+        Its label; of the density of the fluid ``fluid``, since cells have a name there.
+    """
+    return "fluid" if column == FLUID else info_of(column).label
 
 
 def value_text(column: str, value: Any) -> str:
@@ -132,10 +151,25 @@ def cells(rows: pd.DataFrame, columns: Sequence[str]) -> dict[str, list[str]]:
     written = {}
     for column in columns:
         texts = [value(column, item) for item in rows[column]]
+        if column == FLUID:
+            texts = [_fluid(row) or value(column, row[column]) for row in _each(rows)]
         if len({*texts}) < rows[column].nunique():
             texts = [str(item) for item in rows[column]]
-        written[info_of(column).label] = texts
+        written[head_of(column)] = texts
     return written
+
+
+def _each(rows: pd.DataFrame) -> list[pd.Series]:
+    """The rows of a table."""
+    return [row for _, row in rows.iterrows()]
+
+
+def _fluid(row: pd.Series) -> str:
+    """Air or water, where the fluid of a row is one of them; else nothing."""
+    density, viscosity = row.get(FLUID), row.get("nu_m2_s")
+    if density is None or viscosity is None or pd.isna(viscosity):
+        return ""
+    return name_of_fluid(float(density), float(viscosity))
 
 
 def told(row: pd.Series, columns: Sequence[str]) -> list[str]:
@@ -155,6 +189,9 @@ def told(row: pd.Series, columns: Sequence[str]) -> list[str]:
     """
     texts = []
     for column in columns:
+        if column == FLUID and _fluid(row):
+            texts.append(f"in {_fluid(row)}")
+            continue
         is_list = column == "obstacles"
         if is_list or pd.notna(row[column]):
             texts.append(value_text(column, row[column]))

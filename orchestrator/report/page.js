@@ -78,7 +78,7 @@ for (const line of document.querySelectorAll(".files-of:not(:has([href$='.png'])
 
 // long tables: a filter, a copy for a spreadsheet, headings that sort
 const LONG = 20;
-const text = (cell) => cell?.textContent.trim() ?? "";
+const text = (cell) => (cell?.querySelector(".own") ?? cell)?.textContent.replace(/\u00a0/g, " ").trim() ?? "";
 const number = (cell) => {
   const found = text(cell).replace(/−/g, "-").match(/-?\d+(\.\d+)?(e-?\d+)?/);
   return found ? +found[0] : NaN;

@@ -29,8 +29,14 @@ IN_ADDRESS = " <>/=:;,.'()!*?[]{}|~+-"
 """Letters that stand for themselves in the address of a picture."""
 MOST_ROWS = 60
 """Rows of a table that a page of an experiment shows; more are folded away."""
+FIELDS = (b"<image", b"Quad", b"linearGradient", b'class="grains"')
+"""What the SVG of a field of colours, or of grains, has."""
+IN_LEGEND = {"card": "Card", "figures": "Figure", "table": "Sheet"}
+"""What the legend of a page explains where it is there, by the kind of element."""
 IN_SENTENCES = "The answer in sentences"
 """The line that opens the text below the figure of a card."""
+UNITS = r"(?:%|°C|mm|µm|m|m/s|m²/s|kg/m³|Pa|g/m²|s|h|d)(?![\w/²³])"
+"""Units that stay on the line of their number."""
 PACKAGES = (
     "gmsh",
     "matplotlib",
@@ -141,8 +147,10 @@ def _templates(folder: Path, autoescape: bool = True) -> Environment:
     )
     environment.filters |= {
         "typeset": typeset,
+        "sentence": sentence,
         "n": _number,
         "address": address,
+        "is_field": is_field,
         "inline": _inline,
         "cell": _cell,
         "kind": _kind,
@@ -177,9 +185,40 @@ def typeset(text: str) -> Markup:
     """
     index = r"\b([^\W\d_]|[^\W\d_a-z][^\W\d_]{1,2})_([A-Za-z]+)\b(?!_)"
     html = re.sub(index, r"\1<sub>\2</sub>", str(escape(text)))
-    # no line breaks within an interval
-    html = re.sub(r"(?<=\d) … (?=\d)", "\u00a0…\u00a0", html)
+    parts = html.split("`")
+    parts[::2] = map(_unbroken, parts[::2])  # not in code, which is copied
+    html = "`".join(parts)
     return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", html))
+
+
+def _unbroken(html: str) -> str:
+    """A text without line breaks in intervals, equations, numbers with units."""
+    html = re.sub(r"(?<=\d) … (?=[\d−+])", "\u00a0…\u00a0", html)
+    html = re.sub(rf"(?<=\d) (?={UNITS})", "\u00a0", html)
+    return re.sub(r"(?<=[^\W\d_]) = (?=[−\d])", "\u00a0=\u00a0", html)
+
+
+def sentence(text: str) -> str:
+    """Begin a text with a capital, unless it begins with a symbol.
+
+    Parameters
+    ----------
+    text
+        The text.
+
+    Returns
+    -------
+    str
+        The text.
+
+    Examples
+    --------
+    >>> sentence("by the model"), sentence("u* = √(τ_b/ρ)"), sentence("τ_b of the flow")
+    ('By the model', 'u* = √(τ_b/ρ)', 'τ_b of the flow')
+    """
+    first, *_ = text.split(" ", 1)
+    is_word = first.strip(",;:").isalpha() and len(first) > 1
+    return f"{text[0].upper()}{text[1:]}" if is_word else text
 
 
 def address(image: bytes) -> str:
@@ -201,6 +240,24 @@ def address(image: bytes) -> str:
     text = " ".join(image.decode("utf-8").split("\n"))
     text = re.sub('"([^"\']*)"', r"'\1'", text)
     return Markup("data:image/svg+xml;utf8," + quote(text, safe=IN_ADDRESS))
+
+
+def is_field(image: bytes) -> bool:
+    """Say whether a picture has a field of colours, such as a map of speeds.
+
+    Parameters
+    ----------
+    image
+        A PNG or an SVG file.
+
+    Returns
+    -------
+    bool
+        Whether it has; in a dark page its colours are not turned.
+    """
+    if not image.lstrip().startswith(b"<"):
+        return True
+    return any(mark in image for mark in FIELDS)
 
 
 def _inline(figure: "Figure") -> Markup:
@@ -471,7 +528,7 @@ def write_page(
     sections: Sequence[Section],
     *,
     above: str = "",
-    foot: Mapping[str, Any] | None = None,
+    foot: Mapping[str, Any],
     links: Mapping[str, str] | None = None,
     is_paper: bool = False,
 ) -> None:
@@ -496,11 +553,13 @@ def write_page(
     is_paper
         Whether figures that follow one of the paper have its number.
     """
+    kinds = {_kind(each) for section in sections for each in section.content}
+    of = {name for name, kind in IN_LEGEND.items() if kind in kinds}
     text = fill(
         "page.html.j2",
         title=title,
         above=above or title,
-        foot=page_text("foot", **foot) if foot else "",
+        foot=page_text("foot", **foot, reading=page_text("reading", of=of)),
         sections=sections,
         links=links or {},
         is_paper=is_paper,
@@ -514,8 +573,11 @@ def write_experiment(
     folder: Folder,
     name: str,
     solvers: Mapping[str, str],
+    wall_s: float | None = None,
 ) -> None:
     """Write the page of an experiment, with its figures as PNG and SVG beside it.
+
+    Its card stands in a file, too, for a page over several results.
 
     Parameters
     ----------
@@ -529,8 +591,10 @@ def write_experiment(
         File name of the page.
     solvers
         Versions of the solvers, by name.
+    wall_s
+        Wall time of the cases, s; None where it is not known.
     """
-    from orchestrator.report import foot, style  # style imports matplotlib
+    from orchestrator.report import foot, noted, style  # style imports matplotlib
 
     listed = []
     for section in sections:
@@ -544,4 +608,13 @@ def write_experiment(
     if any(section.figures for section in sections):
         files.insert(0, Text(page_text("files_of_figures")))
     listed.append(Section("Files", files))
-    write_page(folder, name, title, listed, foot=foot.of_page(folder, solvers))
+    for card in _cards(listed):
+        leading = [figure.name for section in listed for figure in section.figures]
+        folder.put(noted.CARD, noted.text_of(title, card, leading))
+    write_page(folder, name, title, listed, foot=foot.of_page(folder, solvers, wall_s))
+
+
+def _cards(sections: Sequence[Section]) -> Iterator[Card]:
+    """The card of a page, of one that has it."""
+    for section in sections[:1]:
+        yield from (each for each in section.content if isinstance(each, Card))

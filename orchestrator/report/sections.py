@@ -113,10 +113,10 @@ def _thresholds(results: Results) -> Iterator[Section]:
     if sheet is None:
         return
     content: list[Element] = [sheet]
-    every = sheets.piles_sheet(results)
-    if every is not None and len(every) > len(sheet.frame):
-        fold = f"All {len(every)} thresholds with their cases"
-        content.append(Table(every, "tables/pile_threshold.csv", fold=fold))
+    # what is asked of hills is where their flow turns back
+    every = None if answers.is_of_hills(results) else sheets.piles_sheet(results)
+    if every is not None and len(every.frame) > len(sheet.frame):
+        content.append(every)
     yield Section(sheet.title, content, "thresholds", "Table")
     by_place = places_sheet(results)
     if by_place is not None:

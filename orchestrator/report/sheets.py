@@ -21,7 +21,13 @@ from orchestrator.physics.verdict import (
     USABLE,
 )
 from orchestrator.report import counted, labels, single
-from orchestrator.report.results import Results, measured_hills, split_by
+from orchestrator.report.results import (
+    Results,
+    measured_hills,
+    seeds_as_one,
+    split_by,
+    valid,
+)
 from orchestrator.report.subjects import (
     MEAN,
     STRESS,
@@ -87,6 +93,10 @@ class Sheet:
         What the numbers in brackets of its last column say, from 1 on.
     main
         The head of the column that a reader should take; empty without one.
+    fold
+        Of a table that is folded away the line that opens it.
+    is_grey
+        Whether no row is usable, where the rows have no verdict of their own.
     """
 
     title: str
@@ -96,6 +106,8 @@ class Sheet:
     file: str = ""
     notes: tuple[str, ...] = ()
     main: str = ""
+    fold: str = ""
+    is_grey: bool = False
 
 
 def quantity_of_rows(rows: pd.DataFrame) -> ReportedQuantity:
@@ -182,6 +194,7 @@ def _first_grains(
     """
     # as the rows of the table are
     every = _in_order(every)
+    columns = _columns(every, False, False)
     fraction = results.at_fraction["fraction"].iloc[0]
     beds = every.groupby(list(keys), dropna=False, sort=False)
     parts = []
@@ -199,7 +212,7 @@ def _first_grains(
                 bed = results.plan.piles[str(row["scene_id"])].bed
                 spot = counted.spot(float(row["first_x_m"]), bed)
                 named[PART] = f"{FIRST_MOTION} {spot}"
-            part = _first_grain(row, part, named)
+            part = _first_grain(row, part, named, columns)
         parts.append(part)
     return pd.concat(parts, ignore_index=True)
 
@@ -214,21 +227,25 @@ def _in_order(rows: pd.DataFrame) -> pd.DataFrame:
 
 def _heads_of(keys: Sequence[str], frame: pd.DataFrame) -> list[str]:
     """The heads in a table of the columns that name its beds."""
-    heads = [labels.info_of(column).label for column in keys]
+    heads = [labels.head_of(column) for column in keys]
     return [head for head in heads if head in frame]
 
 
 def _first_grain(
-    row: pd.Series, frame: pd.DataFrame, named: Mapping[str, str]
+    row: pd.Series,
+    frame: pd.DataFrame,
+    named: Mapping[str, str],
+    columns: Mapping[str, Sequence[str]],
 ) -> pd.DataFrame:
     """The table of one bed, with a row for its first motion above the others.
 
-    The row has some cells that name it, by their heads.
+    The row has some cells that name it, by their heads, and those of columns of the
+    whole table: a wind is told as a stress beside one in water.
     """
     if not row["first_ustar0_m_s"] > 0:
         return frame
     values = {**dict.fromkeys(frame.columns, "—"), **named}
-    for head, names in _columns(pd.DataFrame([row]), False, False).items():
+    for head, names in columns.items():
         own = [_of_first(name) for name in names]
         if head not in values or not all(name in row for name in own):
             continue
@@ -253,13 +270,13 @@ def _fits(rows: pd.DataFrame, keys: Sequence[str]) -> bool:
     return len(rows[list(keys)].drop_duplicates()) <= MOST_ROWS
 
 
-def piles_sheet(results: Results) -> pd.DataFrame | None:
+def piles_sheet(results: Results) -> Sheet | None:
     """List the thresholds of the piles at every fraction.
 
     Returns
     -------
-    DataFrame or None
-        The name of the case first; None without piles.
+    Sheet or None
+        A table that is folded away, the name of the case first; None without piles.
     """
     rows = results.joined("pile_threshold")
     if rows.empty:
@@ -269,7 +286,15 @@ def piles_sheet(results: Results) -> pd.DataFrame | None:
     if rows["seed"].nunique() > 1:
         keys.append("seed")
     keys.append("fraction")
-    return _thresholds(rows, keys, more=("case", "count"))
+    frame, notes = _noted(_thresholds(rows, keys, more=("case", "count")))
+    return Sheet(
+        "",
+        frame,
+        file="tables/pile_threshold.csv",
+        notes=notes,
+        main=next(iter(_columns(rows, False, True))),
+        fold=f"All {len(frame)} thresholds with their cases",
+    )
 
 
 def single_grains_sheet(results: Results) -> pd.DataFrame:
@@ -299,7 +324,7 @@ def _sheet(rows: pd.DataFrame, keys: Sequence[str], name: str) -> Sheet:
     shared = []
     is_single = len(frame) == 1
     for column in keys:
-        head = labels.info_of(column).label
+        head = labels.head_of(column)
         if column == "fraction" and not is_single:
             continue
         if head in frame and frame[head].nunique() == 1:
@@ -313,7 +338,6 @@ def _sheet(rows: pd.DataFrame, keys: Sequence[str], name: str) -> Sheet:
     if is_uniform and len(frame) > 1 and " of " not in frame[VERDICT].iloc[0]:
         shared.append(frame[VERDICT].iloc[0])
         frame = frame.drop(columns=VERDICT)
-    terms = (TERMS["u*"], TERMS["shields"])
     if "fraction" in rows and PART not in frame:
         shared.append(f"{PART}: {percent(rows['fraction'].iloc[0])}")
     main = next(iter(_columns(rows, "d_m" not in keys, False)))
@@ -321,11 +345,29 @@ def _sheet(rows: pd.DataFrame, keys: Sequence[str], name: str) -> Sheet:
         TITLES[told_by],
         frame,
         tuple(shared),
-        terms,
+        terms_of(frame),
         f"tables/{name}.csv",
         notes,
         main,
     )
+
+
+def terms_of(frame: pd.DataFrame) -> tuple[str, ...]:
+    """Choose the terms that the heads of a table have.
+
+    Parameters
+    ----------
+    frame
+        The table, with heads as columns.
+
+    Returns
+    -------
+    tuple of str
+        What they mean: of those that are there, and of no others.
+    """
+    heads = " ".join(map(str, frame))
+    signs = {"u*": "u*", "shields": "θ", "re": "Re*"}
+    return tuple(TERMS[name] for name, sign in signs.items() if sign in heads)
 
 
 def _noted(frame: pd.DataFrame) -> tuple[pd.DataFrame, tuple[str, ...]]:
@@ -392,7 +434,14 @@ def _thresholds(
         low[~usable.any()] = np.nan
         d_mm = 1e3 * rows["d_m"].groupby(number).agg(["min", "max"])
         table["diameter, mm"] = _ranges(d_mm["min"], d_mm["max"], "g")
-    table |= _spans(low, high, _columns(rows, is_range, bool(more)))
+    spans = _columns(rows, is_range, bool(more))
+    if not is_range and "seed" in rows and (usable.size() > 1).any():
+        # replicates have the number of the card, and the interval holds all of them
+        one = seeds_as_one(rows)
+        one = one.set_index(number[one.index])
+        lone = [names[0] for names in spans.values() if len(names) == 1]
+        low[lone] = high[lone] = one[lone].astype(float)
+    table |= _spans(low, high, spans)
     table[VERDICT] = [
         _verdict(*told, is_range)
         for told in zip(
@@ -559,8 +608,10 @@ def sizes_sheet(results: Results) -> Sheet | None:
         title="By size",
         frame=frame,
         shared=(f"fraction of each size entrained: {percent(fraction)}",),
-        terms=(TERMS["u*"], TERMS["shields"]),
+        terms=terms_of(frame),
         file="tables/size_class.csv",
+        main="bed shear stress, Pa",
+        is_grey=not valid(rows).any(),
     )
 
 

@@ -5,7 +5,7 @@ which the command `threshold` does without.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -22,6 +22,7 @@ from orchestrator.physics.beside import (
 )
 from orchestrator.physics.constants import CHANNEL
 from orchestrator.physics.fluids import is_gas
+from orchestrator.physics.laws import LAWS
 from orchestrator.physics.reported import (
     CHOICES,
     COUNT,
@@ -340,7 +341,7 @@ def take_this(row: Row, told: ReportedQuantity) -> Number | None:
     if math.isnan(value):
         return None
     rows = known_number(row["measured_rows"])
-    of_what = f"80 % of {rows:.0f} flume experiments (visual criterion)"
+    of_what = f"the middle 80 % of {rows:.0f} flume experiments (visual criterion)"
     if is_gas(float(row["rho_f_kg_m3"])):
         of_what = f"{rows:.0f} field sites"
     if not (math.isnan(low) or low <= value <= high):
@@ -574,56 +575,89 @@ def tested_on(row: Row) -> str:
         sites = len(FIELD)
         them = f"{count} level-bed thresholds ({sites} field sites, {count - sites} "
         them += "of a formula)"
-    held = f"contained {part} of {them}, each set predicted from the others"
+    held = f"set for 80 %, it contained {part} of {them}, each set predicted from "
+    held += "the others"
     return f"{held}; widened for slope" if row["alpha_deg"] > LEVEL_DEG else held
 
 
-def source(row: Row) -> str:
+def source(*rows: Row) -> str:
     """Say where the numbers of a card come from, the computed ones and the others.
 
     Parameters
     ----------
-    row
-        A threshold with the columns of its scene.
+    *rows
+        The thresholds that the card shows, with the columns of their scenes.
 
     Returns
     -------
     str
-        The sentences.
+        The sentences: of the model, and of each other critical Shields number.
     """
-    level = known_number(row["compared_level_ustar_m_s"])
-    if math.isnan(level):
-        return "Computed. No level bed of such grains was measured in such a fluid."
-    size = length(float(row["d_m"]))
+    laws = {str(row["force_law"]) for row in rows if row.get("force_law") in LAWS}
+    law = "the force laws of the table"
+    if len(laws) == 1:
+        law = f"the force law {LAWS[laws.pop()].label}"
+    said = [f"The model’s numbers are computed with {law}."]
+    alike: dict[tuple[bool, bool], list[Row]] = {}
+    for row in rows:
+        if known_number(row["compared_level_ustar_m_s"]) > 0:
+            in_gas = is_gas(float(row["rho_f_kg_m3"]))
+            alike.setdefault((is_by_formula(row), in_gas), []).append(row)
+    if not alike:
+        said.append("No level bed of such grains was measured in such a fluid.")
+    said += [_of_reference(which) for which in alike.values()]
+    return " ".join(said)
+
+
+def _of_reference(rows: Sequence[Row]) -> str:
+    """Say what critical Shields numbers of one kind are."""
+    row = rows[0]
     is_bed = row["bed"] != "grain" and not is_level(row)
-    same = "The same bed and flow" if is_bed else "A level bed"
-    same = f"{same[0].lower()}{same[1:]}" if is_bed else same.lower()
-    theta = _reference_theta(row)
+    same = "the same bed and flow" if is_bed else "a level bed"
+    said = f"Numbers {with_threshold(row)} are those of {same} with {_thetas(rows)}"
     if not is_by_formula(row):
-        rows = f"{row['measured_rows']:.0f} flume experiments"
-        ends = f"{row['measured_low']:.3f} … {row['measured_high']:.3f}"
-        said = (
-            f"Numbers {WITH_MEASURED} are those of {same} with θ_c = {theta}, the "
-            f"median of {rows} at this grain Reynolds number (level beds, visual "
-            f"criterion; Buffington and Montgomery 1997); 80 % of them have {ends}."
+        of = _each(f"{each['measured_rows']:.0f}" for each in rows)
+        spans = _each(
+            f"{each['measured_low']:.3f} … {each['measured_high']:.3f}" for each in rows
         )
-    elif is_gas(float(row["rho_f_kg_m3"])):
+        is_one = " and " not in of
+        medians = "the median" if is_one else "the medians"
+        where = "this grain Reynolds number" if is_one else "their Reynolds numbers"
+        return (
+            f"{said}, {medians} of {of} flume experiments at {where} (level beds, "
+            "visual criterion; Buffington and Montgomery 1997); the middle 80 % of "
+            f"these experiments span {spans}."
+        )
+    if is_gas(float(row["rho_f_kg_m3"])):
         least, most = (1e3 * end for end in OF_TUNNELS)
-        said = (
-            f"Numbers {with_threshold(row)} are those of {same} with θ_c = {theta}, "
-            f"by the formula of {formula_of(row)} for grains of {size}, which was "
-            "fitted to wind tunnels "
-            f"(level beds, dry grains of {least:g} to {most:.2g} mm in air). "
+        return (
+            f"{said}, by the formula of {formula_of(row)}, which was fitted to wind "
+            f"tunnels (level beds, dry grains of {least:g} to {most:.2g} mm in air). "
             f"{_field(row)}"
         )
-    else:
-        said = (
-            f"Numbers {with_threshold(row)} are those of {same} with θ_c = {theta}, "
-            f"by the formula of {formula_of(row)}, which was fitted to flumes; no "
-            "flume experiment of "
-            f"the compilation is at grain Reynolds number {row['reynolds']:.3g}."
-        )
-    return said
+    reynolds = _each(f"{each['reynolds']:.3g}" for each in rows)
+    return (
+        f"{said}, by the formula of {formula_of(row)}, which was fitted to flumes; no "
+        f"flume experiment of the compilation is at grain Reynolds number {reynolds}."
+    )
+
+
+def _thetas(rows: Sequence[Row]) -> str:
+    """The critical Shields numbers on level beds that are not the model's, by size."""
+    found = {}
+    for row in rows:
+        found[length(float(row["d_m"]))] = _reference_theta(row)
+    if len(found) == 1:
+        (size, theta), *_ = found.items()
+        # a median of flumes is at a Reynolds number, a formula is for a size
+        of = f" for grains of {size}" if is_by_formula(rows[0]) else ""
+        return f"θ_c = {theta}{of}"
+    return f"θ_c = {_each(f'{theta} ({size})' for size, theta in found.items())}"
+
+
+def _each(texts: Iterable[str]) -> str:
+    """Different texts in a sentence."""
+    return " and ".join(dict.fromkeys(texts))
 
 
 def _reference_theta(row: Row) -> str:

@@ -130,12 +130,38 @@ def fluid(density: float, viscosity: float) -> str:
     numbers = f"{plain_number(density, 4)} kg/m³, {plain_number(viscosity)} m²/s"
     if is_like_paper(density, viscosity):
         return f"the article’s gas ({numbers}), close to air"
+    kind = "gas" if is_gas(density) else "liquid"
+    return name_of_fluid(density, viscosity) or f"a {kind} of {numbers}"
+
+
+def name_of_fluid(density: float, viscosity: float) -> str:
+    """Name air and water.
+
+    Parameters
+    ----------
+    density
+        Density of a fluid, kg/m3.
+    viscosity
+        Its kinematic viscosity, m2/s.
+
+    Returns
+    -------
+    str
+        The name; empty of another fluid.
+
+    Examples
+    --------
+    >>> name_of_fluid(1.225, 1.46e-5), name_of_fluid(1.0, 1e-5)
+    ('air', '')
+    """
+    if is_like_paper(density, viscosity):
+        return ""
     for name, (densities, viscosities) in (("air", AIR), ("water", WATER)):
         is_dense = densities[0] <= density <= densities[1]
         is_viscous = viscosities[0] <= viscosity <= viscosities[1]
         if is_dense and is_viscous:
             return name
-    return f"a {'gas' if is_gas(density) else 'liquid'} of {numbers}"
+    return ""
 
 
 def length(metres: float) -> str:

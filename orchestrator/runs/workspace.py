@@ -248,7 +248,7 @@ class Workspace(Folder):
             "orchestrator": __version__,
             "kind": kind.word,
             "name": name,
-            "begun": begun or _now(),
+            "begun": begun or now(),
             "cases": [*cases],
             "source": dict(source),
             **question,
@@ -602,9 +602,15 @@ def is_dated() -> bool:
     return EPOCH in os.environ
 
 
-def _now() -> str:
-    """The time to the minute, or that of `EPOCH`."""
-    now = datetime.now(UTC)
+def now() -> str:
+    """Tell the time to the minute, or that of `EPOCH`.
+
+    Returns
+    -------
+    str
+        The time in UTC.
+    """
+    time = datetime.now(UTC)
     if is_dated():
-        now = datetime.fromtimestamp(int(os.environ[EPOCH]), UTC)
-    return now.strftime("%Y-%m-%d %H:%M UTC")
+        time = datetime.fromtimestamp(int(os.environ[EPOCH]), UTC)
+    return time.strftime("%Y-%m-%d %H:%M UTC")

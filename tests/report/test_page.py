@@ -327,7 +327,8 @@ def test_a_study_of_another_version_costs_its_own_sentences(studies: Path) -> No
         _ = orchestrator.open(studies / "one").answer
     html = gallery.write_gallery(studies).read_text(encoding="utf-8")
     assert html.count("another version of this program wrote them") == 1
-    assert html.count("At what wind does a grain of 1 mm start to move?") == 1
+    asked = "At what wind does a grain of 1\u00a0mm start to move?"
+    assert html.count(asked) == 1
 
 
 def test_a_fault_of_the_program_is_not_told_as_another_version(
