@@ -49,11 +49,11 @@ def text_of(title: str, card: Card, figures: Sequence[str]) -> str:
 
 
 def _known(number: dict[str, Any]) -> dict[str, Any]:
-    """The fields of a number that are not NaN."""
+    """The fields of a number that are known."""
     return {
         name: value
         for name, value in number.items()
-        if not (isinstance(value, float) and math.isnan(value))
+        if not isinstance(value, float) or math.isfinite(value)
     }
 
 

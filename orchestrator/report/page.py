@@ -18,6 +18,7 @@ from markupsafe import Markup, escape
 
 from orchestrator import __version__
 from orchestrator.report.card import Card, in_terminal, marked_lines
+from orchestrator.report.field import is_field
 from orchestrator.runs.files import Folder
 
 if TYPE_CHECKING:
@@ -29,8 +30,6 @@ IN_ADDRESS = " <>/=:;,.'()!*?[]{}|~+-"
 """Letters that stand for themselves in the address of a picture."""
 MOST_ROWS = 60
 """Rows of a table that a page of an experiment shows; more are folded away."""
-FIELDS = (b"<image", b"Quad", b"linearGradient", b'class="grains"')
-"""What the SVG of a field of colours, or of grains, has."""
 IN_LEGEND = {"card": "Card", "figures": "Figure", "table": "Sheet"}
 """What the legend of a page explains where it is there, by the kind of element."""
 IN_SENTENCES = "The answer in sentences"
@@ -240,24 +239,6 @@ def address(image: bytes) -> str:
     text = " ".join(image.decode("utf-8").split("\n"))
     text = re.sub('"([^"\']*)"', r"'\1'", text)
     return Markup("data:image/svg+xml;utf8," + quote(text, safe=IN_ADDRESS))
-
-
-def is_field(image: bytes) -> bool:
-    """Say whether a picture has a field of colours, such as a map of speeds.
-
-    Parameters
-    ----------
-    image
-        A PNG or an SVG file.
-
-    Returns
-    -------
-    bool
-        Whether it has; in a dark page its colours are not turned.
-    """
-    if not image.lstrip().startswith(b"<"):
-        return True
-    return any(mark in image for mark in FIELDS)
 
 
 def _inline(figure: "Figure") -> Markup:

@@ -25,6 +25,7 @@ from matplotlib.path import Path
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from orchestrator.report import plotted
+from orchestrator.report.field import is_field
 from orchestrator.runs.files import Folder
 
 RC: dict[Any, Any] = {
@@ -177,6 +178,8 @@ class Figure:
         The numbers that it shows, as CSV; empty until it is drawn, or without any.
     has_png
         Whether a file of it as PNG is beside the SVG.
+    has_field
+        Whether a PNG that the page shows has a field of colours.
     """
 
     name: str
@@ -194,6 +197,7 @@ class Figure:
     narrow_image: bytes = b""
     numbers: str = ""
     has_png: bool = False
+    has_field: bool = False
 
     @cached_property
     def canvas(self) -> Canvas | None:
@@ -547,7 +551,12 @@ def saved(figure: Figure, folder: Folder, *, png: bool = False) -> Figure:
     folder.put(f"{FIGURES}/{figure.name}.svg", made.image)
     if made.numbers:
         folder.put(f"{FIGURES}/{figure.name}.csv", made.numbers)
-    return replace(made, image=raster or made.image, has_png=bool(raster))
+    return replace(
+        made,
+        image=raster or made.image,
+        has_png=bool(raster),
+        has_field=is_field(made.image),
+    )
 
 
 def drawn_as(figure: Figure) -> Figure:
