@@ -407,11 +407,13 @@ def legends_below(
     figure
         The figure.
     colours
-        Samples of colours.
+        Samples of colours; a single one is left out.
     looks
         Samples of lines and marks.
     """
-    above = _legend(figure, colours, 6, "outside upper center")
+    # one colour tells nothing apart
+    several = colours if len(colours) > 1 else []
+    above = _legend(figure, several, 6, "outside upper center")
     below = _legend(figure, looks, 3, "outside lower center")
     if not figure.get_layout_engine():
         extend(figure, above, below)

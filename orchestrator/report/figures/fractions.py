@@ -39,17 +39,18 @@ from orchestrator.report.style import (
     Figure,
     Look,
 )
-from orchestrator.report.subjects import ReportedQuantity
+from orchestrator.report.subjects import STRESS, ReportedQuantity
 
-Along = Literal["shields", "reynolds"]
+Along = Literal["flow", "shields", "reynolds"]
 SHOWN_UP_TO = 0.9
 """n/N up to which the axis of the stress holds every curve."""
 MARKERS = 30
 """Largest number of markers of a curve: peeling gives one for each grain."""
 AXES: Mapping[Along, str] = {"shields": labels.TAU_AXIS, "reynolds": labels.RE_AXIS}
 ENDINGS: Mapping[Along, tuple[str, str, str]] = {
-    "shields": ("", "", "Fig. 14, right"),
-    "reynolds": ("-reynolds", " against Re*", "Fig. 14, left"),
+    "flow": ("-flow", "", ""),
+    "shields": ("", " against τ of those entrained", "Fig. 14, right"),
+    "reynolds": ("-reynolds", " against Re* of those entrained", "Fig. 14, left"),
 }
 """Endings of names and titles, and the figure of the paper."""
 ADVISED: Look = {"color": ANSWER, "lw": 1.8}
@@ -72,13 +73,14 @@ numbers of the card; disc: its answer; pale bar: its interval. {% if seeds %}Thi
 replicates (random seeds).{% endif %} {% if beside %}The other line: the same bed and
 flow {{ beside }}.{% endif %}"""
 CAPTION = """\
-{% from "captions.j2" import laws, protocol, is_open, low_regime %} After Fig. 14 of the
-paper. Each marker is a flow: the fraction of the N(d) exposed grains that had moved,
-against {{ {"shields": "τ", "reynolds": "Re*"}[along] }} of the mean {{ about.stress
-}} over these grains, as in the paper. The mean falls where the next grains to move feel
-less stress. Above n/N = 90 % a curve may leave the frame. Forces: {% if
-about.is_followed %}the drag of a grain's velocity relative to the fluid{% else %}{{
-laws(about, "Between the two") }}{% endif %}. {{ protocol(about) }} {{ is_open(about) }}
+{% from "captions.j2" import laws, protocol, is_open, low_regime %} {% if along ==
+"flow" %}Fraction of the N(d) exposed grains that is entrained, n/N, against the {{ told
+}} of the undisturbed flow. {% else %}After Fig. 14 of the paper: n/N against {{
+{"shields": "τ", "reynolds": "Re*"}[along] }} of the mean {{ about.stress }} over the
+entrained grains. The mean falls where the next grains to move feel less stress. {%
+endif %}Above n/N = 90 % a curve may leave the frame. Forces: {% if about.is_followed
+%}the drag of a grain's velocity relative to the fluid{% else %}{{ laws(about,
+"Between the two") }}{% endif %}. {{ protocol(about) }} {{ is_open(about) }}
 {{ low_regime(about) }}"""
 
 
@@ -92,6 +94,7 @@ def draw(results: Results) -> Iterator[Figure]:
         right half of Fig. 14 of the paper, against Re* as the left one.
     """
     yield from _of_the_card(results)
+    yield from _of_all(results, "flow")
     yield from _of_all(results, "shields")
     yield from _of_all(results, "reynolds")
 
@@ -214,8 +217,9 @@ def _of_all(results: Results, along: Along) -> Iterator[Figure]:
     least = scenes["alpha_deg"].min()
     for (alpha,), of_slope in split_by(scenes, "alpha_deg"):
         for part in shields.by_stress(of_slope):
-            for figure in _of_slope(part, curves, by, colours, along):
-                is_shown = figure.place == "" and alpha == least and along == "shields"
+            along_flow = _with_flow(part.rows, curves) if along == "flow" else curves
+            for figure in _of_slope(part, along_flow, by, colours, along):
+                is_shown = figure.place == "" and alpha == least and along == "flow"
                 yield replace(figure, place="" if is_shown else "folded")
 
 
@@ -234,16 +238,51 @@ def _of_slope(
     name, title, follows = ENDINGS[along]
     is_of_paper = np.isclose(alpha, SLOPE_OF_PAPER)
     keys = ["z0_over_d", *choices]
-    for sheet in shields.sheets(rows, keys, 2.3, AXES[along], "n/N"):
+    told = told_of(scenes)
+    axis = AXES.get(along, f"{told.name}, {told.unit}")
+    against = f", against the {told.name}" if along == "flow" else title
+    for sheet in shields.sheets(rows, keys, 2.3, axis, "n/N"):
         yield Figure(
             name=f"fractions{name}-alpha{alpha:g}{part.name}{sheet.name}",
-            title=f"Fraction of moving grains{title}, {slope}{part.title}{sheet.title}",
-            caption=filled(CAPTION, about=shields.about(sheet.rows), along=along),
+            title=f"Fraction entrained, n/N{against}, {slope}{part.title}{sheet.title}",
+            caption=filled(
+                CAPTION, about=shields.about(sheet.rows), along=along, told=told.name
+            ),
             cases=case_names(sheet.rows),
             drawing=partial(_draw_panels, sheet, curves, by, colours, along),
             place="folded" if sheet.name else "",
             follows=follows + part.after if is_of_paper and not sheet.name else "",
         )
+
+
+def told_of(scenes: pd.DataFrame) -> ReportedQuantity:
+    """Choose the quantity by which the flows of several beds are told.
+
+    Parameters
+    ----------
+    scenes
+        The scenes.
+
+    Returns
+    -------
+    ReportedQuantity
+        That of each bed where it is one, else the bed shear stress.
+    """
+    every = {single.quantity_of_row(row) for _, row in scenes.iterrows()}
+    return every.pop() if len(every) == 1 else STRESS
+
+
+def _with_flow(
+    scenes: pd.DataFrame, curves: Mapping[str, pd.DataFrame]
+) -> dict[str, pd.DataFrame]:
+    """The curves with the undisturbed flow of each point, in one quantity."""
+    told = told_of(scenes)
+    found = {}
+    for _, row in scenes.iterrows():
+        points = curves[row["scene_id"]]
+        flow = units.told_by(row, points["ustar0_m_s"], told)
+        found[str(row["scene_id"])] = points.assign(flow=flow)
+    return found
 
 
 def _curves(results: Results) -> dict[str, pd.DataFrame]:

@@ -196,4 +196,4 @@ def _names(results: Results, piles: Sequence[Pile]) -> list[str]:
     return [labels.panel(row, varied) for _, row in values.iterrows()]
 
 
-FIGURE = FigureKind(order=150, draws=draw, needs=("speed_profile",))
+FIGURE = FigureKind(order=155, draws=draw, needs=("speed_profile",))
