@@ -31,7 +31,7 @@ from orchestrator.study.closed_form import law_holds
 from orchestrator.study.fidelities import Fields
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study, changed, value_of
-from orchestrator.tables.rows import shields
+from orchestrator.tables.quantities import shields
 
 QUASI_STATIC = named("static")
 """Fidelity of the choices but for those that dynamics alone feel."""

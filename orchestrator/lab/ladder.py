@@ -46,7 +46,7 @@ from orchestrator.study.criterion import ENTRAINED
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study, changed
-from orchestrator.tables.rows import point
+from orchestrator.tables.quantities import point
 from orchestrator.types import Row
 
 

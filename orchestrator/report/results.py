@@ -17,8 +17,8 @@ from orchestrator.study.method import HELD_FROM
 from orchestrator.study.study import Study
 from orchestrator.tables import with_methods, with_scenes
 from orchestrator.tables.facts import needs_run
+from orchestrator.tables.flows import measured_hill
 from orchestrator.tables.quoted import reported
-from orchestrator.tables.rows import measured_hill
 
 FRACTION = 0.3  # n/N at which one threshold stands for all of its pile
 Made = TypeVar("Made")

@@ -30,10 +30,34 @@ from orchestrator.runs import second
 from orchestrator.runs.files import Folder, digest_text
 from orchestrator.study import fields
 from orchestrator.study.study import Study
-from orchestrator.tables import check, paired, quoted, rows, usable
+from orchestrator.tables import check, paired, quoted, usable
+from orchestrator.tables.answer import Answer
 from orchestrator.tables.check import KEYS, contradictions, with_agreement
+from orchestrator.tables.classes import SIZE_CLASS
 from orchestrator.tables.columns import Listed, several
+from orchestrator.tables.dem_checks import CHECK, check_rows
+from orchestrator.tables.flows import (
+    FLOW,
+    SPEED_PROFILE,
+    WALL_STRESS,
+    flow_row,
+    speed_profile,
+    wall_stress,
+)
+from orchestrator.tables.forms import BED_CHANGE, FORM, bed_changes
+from orchestrator.tables.piles import PILE_CURVE, PILE_GRAIN, OfPile, of_pile
+from orchestrator.tables.quantities import SPEEDS
 from orchestrator.tables.quoted import of_classes
+from orchestrator.tables.scenes import METHODS, SCENES, method_rows, scene_rows
+from orchestrator.tables.single_grains import SINGLE_GRAIN, single_grain_rows
+from orchestrator.tables.thresholds import (
+    BETWEEN,
+    CORRECTED,
+    DECIDED,
+    PILE_THRESHOLD,
+    SMOOTHING,
+    STARTS,
+)
 from orchestrator.tables.usable import Remedies, with_scatter, with_usable
 from orchestrator.types import Row
 
@@ -55,14 +79,14 @@ TIMINGS: Mapping[str, str] = {
 TABLES: Mapping[str, Listed] = {
     "scenes": Listed(
         "a scene: the values of its fields, and the groups that ask for it",
-        (rows.SCENES,),
+        (SCENES,),
     ),
-    "methods": Listed("a scene: how it was answered, and why", (rows.METHODS,)),
+    "methods": Listed("a scene: how it was answered, and why", (METHODS,)),
     "single_grain": Listed(
         "a single grain: its threshold",
         (
-            rows.SINGLE_GRAIN,
-            rows.SPEEDS,
+            SINGLE_GRAIN,
+            SPEEDS,
             verdict.COLUMNS,
             beside.MEASURED,
             beside.TESTED,
@@ -74,13 +98,13 @@ TABLES: Mapping[str, Listed] = {
     "pile_threshold": Listed(
         "a pile and a fraction n/N: its threshold",
         (
-            rows.PILE_THRESHOLD,
-            rows.SPEEDS,
-            rows.STARTS,
-            rows.DECIDED,
-            rows.SMOOTHING,
-            rows.BETWEEN,
-            rows.CORRECTED,
+            PILE_THRESHOLD,
+            SPEEDS,
+            STARTS,
+            DECIDED,
+            SMOOTHING,
+            BETWEEN,
+            CORRECTED,
             usable.SCATTER,
             verdict.COLUMNS,
             beside.MEASURED,
@@ -94,25 +118,25 @@ TABLES: Mapping[str, Listed] = {
     "reason": Listed("a reason against a threshold", (usable.REASON,)),
     "pile_curve": Listed(
         "a pile and a load step: the part of the grains that has moved",
-        (rows.PILE_CURVE,),
+        (PILE_CURVE,),
     ),
     "pile_grain": Listed(
-        "a grain of a pile: where it lies and when it moved", (rows.PILE_GRAIN,)
+        "a grain of a pile: where it lies and when it moved", (PILE_GRAIN,)
     ),
     "size_class": Listed(
         "a size class of a mixture and a fraction: its threshold, hiding",
-        (rows.SIZE_CLASS,),
+        (SIZE_CLASS,),
     ),
     "bed_change": Listed(
         "a pile on a bed that changes and a number of moved grains",
-        (rows.BED_CHANGE,),
+        (BED_CHANGE,),
     ),
-    "form": Listed("a form of a train and a fraction: its threshold", (rows.FORM,)),
-    "flow": Listed("a solved flow", (rows.FLOW,)),
-    "wall_stress": Listed("a place on the bed of a solved flow", (rows.WALL_STRESS,)),
+    "form": Listed("a form of a train and a fraction: its threshold", (FORM,)),
+    "flow": Listed("a solved flow", (FLOW,)),
+    "wall_stress": Listed("a place on the bed of a solved flow", (WALL_STRESS,)),
     "speed_profile": Listed(
         "a height over a place of the bed of a solved flow: the speed",
-        (rows.SPEED_PROFILE,),
+        (SPEED_PROFILE,),
     ),
     "paired": Listed(
         "a bed with shelter and a fraction: its threshold over that without shelter",
@@ -120,7 +144,7 @@ TABLES: Mapping[str, Listed] = {
     ),
     "check": Listed(
         "a threshold that DEM answered too, as a check of a fast method",
-        (rows.CHECK, check.AGREEMENT),
+        (CHECK, check.AGREEMENT),
     ),
     "timings": Listed(
         "a case: the times of its run, in `timings/timings.csv`", (TIMINGS,)
@@ -178,14 +202,12 @@ def make_tables(study: Study, plan: Plan, cases: Path, done: Container[str]) -> 
             answered[scene_id] = pile
     answer_of = partial(_answer, plan, cases, done)
     told = _of_piles([*answered], answer_of)
-    scenes = pd.DataFrame(rows.scenes(study, plan))
-    methods = pd.DataFrame(rows.methods(plan))
+    scenes = pd.DataFrame(scene_rows(study, plan))
+    methods = pd.DataFrame(method_rows(plan))
     asked = with_methods(scenes, methods)
     grains = _single_grains(plan, cases, done)
     thresholds = with_scatter(_listed(each.thresholds for each in told), asked)
-    checks = with_agreement(
-        pd.DataFrame(rows.check_rows(plan, cases, done)), thresholds
-    )
+    checks = with_agreement(pd.DataFrame(check_rows(plan, cases, done)), thresholds)
     beds = with_usable(
         thresholds,
         asked,
@@ -200,19 +222,17 @@ def make_tables(study: Study, plan: Plan, cases: Path, done: Container[str]) -> 
         "scenes": scenes,
         "methods": methods,
         "single_grain": lone.table,
-        "wall_stress": _stacked(
-            rows.wall_stress(pile, cases) for pile in flows.values()
-        ),
+        "wall_stress": _stacked(wall_stress(pile, cases) for pile in flows.values()),
         "speed_profile": _stacked(
-            rows.speed_profile(pile, cases) for pile in flows.values()
+            speed_profile(pile, cases) for pile in flows.values()
         ),
-        "flow": pd.DataFrame([rows.flow(pile, cases) for pile in flows.values()]),
+        "flow": pd.DataFrame([flow_row(pile, cases) for pile in flows.values()]),
         "pile_grain": _stacked(each.grains for each in told),
         "pile_curve": curves,
         "pile_threshold": beds.table,
         "reason": pd.concat([beds.reasons, lone.reasons], ignore_index=True),
         "size_class": of_classes(classes, beds.table),
-        "bed_change": _stacked(rows.bed_changes(answered, answer_of)),
+        "bed_change": _stacked(bed_changes(answered, answer_of)),
         "form": _listed(each.forms for each in told),
         "paired": paired.paired(beds.table, curves, asked),
         "check": checks,
@@ -234,22 +254,20 @@ def _remedies(
     return found
 
 
-def _answer(
-    plan: Plan, cases: Path, done: Container[str], scene_id: str
-) -> rows.Answer:
+def _answer(plan: Plan, cases: Path, done: Container[str], scene_id: str) -> Answer:
     """The answer to the scene of a pile whose runs are done."""
     smoothed = _smoothed(plan, scene_id, done)
-    return rows.Answer(plan.decisions[scene_id], plan.piles[scene_id], cases, smoothed)
+    return Answer(plan.decisions[scene_id], plan.piles[scene_id], cases, smoothed)
 
 
 def _of_piles(
-    answered: Sequence[str], answer_of: Callable[[str], rows.Answer]
-) -> list[rows.OfPile]:
+    answered: Sequence[str], answer_of: Callable[[str], Answer]
+) -> list[OfPile]:
     """The rows of each pile, in which grains without a run move, by two processes."""
 
-    def of_part(part: int) -> list[rows.OfPile]:
+    def of_part(part: int) -> list[OfPile]:
         chosen = answered[PART * part : PART * (part + 1)]
-        return [rows.of_pile(answer_of(scene_id)) for scene_id in chosen]
+        return [of_pile(answer_of(scene_id)) for scene_id in chosen]
 
     parts = second.shared(of_part, ceil(len(answered) / PART))
     return [*chain.from_iterable(parts)]
@@ -258,7 +276,7 @@ def _of_piles(
 def _single_grains(plan: Plan, cases: Path, done: Container[str]) -> pd.DataFrame:
     """The rows of the single grains whose cells are done."""
     cells = [cell for cell in plan.cells if cell.name in done]
-    return pd.DataFrame(rows.single_grain_rows(plan, cells, cases))
+    return pd.DataFrame(single_grain_rows(plan, cells, cases))
 
 
 def missing(tables: Mapping[str, pd.DataFrame]) -> list[str]:

@@ -23,7 +23,7 @@ from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.study import study
 from orchestrator.study.study import Study
-from orchestrator.tables.rows import shields
+from orchestrator.tables.quantities import shields
 
 TOLERANCE = 0.08
 """Between the errors of DEM and of pivots on lifted grains."""

@@ -22,7 +22,8 @@ from orchestrator.report.results import Results
 from orchestrator.study import study
 from orchestrator.study.closed_form import closed_form
 from orchestrator.study.study import changed
-from orchestrator.tables.rows import Answer, size_class
+from orchestrator.tables.answer import Answer
+from orchestrator.tables.classes import size_class
 from tests import small_study
 
 SMALL = """

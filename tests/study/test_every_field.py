@@ -14,7 +14,11 @@ from orchestrator import plan
 from orchestrator.errors import InputError
 from orchestrator.study import study
 from orchestrator.study.fields import COLUMNS, FIELDS, PARTS, Quantity, default_of
-from orchestrator.tables import csv, rows
+from orchestrator.tables import csv
+from orchestrator.tables.answer import Answer
+from orchestrator.tables.piles import pile_grain
+from orchestrator.tables.single_grains import single_grain_rows
+from orchestrator.tables.thresholds import pile_threshold
 
 ROOT = Path(__file__).parents[2]
 PROFILE = str(ROOT / "tests/study/profile.csv")
@@ -202,12 +206,12 @@ def _found(asked: study.Study) -> Found:
     if planned.cases:
         return sorted(planned.cases)
     none = Path("no case")
-    tables = [pd.DataFrame(rows.single_grain_rows(planned, (), none))]
+    tables = [pd.DataFrame(single_grain_rows(planned, (), none))]
     for scene_id, pile in planned.piles.items():
-        answer = rows.Answer(planned.decisions[scene_id], pile, none)
+        answer = Answer(planned.decisions[scene_id], pile, none)
         tables += [
-            pd.DataFrame(rows.pile_threshold(answer)),
-            pd.DataFrame(rows.pile_grain(answer)),
+            pd.DataFrame(pile_threshold(answer)),
+            pd.DataFrame(pile_grain(answer)),
         ]
     # what is said of the scene again is no answer
     answers = [

@@ -15,7 +15,8 @@ from orchestrator.study.fields import Quantity
 from orchestrator.study.parts import Gusts, LogNormal, PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import changed
-from orchestrator.tables import meanings, rows
+from orchestrator.tables import meanings
+from orchestrator.tables.scenes import method_rows, scene_rows
 
 PAGE = Path(__file__).parents[2] / "docs" / "study-file.md"
 REFERENCE = runpy.run_path(str(PAGE.with_name("study_file.py")))
@@ -167,9 +168,9 @@ def test_a_field_without_effect_is_empty_and_one_left_open_is_worked_out(
 def test_a_row_has_the_scene_that_was_asked_and_the_one_that_answered_it() -> None:
     asked = study.parse("tolerance = 0.2\n" + PILE, name="test", where="test")
     planned = plan.make(asked)
-    (row,), (scene,) = rows.scenes(asked, planned), asked.scenes
+    (row,), (scene,) = scene_rows(asked, planned), asked.scenes
     assert {"scene_id": scene.id, **fields.question(scene)}.items() <= row.items()
-    (how,) = rows.methods(planned)
+    (how,) = method_rows(planned)
     answer = fields.method(planned.decisions[scene.id].scene)
     assert {"scene_id": scene.id, **answer}.items() <= how.items()
     assert (how["asked"], how["method"], how["fidelity"]) == ("auto", "pivot", "quick")

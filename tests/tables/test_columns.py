@@ -10,8 +10,8 @@ import pytest
 from orchestrator import tables
 from orchestrator.report.results import Results
 from orchestrator.runs.files import Folder
-from orchestrator.tables import TABLES, rows
-from orchestrator.tables.rows import Answer
+from orchestrator.tables import TABLES, piles
+from orchestrator.tables.answer import Answer
 from orchestrator.types import Row
 from tests import small_study
 
@@ -40,15 +40,15 @@ def test_a_column_more_is_one_file(
 ) -> None:
     """With its maker it gets into the table, into the file of meanings and the page."""
     name, meaning = "twice_moved", "two times the grains that had moved"
-    made: Any = rows.pile_curve
+    made: Any = piles.pile_curve
 
     def with_one_more(answer: Answer) -> Row:
         row: Row = made(answer)
         return {**row, name: 2 * row["moved"]}
 
     assert not [*tmp_path.iterdir()]
-    monkeypatch.setitem(rows.PILE_CURVE, name, meaning)
-    monkeypatch.setattr(rows, "pile_curve", with_one_more)
+    monkeypatch.setitem(piles.PILE_CURVE, name, meaning)
+    monkeypatch.setattr(piles, "pile_curve", with_one_more)
     found = small_study.run(tmp_path, BED).tables
     curve = found["pile_curve"]
     assert curve[name].tolist() == (2 * curve["moved"]).tolist()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from orchestrator.flow.stress import WallStress
-from orchestrator.tables import rows
+from orchestrator.tables.flows import wall_stress
 
 
 def test_each_column_of_the_stress_has_its_own_quantity() -> None:
@@ -31,7 +31,7 @@ def test_each_column_of_the_stress_has_its_own_quantity() -> None:
             level=lambda z: z + 20.0,
         ),
     )
-    found = rows.wall_stress(pile, Path())
+    found = wall_stress(pile, Path())
     expected = {
         "s_m": [0.1, 0.3],
         "s_over_h": [0.2, 0.6],
