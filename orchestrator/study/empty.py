@@ -8,7 +8,10 @@ from orchestrator.types import FloatArray
 
 EMPTY_WORDS = ("null", "nan", "*", "na", "n/a", "none", "-", "--", "---")
 """Words that stand in place of a number."""
-EMPTY_MARKS = (99, 999, 9999, 99999, 999999, 9999999, 32767, 32768, 65535)
+EMPTY_MARKS = np.array(
+    [99, 999, 9999, 99999, 999999, 9999999, 32767, 32768, 65535, 99.9, 99.99, 999.25,
+     999.9, 999.99, 9999.9, 9999.99]
+)  # fmt: skip
 """Numbers of one sign or the other that stand for no number in many files."""
 ISOLATED = 10.0
 """How many times the range of all others a number that stands for none is off them, if
@@ -65,4 +68,6 @@ def _is_isolated(
     spread = float(np.ptp(others))
     if off <= max(spread, step * math.tan(math.radians(slope_deg))):
         return False
-    return abs(value) in EMPTY_MARKS or (count > 1 and off > ISOLATED * spread > 0)
+    # a height in another unit has been multiplied, and has other last digits
+    is_mark = np.isclose(abs(value), EMPTY_MARKS, rtol=1e-9, atol=0.0).any()
+    return bool(is_mark) or (count > 1 and off > ISOLATED * spread > 0)

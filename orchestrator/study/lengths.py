@@ -94,7 +94,7 @@ OTHERS = sorted(
     reverse=True,
 )
 MENTIONED = re.compile(
-    rf"(?<![\w.%])(?<!\d )({'|'.join(map(re.escape, OTHERS))})(?![\w/])"
+    rf"(?<![\w.%])(?<!\d[ -])({'|'.join(map(re.escape, OTHERS))})(?![\w/])"
 )
 """Another unit than the metre, which is not that of a number before it."""
 

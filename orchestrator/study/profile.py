@@ -525,7 +525,7 @@ def _remedy_of_line(cells: Sequence[str]) -> str:
     """What helps a line that is no point."""
     if any(cell.lower() in EMPTY_WORDS for cell in cells):
         return "remove such lines, or write the numbers"
-    if any(re.match(r"[+-]?[.,]?\d", cell) for cell in cells):
+    if re.match(r"[+-]?[.,]?\d", cells[0]) or not cells[0]:
         return PROFILE_REMEDY
     return "remove the line, if it is no point; or write its numbers"
 

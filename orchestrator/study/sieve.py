@@ -16,7 +16,7 @@ import numpy as np
 from orchestrator.digits import number as counted
 from orchestrator.digits import rounded
 from orchestrator.errors import InputError
-from orchestrator.study.cells import Marks, TextTable, marks_of, read_cells
+from orchestrator.study.cells import POINT, Marks, TextTable, marks_of, read_cells
 from orchestrator.study.heads import name_of
 from orchestrator.study.lengths import INCH, LENGTHS, UNIT_NAMES, shown_unit
 
@@ -308,6 +308,11 @@ def _is_told(cell: str) -> bool:
     return bool(_words(cell) & {*PASSES, *STAYS, *COARSER})
 
 
+def _is_total(cell: str) -> bool:
+    """Whether a line with such an opening has totals."""
+    return cell.lower().strip(" :") in TOTALS
+
+
 def _size_column(table: TextTable, where: str) -> int:
     """The place of the column of openings."""
     called = [at for at, name in enumerate(table.names) if _is_size(name)]
@@ -450,7 +455,6 @@ class _Sieving:
     def _lines(self) -> list[_Line]:
         """Number, openings and amounts of each line, the coarsest first."""
         found: list[_Line] = []
-        totals: list[tuple[int, dict[int, str]]] = []
         first = next(iter(self.values))
         columns = [*self.values, self.size, *self.other_sizes]
         for line, cells in self.table.cells(columns):
@@ -459,8 +463,7 @@ class _Sieving:
             if not any([size, *amounts]):
                 continue
             place = f"{self.where}: line {line}"
-            if size.lower().strip(" :") in TOTALS:
-                totals.append((line, dict(zip(self.values, amounts, strict=True))))
+            if _is_total(size):
                 continue
             opening = self._opening(size, place)
             given = {}
@@ -475,34 +478,45 @@ class _Sieving:
             what = "one class lies between two sieves"
             raise InputError(what, self.where, "give two sieves at least")
         found.sort(key=lambda each: (-each[1][1], -each[1][0]))
-        for line, of in totals:
-            self._check_total(found, line, of)
+        every = range(len(self.table.names))
+        self._check_totals([*self.table.cells(every)])
         for (_, one, _), (line, other, _) in pairwise(found):
             if one == other:
                 what = f"{other[1]:g} mm stands twice"
                 raise InputError(what, f"{self.where}: line {line}", "leave one line")
         return found
 
-    def _check_total(
-        self, lines: Sequence[_Line], line: int, totals: Mapping[int, str]
-    ) -> None:
+    def _check_totals(self, rows: Sequence[tuple[int, list[str]]]) -> None:
         """Refuse a total that is not the sum of what stays on the sieves."""
-        place = f"{self.where}: line {line}"
-        for at, cell in totals.items():
-            if self.values[at] != "retained" or not cell:
+        totals = [row for row in rows if _is_total(row[1][self.size])]
+        for at, name in enumerate(self.table.names):
+            if at == self.size or self.values.get(at, _kind_of(name)) != "retained":
                 continue
-            name = self.table.names[at]
-            (total,) = _numbers([cell], [name], self.marks, place)
-            amounts = [given[at] for _, _, given in lines if at in given]
-            if [*amounts] == sorted(amounts) and total == amounts[-1]:
-                continue  # the column has sums, which end with the total
-            off = abs(sum(amounts) - total)
-            if off > OFF_COLUMNS / 100 * abs(total):
-                what = f"{name}: the total is {total:g}, and the lines add up to "
-                what = f"{what}{sum(amounts):.6g}"
-                raise InputError(
-                    what, place, "mend a line, or remove that of the total"
-                )
+            for line, cells in totals:
+                others = [row[at] for _, row in rows if not _is_total(row[self.size])]
+                self._check_total(cells[at], others, name, line)
+
+    def _check_total(
+        self, cell: str, others: Sequence[str], name: str, line: int
+    ) -> None:
+        """Refuse a total that is not the sum of the other cells of its column."""
+        given = [one.rstrip("% ") for one in (cell, *others)]
+        try:
+            marks = marks_of(given)
+            total, *amounts = (marks.number(one) if one else math.nan for one in given)
+        except ValueError:
+            return  # a column that is not read says nothing
+        known = [amount for amount in amounts if not math.isnan(amount)] or [0.0]
+        is_of_sums = known in (sorted(known), sorted(known, reverse=True)) and any(
+            math.isclose(total, end) for end in (known[0], known[-1])
+        )
+        if math.isnan(total) or is_of_sums:
+            return
+        if abs(sum(known) - total) > OFF_COLUMNS / 100 * abs(total):
+            what = f"{name}: the total is {total:g}, and the lines add up to "
+            what = f"{what}{sum(known):.6g}"
+            remedy = "mend a line, or remove that of the total"
+            raise InputError(what, f"{self.where}: line {line}", remedy)
 
     def _opening(self, cell: str, place: str) -> tuple[float, float]:
         """The openings that a cell names, mm; 0 of the pan."""
@@ -514,14 +528,9 @@ class _Sieving:
         numbered = OF_NUMBER.fullmatch(bare)
         if numbered:
             return self._astm(ASTM, numbered[1] or numbered[2], cell, place)
-        in_inches = OF_INCHES.fullmatch(bare)
-        if in_inches:
-            return self._astm(INCHES, in_inches[1].strip(), cell, place)
-        is_inch = unit == INCH / LENGTHS["mm"]
-        if (unit is None or is_inch) and FRACTION.fullmatch(bare):
-            return self._astm(INCHES, bare.replace("-", " "), cell, place)
-        if is_inch and bare in INCHES:
-            return self._astm(INCHES, bare, cell, place)
+        in_inches = self._inches(bare, unit, cell, place)
+        if in_inches is not None:
+            return in_inches
         between = (
             RANGE.fullmatch(bare) if unit != 0 or not bare.startswith("-") else None
         )
@@ -542,6 +551,21 @@ class _Sieving:
         if alone[1] in (">", "≥"):
             return found, math.inf
         return found, found
+
+    def _inches(
+        self, bare: str, unit: float | None, cell: str, place: str
+    ) -> tuple[float, float] | None:
+        """The openings of a cell in inches, mm; None for another cell."""
+        marked = OF_INCHES.fullmatch(bare)
+        is_inch = unit == INCH / LENGTHS["mm"]
+        word = marked[1].strip() if marked else bare
+        if marked and POINT.fullmatch(word):
+            found = self._length(word, "in", unit, place)
+            return found, found
+        is_fraction = (unit is None or is_inch) and FRACTION.fullmatch(word)
+        if marked or is_fraction or (is_inch and word in INCHES):
+            return self._astm(INCHES, word.replace("-", " "), cell, place)
+        return None
 
     def _astm(
         self, table: Mapping[str, float], word: str, cell: str, place: str

@@ -203,6 +203,18 @@ HEIGHT = re.compile(
     re.IGNORECASE,
 )
 """A height in the name of a column: wind_speed_10m, WS50M, speed at 33 ft."""
+TENS = re.compile(
+    r"[(\[]? ?(?:10'?s? ?(?:of )?(?:deg(?:rees)?|°)|tens of deg\w*) ?[)\]]?"
+)
+"""A unit of directions: tens of degrees."""
+HIGHEST_TEN = 36
+"""The north in tens of degrees."""
+ABOVE = re.compile(
+    r"(?:anemometer|sensor|measure\w*|wind\w*|mess\w*)\W*(?:height|höhe)\W+"
+    rf"(?:above ground\W+)?(\d+(?:[.,]\d+)?) ?({'|'.join((*FEET, *METRE))})(?!\w)",
+    re.IGNORECASE,
+)
+"""The height of the winds in a line above a table."""
 HEIGHTS = ("z", "height", "höhe", "hoehe", "hoogte")
 """Columns of the height of winds."""
 CLASS = re.compile(
@@ -216,6 +228,11 @@ PARTS = 10
 REMEDY = (
     "name the columns: from_deg, speed_m_s and share or hours; or a time, a speed and "
     "a direction, as date,ws,wd; or a direction and classes of speeds, 0-2,2-4,>4"
+)
+NAMES_REMEDY = (
+    f"{REMEDY}; names that are known: {', '.join(FIELDS['direction'][1:9:2])}; "
+    f"{', '.join(FIELDS['speed'][:8:2])}; {', '.join(FIELDS['share'][:3])}; "
+    "docs/your-files.md has the others"
 )
 WND = "WND"
 """Column of winds in the hourly files of NOAA."""
@@ -324,7 +341,7 @@ def read_winds(text: str, where: str) -> Winds:
     if found is not None:
         return found
     table = _of_isd_lite(text) or _without_wnd(
-        read_cells(text, _is_head, where, REMEDY), where
+        read_cells(text, _is_head, where, NAMES_REMEDY), where
     )
     if not table.rows:
         raise InputError("its shares add up to 0: no line has a wind", where, REMEDY)
@@ -334,7 +351,7 @@ def read_winds(text: str, where: str) -> Winds:
 
 def _column(name: str) -> _Column:
     """What the name of a column says of it."""
-    words = name.strip().lower()
+    words = TENS.sub(" ", name.strip().lower())
     unit = UNIT.search(words.replace("_m_s", " m_s").replace("_km_h", " km_h"))
     bare = words.replace("_m_s", " m_s").replace("_km_h", " km_h")
     if unit:
@@ -488,6 +505,9 @@ class _Reading:
         """The height that names of columns, or a column of heights, say."""
         told = (self.columns[at].height for at in columns)
         named = {height for height in told if height is not None}
+        for found in ABOVE.finditer("\n".join(self.table.before)):
+            metres = LENGTHS[found[2].lower()]
+            named.add(rounded(metres * float(found[1].replace(",", "."))))
         for at, name in enumerate(self.table.names):
             called = name_of(name)
             if called.plain in HEIGHTS and not called.datum:
@@ -496,8 +516,8 @@ class _Reading:
                     what = f"{name}: heights from {min(cells)} to {max(cells)}"
                     raise InputError(what, self.where, "give winds of one height")
                 metres = LENGTHS[called.unit or "m"]
-                found = {self._number(cell, name, self.where) for cell in cells}
-                named |= {rounded(metres * height) for height in found}
+                heights = {self._number(cell, name, self.where) for cell in cells}
+                named |= {rounded(metres * height) for height in heights}
         if len(named) > 1:
             listed = " and ".join(
                 f"{height:g} m" for height in sorted(named, key=float)
@@ -553,6 +573,7 @@ class _Reading:
             return None
         if self.is_knmi and value == 0:
             return None  # a calm at the end of an hour
+        value *= 10.0 if TENS.search(name.lower()) else 1.0
         if not -360 <= value <= 360:
             what = f"{name} {value:g}"
             raise InputError(what, place, "degrees from north over east, 0 to 360")
@@ -601,6 +622,8 @@ class _Reading:
         factor = self._factor(fast)
         self.height = self._height([fast, way])
         self._check_degrees(self.table.column(way), self.table.names[way])
+        if TENS.search(self.table.names[way].lower()):
+            self.said.append(f"directions from {self.table.names[way]!r} in tens of °")
         for line, cells in self.table.rows:
             cells += [""] * (len(self.columns) - len(cells))
             place = self._place(line)
@@ -646,6 +669,13 @@ class _Reading:
         if len(values) >= MANY and 0 < max(values) <= 2 * math.pi and not is_whole:
             what = f"{name} is {max(values):g} at most: did you mean radians?"
             raise InputError(what, self.where, "multiply it by 57.29578")
+        known = [value for value in values if 0 <= value <= 360]
+        is_low = is_whole and len(known) >= MANY and max(known) <= HIGHEST_TEN
+        if is_low and not TENS.search(name.lower()):
+            what = f"{name} is {max(known):g} at most: did you mean tens of degrees?"
+            remedy = f"name it {name} (10 deg), or {name} (deg)"
+            if not re.search(r"deg|°|grad", name.lower()):
+                raise InputError(what, self.where, remedy)
 
     # the kinds of tables
 

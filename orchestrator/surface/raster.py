@@ -622,7 +622,7 @@ def _system_beside(path: Path, where: str) -> tuple[Any, RasterUnits]:
         return None, RasterUnits()
     library = rasterio(where)
     where = f"{where}: {path.name}"
-    text = decoded(read_bytes(path, LARGEST_PROJECTION, where), where)
+    text = decoded(read_bytes(path, LARGEST_PROJECTION, where), where, is_data=True)
     if UNIT_OF_ARCINFO.search(text):
         return None, units_of_arcinfo(text, path.name, where)
     try:

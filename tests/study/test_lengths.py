@@ -59,7 +59,7 @@ def test_the_name_of_a_column_says_its_unit_and_its_datum(
         (["Survey of May", "all values are in inches"], "inches"),
         (["units are in US survey feet"], "us survey feet"),
         (["line 3 of 7, flown at 120 ft"], "m"),
-        (["grain 0.25 mm"], "m"),
+        (["grain 0.25 mm", "a 5-cm grid, GSD 2cm"], "m"),
         ([], "m"),
     ],
 )

@@ -532,6 +532,7 @@ def test_names_of_surveyors_in_metres_are_no_other_bed(tmp_path: Path) -> None:
         ({20: "-9999,0.01"}, "line 22: x_m: -9999 in 1 point looks like an empty cell"),
         ({20: "-9999,-9999"}, "line 22: x_m: -9999 in 1 point looks"),
         ({20: "0.1,99", 21: "0.105,99"}, "line 22: z_m: 99 in 2 points looks"),
+        ({20: "0.1,-999.25"}, "line 22: z_m: -999.25 in 1 point"),
         ({20: "0.1,-32768"}, "line 22: z_m: -32768 in 1 point"),
     ],
 )
@@ -555,9 +556,10 @@ def test_words_behind_the_points_are_left_out_and_said(
     assert said.endswith("1 line of words behind its points left out")
 
 
-def test_a_foot_with_numbers_is_to_be_removed(tmp_path: Path) -> None:
+@pytest.mark.parametrize("foot", ["Surveyed 2024-05-01", "Mean,0.01", "Points: 4"])
+def test_a_foot_with_numbers_is_to_be_removed(foot: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"line 8: .*remove the line, if it is no"):
-        scene_of(tmp_path, GOOD + "Surveyed 2024-05-01\n")
+        scene_of(tmp_path, f"{GOOD}{foot}\n")
 
 
 READ = {

@@ -95,6 +95,12 @@ def test_fractions_are_sieves_of_inches(head: str) -> None:
     assert [1e3 * size for size, _ in table.rows] == pytest.approx(means)
 
 
+def test_cells_may_have_inches_with_a_point() -> None:
+    table = read_sieve('Sieve,% passing\n"0.08""",100\n0.04 in,50\n0.02 inch,0\n', "s")
+    sizes = [25.4 * (0.02 * 0.04) ** 0.5, 25.4 * (0.04 * 0.08) ** 0.5]
+    assert [1e3 * size for size, _ in table.rows] == pytest.approx(sizes)
+
+
 def test_openings_in_inches_become_millimetres_and_are_said() -> None:
     table = read_sieve("Opening (in),% passing\n0.08,100\n0.04,50\n0.02,0\n", "s")
     sizes = [25.4 * (0.02 * 0.04) ** 0.5, 25.4 * (0.04 * 0.08) ** 0.5]
@@ -145,6 +151,9 @@ REFUSED = {
     ),
     "Sieve (mm);Retained (%);Passing (%)\n4;0;100\n2;40;60\n1;60;0\nSumme;90;\n": (
         r"line 5: Retained \(%\): the total is 90, and the lines add up to 100"
+    ),
+    "Sieve (mm),Mass (g),% passing\n4,0,100\n2,40,60\n1,60,0\nTotal,110,\n": (
+        r"line 5: Mass \(g\): the total is 110, and the lines add up to 100"
     ),
     "Sieve (in),Passing (%)\n3/7,100\nNo. 20,0\n": "'3/7' is no sieve of ASTM",
     "Sieve (mm),Passing (%)\n3/8,100\n2,0\n": "'3/8' is no sieve",

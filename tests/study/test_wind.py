@@ -158,6 +158,20 @@ SERIES |= {
         1.0,
         None,
     ),
+    "Canada's service": (
+        series(
+            '"Date/Time (LST)","Wind Dir (10s deg)","Wind Spd (km/h)"',
+            lambda t, d, u: f'"{t:%Y-%m-%d %H:%M}","{d // 10}","{u}"',
+        ),
+        1 / 3.6,
+        None,
+    ),
+    "a height above the table": (
+        "# Anemometer height: 33 ft\n"
+        + series("time,ws,wd", lambda t, d, u: f"{t:%Y-%m-%d %H:%M},{u},{d}"),
+        1.0,
+        10.0584,
+    ),
     "a zone beside the time": (
         series("valid(UTC),drct,sknt", lambda t, d, u: f"{t:%Y-%m-%d %H:%M},{d},{u}"),
         1852 / 3600,
@@ -432,7 +446,7 @@ REFUSED = {
     "date,ws,wd,z\n2020-01-01 00:00,5,90,2\n2020-01-01 01:00,5,90,10\n": "winds of one height",
     "Richtung;0-2;>2\nN;50;10\nO;30;10\n": "'o' is no direction that is told from the others",
     "0 5 270\n3600 6 280\n": "in '0 5 270' .name the columns",
-    "richting,kracht\n1,2\n": "no names of columns that are known",
+    "richting,kracht\n1,2\n": "no names of columns that are known.* direction, winddir.* share.*your-files.md",
     "Direction,0-2,2-4\nN,60,30\n": "shares add up to 90",
 }  # fmt: skip
 
@@ -455,6 +469,18 @@ def test_two_stations_in_one_file_are_asked_about() -> None:
     lines = one.splitlines()
     once = read_winds("\n".join([*lines, lines[50]]) + "\n", WHERE)
     assert sum(share for *_, share in once.rows) == pytest.approx(1.0)
+
+
+def test_directions_in_tens_of_degrees_are_asked_about() -> None:
+    rows = [f"2020-01-01 {h:02d}:00,5,{h + 1}" for h in range(24)]
+    with pytest.raises(
+        InputError, match=r"tens of degrees.* wd \(10 deg\), or wd \(deg"
+    ):
+        read_winds("date,ws,wd\n" + "\n".join(rows), WHERE)
+    found = read_winds("date,ws,wd (deg)\n" + "\n".join(rows), WHERE)
+    assert max(way for way, *_ in found.rows) == 24.0
+    found = read_winds("date,ws,wd (10 deg)\n" + "\n".join(rows), WHERE)
+    assert max(way for way, *_ in found.rows) == 240.0
 
 
 def test_directions_in_radians_are_asked_about() -> None:
