@@ -20,7 +20,7 @@ from orchestrator.plan import Plan
 from orchestrator.report import page, style
 from orchestrator.report.page import Paragraphs, Section
 from orchestrator.report.remarks import NOT_AS_PLANNED
-from orchestrator.runs import case, reuse, workspace
+from orchestrator.runs import case, reuse, terminal, workspace
 from orchestrator.runs.engine import Display
 from orchestrator.runs.files import Folder
 from orchestrator.runs.workspace import EXPERIMENT, Workspace, claimed
@@ -271,7 +271,7 @@ class Experiment(ABC):
             self.check(out)
             cases = out.absolute() / "cases"
             listed = plan.expected(self.planned, cases, options.workers, beside)
-            print(*self.outline, *listed, sep="\n")
+            print(terminal.fitted([*self.outline, *listed]))
             return 0
         return self.run(out, workers=options.workers, beside=beside).tell()
 

@@ -170,7 +170,7 @@ QUANTITIES = {
 BESIDE_CHANNEL = {
     "mean_velocity_3d84_m_s": "k_s = 3 d84",
     "mean_velocity_strickler_m_s": "Strickler, 21.1/d^(1/6)",
-    "mean_velocity_grains_m_s": "grains alone, z0 of the pocket",
+    "mean_velocity_grains_m_s": "grains alone, pocket z₀",
 }
 """Columns of the mean velocity of the same depth by other roughnesses of a channel."""
 ENTRAINED, SUSTAINED = "entrained", "sustained"

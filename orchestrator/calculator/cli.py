@@ -37,10 +37,10 @@ FORM = (
     "a z0 may be d/30"
 )
 RANGES = """\
-Any number may be a range FIRST:LAST:COUNT, such as --diameter 1e-4:2e-3:20, for a
-table; several ranges give every combination. Lengths, viscosity and the slope of a
-channel are spaced geometrically, all others evenly. A fluid below 100 kg/m3 is a
-gas."""
+Any number may be a range FIRST:LAST:COUNT, such as --diameter 1e-4:2e-3:20,
+for a table; several ranges give every combination. Lengths, viscosity and the
+slope of a channel are spaced geometrically, all others evenly. A fluid below
+100 kg/m3 is a gas."""
 LAW_HELP = (
     "force law of the answer; default: bridged, or bridged-gravel where the drag law "
     "of bridged ends; paper: Eq. 2 or 4 where each holds"

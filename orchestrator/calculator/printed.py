@@ -151,9 +151,12 @@ def as_text(
         yield from _of_one(rows)
     fluids = {(row["rho_f_kg_m3"], row["nu_m2_s"]) for row in rows}
     if fluid and len(fluids) == 1:
+        from orchestrator.digits import plain_number
+
         ((density, viscosity),) = fluids
         name = "the paper's gas (real air: --fluid air)" if fluid == PAPER else fluid
-        yield f"{name}: {density:g} kg/m3, {viscosity:.5g} m2/s"
+        kinematic = plain_number(viscosity, 5)
+        yield f"{name}: {density:g} kg/m³, {kinematic} m²/s"
     liquid = [row for row in rows if row["rho_f_kg_m3"] >= GAS_BELOW]
     if any(_is_nan(row["depth_m"]) for row in liquid):
         yield "for the mean velocity of the liquid give its depth, --depth in m"
@@ -190,8 +193,9 @@ def _of_one(rows: Sequence["Row"]) -> Iterator[str]:
         marks.append(f"<- {', '.join(said)}" if said else "")
     yield from _as_table(ordered, heads, marks)
     if near:
-        beside = single.what_beside(ordered[0])
-        yield f"Nearest: the law that holds and is nearest to {beside}."
+        is_formula = single.is_by_formula(ordered[0])
+        beside = "the formula" if is_formula else "the measurements"
+        yield f"Nearest: of the laws that hold, the nearest to {beside}."
     yield ""
     for term in TERMS.values():
         yield from _wrapped(f"{term[:1].upper()}{term[1:]}.")
@@ -241,13 +245,14 @@ def _of_channel(row: "Row") -> Iterator[str]:
 
     The depth is one, that of the answer.
     """
+    from orchestrator.digits import plain_number
     from orchestrator.report.card import apart
     from orchestrator.report.lines import head_width, table
 
     def cells(words: str, roughness: float, speed: float, interval: str) -> list[str]:
         discharge = speed * row["depth_m"]
         numbers = [f"{number:.3g}" for number in (speed, discharge)]
-        length = "-" if _is_nan(roughness) else f"{roughness:.3g}"
+        length = "-" if _is_nan(roughness) else plain_number(roughness)
         return [words, length, *numbers, interval]
 
     ends = [row[f"discharge{end}_m2_s"] for end in ("_low", "_high")]
@@ -260,7 +265,7 @@ def _of_channel(row: "Row") -> Iterator[str]:
         BESIDE_CHANNEL.items(), roughnesses, strict=True
     ):
         rows.append(cells(words, roughness, row[column], ""))
-    heads = ["channel", "z0, m", "mean velocity, m/s", "discharge, m2/s", "interval"]
+    heads = ["channel", "z₀, m", "mean velocity, m/s", "discharge, m²/s", "interval"]
     widths = [
         max(head_width(head), *map(len, column))
         for head, column in zip(heads, zip(*rows, strict=True), strict=True)
@@ -363,10 +368,10 @@ def _as_table(
 
 
 def _cell(value: float | str) -> str:
-    """A number of four digits, a dash for NaN, or a text as it is."""
+    """A number of three digits, a dash for NaN, or a text as it is."""
     if isinstance(value, str):
         return value
-    return "-" if _is_nan(value) else f"{value:.4g}"
+    return "-" if _is_nan(value) else f"{value:.3g}"
 
 
 def _is_nan(value: object) -> bool:

@@ -49,7 +49,7 @@ def _run(options: Namespace) -> int:
     out = options.out or Path("results") / study.name
     if options.plan:
         cases = out.absolute() / "cases"
-        print(*plan.forecast(study, cases, options.workers), sep="\n")
+        print(terminal.fitted(plan.forecast(study, cases, options.workers)))
         return 0
     queue = Queue(options.cluster, study.cluster) if options.cluster else None
     ended = pipeline.run(study, out, workers=options.workers, queue=queue)

@@ -36,7 +36,7 @@ from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import changed, value_of
 
-EXACT = "the closed form is exact for a single grain in a held flow"
+EXACT = "the closed form is exact for a single grain in a steady flow"
 LONG_BED = f"more than {LONGEST_PACKED:g} grains long"
 ALONG = f"{LONG_BED}: closed form along the bed, checked where motion starts"
 HOPS = "sustained motion: entrainment has a closed form, rolling and hopping a table"
@@ -495,10 +495,10 @@ def _of_grain(scene: Scene, tolerance: float | None) -> Decision:
     if tolerance is None or not plain.scene.method.is_resolved_in_time:
         return plain
     if scene.method.grains.waiting_time < HELD_FROM:
-        return as_written(scene, "the study asks for a ramp of the flow")
+        return as_written(scene, "the study asks for a flow that rises steadily")
     if scene.bed.slope_deg > scene.bed.entrainment_angle_deg:
         return as_written(
-            scene, "a slope beyond the entrainment angle: the closed form is off"
+            scene, "a slope beyond the entrainment angle: the closed form does not hold"
         )
     exact = _by(scene, methods.PIVOT)
     return Decision(scene, exact, None, UNKNOWN, EXACT, is_chosen=True)
@@ -523,7 +523,7 @@ def _why_as_written(scene: Scene, tolerance: float | None) -> str | None:
     if scene.method.flow.facts is not _best_model(scene):
         return f"the study asks for the flow model {scene.method.flow.model}"
     if scene.method.grains.waiting_time < HELD_FROM:
-        return "the study asks for a ramp of the flow"
+        return "the study asks for a flow that rises steadily"
     # the decision on the scene as it is written has the reason
     return "" if unmeasured(scene) else None
 

@@ -30,7 +30,7 @@ from orchestrator.study.study import Study
 
 MOST_GRAINS = 1e5  # largest length of a bed with grains, diameters
 FROZEN_BED = 0.05
-"""Relative change of a threshold up to which the flow of the whole pile acts on."""
+"""Relative change of a threshold up to which the flow over the initial pile acts on."""
 PILE_SLOPES_DEG = (
     1.0,
     35.0,
@@ -253,7 +253,7 @@ def _pile(scene: Scene, bed: PileBed) -> Iterator[Limit]:
         yield Limit("turbulence", field, what, remedy, refused=False)
     loaded = scene.forces.loaded_grains
     if loaded != "exposed":
-        what = f"{loaded}: a grain without its force blocks those behind it"
+        what = f"{loaded}: a grain without load blocks those behind it"
         yield Limit("forced", "forces.loaded_grains", what, "exposed", refused=False)
 
 
@@ -324,7 +324,8 @@ def _theory(scene: Scene, bed: PileBed) -> Iterator[Limit]:
     slope = float(np.degrees(np.arctan(seen.slopes[at])))
     if slope > PILE_SLOPES_DEG[1] + 1e-6:
         place = f"x = {float(bed.place(seen.x[at])):.9g} m"
-        what = f"a bed that rises by {slope:.3g} deg at {place} is no low one"
+        what = f"a bed that rises by {slope:.3g} deg at {place} is not low,"
+        what += " as linear theory assumes"
         yield Limit("slope", "method.flow.model", what, 'choose "solve"')
 
 
@@ -394,9 +395,9 @@ def _dem(scene: Scene) -> Iterator[Limit]:
         return
     if rules.waiting_time < HELD_FROM:
         what = f"load steps that wait {rules.waiting_time:g} sqrt(d/g')"
-        what += " are a ramp of the flow"
+        what += " make a flow that rises steadily"
         field = "method.grains.waiting_time"
-        remedy = "raise it, unless a ramp is what you want"
+        remedy = "raise it, unless a rising flow is what you want"
         yield Limit("quiet-step", field, what, remedy, refused=False)
     if rules.stiffness > STIFFEST:
         what = f"with K d/W = {rules.stiffness:g} thresholds may be 6 to 11 % too high"
@@ -419,6 +420,6 @@ def _ramp(rules: GrainMethod) -> Iterator[Limit]:
         return
     what = f"on a ramp of more than {percent(RAMP, 1)} per √(d/g′) a grain leaves late"
     what += ": from 1 % on its threshold is 8 % and more too high"
-    remedy = f"a waiting time of {HELD_FROM:g}, unless a ramp is what you want"
+    remedy = f"a waiting time of {HELD_FROM:g}, unless a rising flow is what you want"
     field = "method.grains.load_increment"
     yield Limit("rate-stiffness", field, what, remedy, refused=False)

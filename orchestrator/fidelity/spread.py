@@ -21,7 +21,7 @@ VISCOUS = 3.0
 ROUGH = 30.0
 """Re* from which a bed is rough."""
 FROZEN = "frozen bed"
-"""The choice that the flow of the whole pile acts until the last grain has left."""
+"""The choice that the flow over the initial pile acts until the last grain has left."""
 STATED = (
     "packing",
     "roughness length",

@@ -1,6 +1,6 @@
 """The bed that changes: grains leave in rounds, each under its own flow.
 
-Without `threshold.update` the flow of the whole pile acts until the last grain has
+Without `threshold.update` the flow over the initial pile acts until the last grain has
 gone, as in the paper, and nothing here is asked. With it the flow is solved after each
 round over the bed that is left, and what is left goes on under its forces.
 """

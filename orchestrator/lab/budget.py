@@ -271,8 +271,8 @@ CHOICES: tuple[Choice, ...] = (
     ),
     Choice(
         name=FROZEN,
-        why="The paper, and every fidelity, keeps the flow of the whole pile until the "
-        "last grain has gone. Else the bed line is drawn anew after each tenth.",
+        why="The paper, and every fidelity, keeps the flow over the initial pile until "
+        "the last grain is entrained. Else the bed is updated after each tenth.",
         field="threshold.update",
         values=[0.1],
         of_solved_flow=True,

@@ -44,6 +44,7 @@ from orchestrator.report import style
 from orchestrator.report.card import Card, Number, Worth
 from orchestrator.report.page import Limits, Paragraphs, Section, Table
 from orchestrator.report.style import Figure, Look
+from orchestrator.runs import terminal
 from orchestrator.study import methods
 from orchestrator.study.fidelities import Fields
 from orchestrator.study.parts import PileBed
@@ -415,7 +416,7 @@ class Convergence(Experiment):
         if not options.plan:
             cases = out.absolute() / "cases"
             listed = plan.expected(self.planned, cases, options.workers)
-            print(*listed, sep="\n", file=sys.stderr)
+            print(terminal.fitted(listed), file=sys.stderr)
         return super().command(options, out)
 
     def results(self, runs: Runs) -> ExperimentResults | None:

@@ -691,7 +691,7 @@ def _across_methods(coded: pd.DataFrame) -> Comparisons:
 
 
 def coupling(evidence: Evidence) -> Comparisons:
-    """The flow of the whole pile, kept until the last grain has gone.
+    """The flow over the initial pile, kept until the last grain has gone.
 
     Yields
     ------

@@ -38,7 +38,7 @@ AGREES = 1.05
 NEAR_ONE = 1.1
 """Factor of a correction below which it is told with three digits."""
 PAPER_FLUID = Remark(
-    "The gas is not quite air.",
+    "The gas is the article's, and not air.",
     "The gas is that of the article, of 1 kg/m³, in which a grain counts as entrained "
     'when it leaves its pocket. For real air write `fluid.kind = "air"`.',
 )
@@ -57,7 +57,7 @@ SOLID_FENCE = Remark(
     "and shelter the bed behind them otherwise: `porosity` of the fence.",
 )
 POROUS_FENCE = Remark(
-    "A porous fence is a loss of pressure.",
+    "A porous fence is modelled as a loss of pressure.",
     "The loss is that of slats or holes with sharp edges, by the porosity of the fence "
     "(Idelchik). Nets of round threads let more wind through. The wakes of single "
     "slats are not resolved, and the flow was compared with no measurement.",
@@ -166,7 +166,9 @@ def _of_laws(results: Results) -> Iterator[Remark]:
     if len(best) <= theory.MANY:
         return
     for found in theory.nearest_lines(results):
-        head = f"{found.of}:" if found.of else "Where no law is as measured."
+        head = "Where no force law agrees with the measurements."
+        if found.of:
+            head = f"{found.of}:"
         yield Remark(head, found.text)
 
 
@@ -408,7 +410,7 @@ def _counted(scene: Scene, bed: PileBed, x: pd.Series) -> Iterator[Remark]:
     where = "All of the bed is counted"
     if isinstance(counts, tuple):
         where = "A range of the bed is counted"
-        rest = "shares are parts of the grains in it"
+        rest = "fractions are of the grains in it"
     elif counts == "windward":
         where = "The sides that rise in the wind are counted"
         rest = "so are ripples and noise of level ground beside the form"
@@ -444,7 +446,7 @@ def _closed_form(row: pd.Series, bed: PileBed, *, is_asked: bool) -> Iterator[Re
         if bed.profile:
             place = f"x = {place_of_file(float(row['pivot_x_m']), bed.profile)} m"
         text += (
-            f" The grains around the answer, turned one by one, start at {place} and a "
+            f" The grains around the answer, each by itself, start at {place} and a "
             f"friction velocity of {row['pivot_first_m_s']:#.3g} m/s."
         )
     if row["interlocking"] > INTERLOCKED:

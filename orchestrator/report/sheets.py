@@ -388,7 +388,7 @@ def _noted(frame: pd.DataFrame) -> tuple[pd.DataFrame, tuple[str, ...]]:
 USTAR_HEAD = "friction velocity u*₀, m/s"
 TAU_HEAD = "θ_c"
 TAU_INTERVAL = "interval of θ_c"
-RATIO = "ratio to no shelter"
+RATIO = "ratio to the reference bed"
 PAIRED = "paired interval"
 OTHER = "compared_"
 """What the names of columns of numbers with another critical number begin with."""
@@ -525,9 +525,9 @@ def _verdict(count: int, of: int, word: str, why_not: str, is_range: bool) -> st
     """How many of the thresholds of a row are usable, or what one is worth."""
     if is_range:
         return f"{count} of {of} usable"
-    if of > 1:
-        return f"{count} of {of} seeds usable"
-    return WORDS[word] if count else f"{WORDS[UNUSABLE]}: {why_not}"
+    if not count:
+        return f"{WORDS[UNUSABLE]}: {why_not}"
+    return f"{count} of {of} seeds usable" if of > 1 else WORDS[word]
 
 
 def hills(results: Results) -> Sheet:

@@ -818,7 +818,7 @@ def legends(sheet: DiagramSheet, column: str, colours: Mapping[Any, str]) -> Can
 def diagram_rows(results: Results) -> pd.DataFrame:
     """List the single grains under a held flow.
 
-    Grains under a ramp of the flow are left out: a ramp gives no threshold.
+    Grains under a flow that rises steadily are left out: it gives no threshold.
 
     Parameters
     ----------

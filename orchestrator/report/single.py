@@ -669,7 +669,10 @@ def _reference_theta(row: Row) -> str:
 def _field(row: Row) -> str:
     """What the field sites have, or why none is near."""
     if not row["measured_rows"] > 0:
-        return "No field site is near: those have sand of 0.40 to 0.53 mm in air."
+        return (
+            "No field site has a grain Reynolds number within a factor of 2 of this "
+            "threshold: those are level beds of sand of 0.40 to 0.53 mm in air."
+        )
     ends = f"{min(FIELD):.4f} … {max(FIELD):.4f}"
     return f"{len(FIELD)} field sites (Martin and Kok 2018) have θ_c = {ends}."
 
@@ -730,8 +733,10 @@ def _within(row: Row) -> str:
     if not is_by_formula(row):
         return "It is within what was measured on level beds."
     if row["measured_rows"] > 0:
-        return "Its interval contains the formula's; field sites were measured near."
-    return "Its interval contains the formula's; no threshold was measured near."
+        near = "level field sites have a grain Reynolds number within a factor of 2"
+    else:
+        near = "no field site has a grain Reynolds number within a factor of 2"
+    return f"Its interval contains the formula's; {near}."
 
 
 def _sentence(text: object) -> str:

@@ -205,4 +205,17 @@ def _widths(frame: pd.DataFrame, most: int) -> list[int]:
 def _as_lines(frame: pd.DataFrame, most: int) -> list[str]:
     """The lines of a table of texts; long heads and cells stand on several lines."""
     heads = [str(name) for name in frame]
-    return lines.table(frame.to_numpy(str).tolist(), heads, _widths(frame, most))
+    rows = frame.to_numpy(str).tolist()
+    return lines.table(_without_repeats(rows), heads, _widths(frame, most))
+
+
+def _without_repeats(rows: Sequence[Sequence[str]]) -> list[list[str]]:
+    """Leave out the first cells of a row that are those of the row above it."""
+    shown = []
+    above: Sequence[str] = ("",) * len(rows[0]) if rows else ()
+    for row in rows:
+        alike = [one == other for one, other in zip(row[:-1], above, strict=False)]
+        count = [*alike, False].index(False)
+        shown.append([*("" for _ in range(count)), *row[count:]])
+        above = row
+    return shown

@@ -9,7 +9,9 @@ import os
 import re
 import signal
 import sys
+import textwrap
 import threading
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NoReturn, TextIO
 
@@ -50,7 +52,43 @@ ASCII = str.maketrans(
     }
 )
 """What stands for some letters where the output has ASCII alone."""
+WIDEST = 79
+"""Letters of a line that fits any terminal."""
 _interrupted = threading.Event()
+
+
+def fitted(lines: Iterable[str]) -> str:
+    """Break long lines, what follows of each two letters further in.
+
+    Parameters
+    ----------
+    lines
+        The lines.
+
+    Returns
+    -------
+    str
+        The text, without a line end.
+
+    Examples
+    --------
+    >>> print(fitted(["  a case", "  " + "a word " * 12]))
+      a case
+      a word a word a word a word a word a word a word a word a word a word a word
+        a word
+    """
+    broken: list[str] = []
+    for line in lines:
+        indent = line[: len(line) - len(line.lstrip())]
+        broken += textwrap.wrap(
+            line.strip(),
+            WIDEST,
+            initial_indent=indent,
+            subsequent_indent=f"{indent}  ",
+            break_long_words=False,
+            break_on_hyphens=False,
+        ) or [""]
+    return "\n".join(broken)
 
 
 def listen() -> None:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from orchestrator import __version__
 from orchestrator.errors import InputError, OrchestratorError, printable
 from orchestrator.runs import case as case_states
-from orchestrator.runs import files, locks, process
+from orchestrator.runs import files, locks, process, terminal
 from orchestrator.runs.case import DONE, SAID, failure, names_in
 from orchestrator.runs.files import (
     RECORD,
@@ -504,7 +504,7 @@ def status(directory: Path) -> tuple[str, bool]:
     lines += [f"  {word}: {name}" for name in unfinished]
     lines += [f"  failed: {name}: {cause}" for name, cause in causes.items()]
     lines += [f"  done: {each}" for each in _said(markers)]
-    lines += _sizes(space, "size: ")
+    lines += terminal.fitted(_sizes(space, "size: ")).splitlines()
     # a run of an experiment ends with its page, and notes nothing of it
     is_drawn = not (unfinished or len(begun) < len(names))
     if kind is STUDY:
@@ -560,7 +560,7 @@ def prune_cases(
     whole = ", ".join(name for name in done if name in shown)
     ran = f"pruned: {len(pruned)} cases; ./Allrun in one of them makes its files anew"
     shows = f"whole, for the pictures of the page: {whole or 'none'}"
-    return "\n".join([before, after, ran, shows, *left])
+    return terminal.fitted([before, after, ran, shows, *left])
 
 
 def _sizes(space: Workspace, head: str) -> list[str]:

@@ -132,9 +132,9 @@ class FlowMethod(Part):
 HELD_FROM = 6.0
 """Least waiting time of load steps in which the flow is held, sqrt(d/g').
 
-Shorter ones are a ramp of the flow, with other thresholds: in the map ``quiet-step``
-steps of at most 5 % are within 5 % of long ones from here on, and at half of it up to 7
-% off.
+Shorter ones make a flow that rises steadily, with other thresholds: in the map
+``quiet-step`` steps of at most 5 % are within 5 % of long ones from here on, and at
+half of it up to 7 % off.
 """
 
 

@@ -85,7 +85,7 @@ BED_CHANGE: Mapping[str, str] = {
     **phrases("packing"),
     **several("count", "moved", "fraction_moved", "shields"),
     "shields_frozen": (
-        "shields of the same pile under the flow of the whole pile until the end"
+        "shields of the same pile under the flow over the initial pile to the end"
     ),
     "change": "shields over shields_frozen, less 1",
     "change_ustar0": (

@@ -362,7 +362,9 @@ def _reasons_of_bed(row: Mapping[Any, Any]) -> Iterator[Reason]:
     is_renewed = renews or (row.get("update") or 0) > 0
     is_kept = row.get("sheltering") == "balanced" and not is_renewed
     if is_kept and row["fraction"] > KEPT_TO + 1e-9:
-        beyond = f"beyond n/N = {KEPT_TO} grains that have gone still bear a part of it"
+        beyond = (
+            f"beyond n/N = {KEPT_TO} grains that were entrained still bear a part of it"
+        )
         yield Reason("kept balance", f"kept balance: {beyond}")
 
 

@@ -115,7 +115,7 @@ def test_the_command_prints_the_discharge_with_its_interval(
     lines = capsys.readouterr().out.splitlines()
     heads = [place for place, line in enumerate(lines) if "discharge, " in line]
     head = heads[0] + 1
-    assert lines[head].split() == ["velocity,", "m/s", "m2/s"]
+    assert lines[head].split() == ["velocity,", "m/s", "m²/s"]
     of_answer, coarse, strickler, grains = (
         line.split() for line in lines[head + 1 : head + 5]
     )

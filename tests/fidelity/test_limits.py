@@ -74,7 +74,11 @@ WARNED: list[tuple[dict[str, object], str, str]] = [
         "bed.slope_deg",
         "half-way",
     ),
-    ({"method.grains.waiting_time": 2.0}, "method.grains.waiting_time", "ramp"),
+    (
+        {"method.grains.waiting_time": 2.0},
+        "method.grains.waiting_time",
+        "rises steadily",
+    ),
     (
         {**GRAIN, **RISING, "method.grains.load_increment": 0.0101},
         "method.grains.load_increment",

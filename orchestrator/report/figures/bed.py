@@ -44,14 +44,14 @@ BARS = (1, 2, 5, 10, 20, 50, 100)
 CAPTION = """\
 After Fig. 13 of the paper. Grains {% if width %}of all rows of a strip of {{
 "%g"|format(width) }} d, from the side, {% endif %} {% if by_dem %} at the end of a load
-step. Orange: has moved, by {{ criterion }} downstream along the bed. Pale orange: has
-left the box; drawn at its first place. {% else %} as they were packed. Orange: has
-moved at this flow, by {{ method }}, a method without dynamics. {% endif %} Pale yellow:
-exposed, has not moved. Beige: mobile, under the exposed grains. Grey: fixed. {% if flow
-%} The shade of blue is the speed of the flow by OpenFOAM over the bed without grains,
-relative to that of the approaching flow at 10 h. {% endif %} {% if update %} Blue line:
-the bed line, drawn anew after each {{ "%.0f"|format(100 * update) }} % of the grains.
-Pale: has gone; drawn at its first place. {% endif %} d is one diameter. {{ properties
+step. Orange: entrained, displaced by {{ criterion }} downstream along the bed. Pale
+orange: has left the domain; drawn at its initial place. {% else %} as they were packed.
+Orange: entrained at this flow, by {{ method }}, a method without dynamics. {% endif %}
+Pale yellow: exposed, at rest. Beige: mobile, under the exposed grains. Grey: fixed.
+{% if flow %} The shade of blue is the speed of the flow by OpenFOAM over the bed
+without grains, relative to that of the approaching flow at 10 h. {% endif %} {% if
+update %} Blue line: the bed line, drawn anew after each {{ "%.0f"|format(100 * update)
+}} % of the grains. Pale: entrained; drawn at its initial place. {% endif %} d is one diameter. {{ properties
 }}. {{ part }}"""
 
 

@@ -23,14 +23,14 @@ def _wilcock_crowe(size: FloatArray) -> Any:
 
 
 def _one_stress(size: FloatArray) -> Any:
-    """Shields number of a size over that of d50 if one stress moves all sizes."""
+    """Shields number of a size over that of d50 if equal mobility."""
     return 1 / size
 
 
 HIDING: tuple[tuple[str, Callable[[Any], Any], str], ...] = (
     ("Wilcock and Crowe", _wilcock_crowe, "-"),
     ("Egiazaroff", measured.egiazaroff_hiding, "--"),
-    ("one stress moves all sizes", _one_stress, ":"),
+    ("equal mobility", _one_stress, ":"),
 )
 """Published functions of the size: label, function and dash of a line."""
 CAPTION = (

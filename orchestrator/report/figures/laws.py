@@ -13,7 +13,7 @@ from orchestrator.report.style import ANSWER, FLOW, NONE, RANGE, Figure
 CAPTION = (
     "Thick: Re* at which the law is between the tenth and the ninetieth percentile of "
     "the flumes; thin: where it answers. Orange: the nearest law. At the right: its "
-    "factor from the measured medians, in the median."
+    "median misfit, as a factor of the measured medians."
 )
 
 

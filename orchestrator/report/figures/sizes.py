@@ -22,7 +22,7 @@ OPEN |= {"color": ANSWER, "zorder": 1.5}
 TOGETHER: Look = {"color": ANSWER, "lw": 1, "ls": ":", "zorder": 0.5}
 TOGETHER["label"] = "all sizes together"
 CAPTION = (
-    "Orange: computed, with the interval that so few grains leave; rings: fewer than "
+    "Orange: computed, with the sampling interval of so few grains; rings: fewer than "
     "ten grains. Squares: the function that Wilcock and Crowe (2003) fitted to "
     "transport, at the measured stress of d50. Dotted: all sizes together. An "
     "arrow is an interval without an upper end."

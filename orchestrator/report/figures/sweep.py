@@ -22,7 +22,7 @@ MOST_TICKS = 6
 """Sizes that an axis names each."""
 CAPTION = (
     "Orange: computed, with its interval; rings: not usable. Dashed, black: with the "
-    "threshold of one grain that was measured, or that a formula has."
+    "measured θ_c of one grain, or with that of a formula."
 )
 
 

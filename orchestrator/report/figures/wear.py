@@ -10,14 +10,14 @@ from orchestrator.report.figures import FigureKind
 from orchestrator.report.results import Results, split_by
 from orchestrator.report.style import Figure, Look
 
-FROZEN: Look = {"ls": "--", "lw": 0.9, "label": "flow of the whole pile"}
-WORN: Look = {"lw": 1.3, "label": "flow of the bed as it is"}
+FROZEN: Look = {"ls": "--", "lw": 0.9, "label": "flow over the initial pile"}
+WORN: Look = {"lw": 1.3, "label": "flow over the updated bed"}
 APART: Look = {"ls": "", "marker": "o", "ms": 4, "label": "first 5 % apart"}
 CAPTION = (
-    "The threshold at which n grains have moved, as the mean stress on them. Dashed: "
-    "the flow of the whole pile acts until the last grain has gone, as in the paper. "
-    "Solid: the bed line is drawn anew through the grains that remain after each "
-    "share of the grains that threshold.update gives, and the flow is solved over it. "
+    "The threshold at which n grains are entrained, as the mean stress on them. "
+    "Dashed: the flow over the initial pile acts until the last grain is entrained, as "
+    "in the paper. Solid: after each further part of the grains the bed line is drawn "
+    "anew through those that remain, and the flow is solved over it. "
     "Dot: the place from which the two differ by more than 5 %. "
     "By DEM one load step changes θ by twice the load increment."
 )
@@ -46,7 +46,7 @@ def draw(results: Results) -> Iterator[Figure]:
             cases.append(results.plan.piles[scene_id].runs[-1].name)
         yield Figure(
             name=f"wear{sheet.name}",
-            title=f"Frozen bed and bed that changes{sheet.title}",
+            title=f"Fixed bed and updated bed{sheet.title}",
             caption=CAPTION,
             cases=tuple(cases),
             drawing=shields.legends(sheet, "d_m", colours),
