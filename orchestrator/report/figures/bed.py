@@ -51,8 +51,8 @@ Pale yellow: exposed, at rest. Beige: mobile, under the exposed grains. Grey: fi
 {% if flow %} The shade of blue is the speed of the flow by OpenFOAM over the bed
 without grains, relative to that of the approaching flow at 10 h. {% endif %} {% if
 update %} Blue line: the bed line, drawn anew after each {{ "%.0f"|format(100 * update)
-}} % of the grains. Pale: entrained; drawn at its initial place. {% endif %} d is one diameter. {{ properties
-}}. {{ part }}"""
+}} % of the grains. Pale: entrained; drawn at its initial place. {% endif %} d is one
+diameter. {{ properties }}. {{ part }}"""
 
 
 @dataclass(frozen=True)
