@@ -24,7 +24,7 @@ BACK = np.array([0.9, 0.6, 0.3])
 CAPTION = """\
 Steady turbulent flow by OpenFOAM ({{ models }}, rough wall), at the last iteration, for
 U_e = {{ speeds }} at 10 h. The fields of other speeds are taken to be similar. White:
-streamlines at arbitrary spacing; closed ones surround the flow that runs back. Only the
+streamlines at arbitrary spacing; closed ones surround the reversed flow. Only the
 part near the pile is shown. {% if lid %}The lid is far above. {% endif %}To scale."""
 
 

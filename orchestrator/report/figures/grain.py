@@ -30,8 +30,8 @@ from orchestrator.types import FloatArray
 CAPTION = (
     "By law: orange, the answer; blue discs, other laws that hold; grey rings, laws "
     "outside their range. By size: the same law, each size on a bed of identical "
-    "grains. Dashed: the formula that is named there, over the sizes that it was fitted "
-    "to; shaded: the range of the field sites, or of 80 % of the flumes."
+    "grains. Dashed: the formula that is named there, over the sizes that it was "
+    "fitted to; shaded: the range of the field sites, or of 80 % of the flumes."
 )
 
 
