@@ -38,5 +38,11 @@ def test_the_page_of_the_gallery_is_made_of_runs(
     assert "## first-look" in page
     assert "When does it move?\n\n  1 m/s  wind\n```" in page
     assert "all rows" not in page
+    # a card at its head leads to the section
+    small = "figures/gallery-first-look-small.png"
+    assert f"[![first-look]({small})](#first-look)" in page
+    assert "<br>When does it move?" in page
+    with Image.open(tmp_path / "docs" / small) as picture:
+        assert picture.size == script.SMALL
     with Image.open(pictures / "gallery-first-look.png") as picture:
         assert picture.convert("RGB").getpixel((5, 5)) == (255, 0, 0)

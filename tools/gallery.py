@@ -7,12 +7,14 @@ DIRECTORY holds the results of each preset below, in a directory of its name, as
 `COMMANDS` are run by another command. The pictures are drawn by chromium from the figures of the runs.
 """
 
+import re
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
-from PIL import Image, ImageChops
+from PIL import Image, ImageChops, ImageOps
 
 ROOT = Path(__file__).parents[1]
 PICTURES = ROOT / "docs" / "figures"
@@ -46,6 +48,12 @@ NOTES = {
 WHOLE = ("ladder",)
 """Sections whose answer is shown whole: lines for a study file stand below the card."""
 WIDE = 900  # pixels
+SMALL = (360, 200)  # pixels
+"""Size of the pictures of the cards at the head of the page."""
+CARDS = 3
+"""Cards of a row."""
+CARD = re.compile(r"(?ms)^## ([^\n]+)\n.*?^!\[([\w-]+): ([^\]]+)\]")
+"""The heading, the name and the question of a section."""
 COLOURS = 256
 HEAD = """\
 # Gallery of results
@@ -66,8 +74,33 @@ END = """\
 def main(directory: Path) -> None:
     """Write the page and its pictures."""
     sections = [section(directory, preset) for preset in SHOWN]
-    text = "\n".join([HEAD, *sections, END])
+    text = "\n".join([HEAD, grid(sections), *sections, END])
     (ROOT / "docs" / "gallery.md").write_text(text, encoding="utf-8")
+
+
+def grid(sections: Sequence[str]) -> str:
+    """The cards at the head of the page: a small picture and a question, which link."""
+    cells = []
+    for text in sections:
+        (heading, name, question), *_ = CARD.findall(text)
+        picture = f"figures/gallery-{name}-small.png"
+        anchor = heading.lower().replace(" ", "-")
+        small(PICTURES / f"gallery-{name}.png")
+        link = f"[![{heading}]({picture})](#{anchor})"
+        cells.append(f"{link}<br>**[{heading}](#{anchor})**<br>{question}")
+    cells += [""] * (-len(cells) % CARDS)
+    rows = [cells[at : at + CARDS] for at in range(0, len(cells), CARDS)]
+    empty = [""] * CARDS
+    lines = [empty, ["---"] * CARDS, *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+
+
+def small(picture: Path) -> None:
+    """Make the picture of a card, all of it, beside the large one."""
+    with Image.open(picture) as image:
+        card = ImageOps.pad(image.convert("RGB"), SMALL, color="white")
+    few = card.quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
+    few.save(picture.with_stem(f"{picture.stem}-small"), optimize=True)
 
 
 def section(directory: Path, preset: str) -> str:

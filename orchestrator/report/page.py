@@ -216,7 +216,7 @@ def sentence(text: str) -> str:
     ('By the model', 'u* = √(τ_b/ρ)', 'τ_b of the flow')
     """
     first, *_ = text.split(" ", 1)
-    is_word = first.strip(",;:").isalpha() and len(first) > 1
+    is_word = first == "a" or (first.strip(",;:").isalpha() and len(first) > 1)
     return f"{text[0].upper()}{text[1:]}" if is_word else text
 
 

@@ -109,6 +109,7 @@ def test_no_line_ends_within_a_number_and_its_unit(text: str, whole: str) -> Non
 def test_a_symbol_has_no_capital() -> None:
     assert pages.sentence("τ_b of the flow") == "τ_b of the flow"
     assert pages.sentence("by the model") == "By the model"
+    assert pages.sentence("a finer mesh") == "A finer mesh"
     card = pages.fill(
         "page.html.j2",
         title="",
