@@ -29,7 +29,7 @@ from tests.report.conftest import only, write
 from tests.small_study import TITLE
 from tests.waiting import HANGS_S
 
-VOID = {"meta", "img", "br", "link", "input", "hr"}
+VOID = {"meta", "img", "br", "link", "input", "hr", "source"}
 
 
 class Page(HTMLParser):
