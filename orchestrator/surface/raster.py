@@ -321,7 +321,7 @@ def _of_geotiff(path: Path, where: str) -> Raster:
             scale, offset = dataset.scales[0], dataset.offsets[0]
             words.append(f"its numbers times {scale:g} plus {offset:g} are heights")
         raster = _raster(opened, path.name, units, units.of_heights(where), where)
-    said = _said_of_system(dataset.crs)
+    said = _said_of_system(dataset.crs, units)
     return replace(raster, understood=(*words, said, *units.said))
 
 
@@ -333,8 +333,10 @@ def _said_of_empty(empty: float | str | None) -> str:
     return f"{mark} in empty cells"
 
 
-def _said_of_system(system: Any) -> str:
+def _said_of_system(system: Any, units: RasterUnits) -> str:
     """What is said of a coordinate reference system; without one lengths are in m."""
+    if not system and units.said:
+        return "no coordinate system"
     if not system:
         return "no coordinate system: lengths taken for m"
     code = system.to_epsg()
@@ -431,7 +433,7 @@ def _grid(path: Path, text: str, where: str) -> Iterator[OpenedRaster]:
     marks_of_empty = f"{_said_of_empty(grid.empty)}{by}"
     if grid.words:
         marks_of_empty = f"{marks_of_empty}, and {', '.join(grid.words)}"
-    said = [f"a grid with {marks_of_empty}", _said_of_system(system)]
+    said = [f"a grid with {marks_of_empty}", _said_of_system(system, units)]
     if marks.said:
         said.insert(1, marks.said)
     empty = None if isinstance(grid.empty, str) else grid.empty

@@ -130,7 +130,7 @@ class RasterUnits(NamedTuple):
             words.append(f"axes in {self.axes_unit}, {self.axes:.7g} m each")
         if self.heights and LENGTHS[self.heights] != 1:
             words.append(f"heights in {shown_unit(self.heights)}")
-        return tuple(words) or ("in m",)
+        return tuple(words) or (("in m",) if self.name else ())
 
 
 def unit_named(word: str) -> str | None:

@@ -723,6 +723,7 @@ def test_cells_of_a_grid_may_have_a_step_along_each_axis(tmp_path: Path) -> None
 
 def test_a_grid_without_a_number_of_empty_cells_has_the_formats(tmp_path: Path) -> None:
     found = read(tmp_path, grid("cellsize 1\n", "-9999"), "heap.asc")
+    assert "lengths taken for m; 44 x 36 heights" in found.understood
     check_is_the_heap(found)
     assert "continued as level ground over 3 cells" in found.said[-1]
 
@@ -824,6 +825,7 @@ def test_units_beside_a_grid_are_applied(
     assert found.z == pytest.approx(axes * heights(), rel=1e-6)
     assert found.x[0] == pytest.approx(axes * EAST)
     assert found.steps == pytest.approx((axes, axes))
+    assert "lengths taken for m" not in found.understood
 
 
 @pytest.mark.parametrize(
