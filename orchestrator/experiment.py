@@ -294,7 +294,7 @@ class Experiment(ABC):
         Without any table the first failure says why there is none.
         """
         cases = space.cases
-        with style.settings():
+        with style.settings(style.LETTERS):
             done = reuse.done(self.planned.cases, cases)
             runs = Runs(self.planned, cases, done)
             made = self.results(runs)

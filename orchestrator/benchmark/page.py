@@ -123,7 +123,7 @@ def write_page(
         passed=np.where(theirs["passed"], "yes", "no"),
     )
     scenes = scenes.rename(columns=SHOWN)
-    with style.settings(), warnings.catch_warnings():
+    with style.settings(style.LETTERS), warnings.catch_warnings():
         # the name of a solver may have letters that the font has not
         warnings.filterwarnings("ignore", "Glyph .* missing from font")
         beds = _beds(numbers, theirs) + _shields(chosen, numbers)
@@ -160,7 +160,20 @@ def _beds(numbers: pd.DataFrame, theirs: pd.DataFrame) -> list[Figure]:
     figures = []
     for kind, quantity, name, title in BEDS:
         if kind in answered:
-            figures.append(_panels(numbers, answered[kind], quantity, name, title))
+            scenes = answered[kind]
+            _, outside = _panels(numbers, scenes, quantity, style.NARROW)
+            shown = len(_drawn(scenes))
+            caption = (
+                f"Expected answers with their intervals, and rings of the solvers: "
+                f"{shown} of {len(scenes)} scenes.{_left_out(outside)}"
+            )
+
+            def draw(
+                width: float, scenes: Sequence[str] = scenes, quantity: str = quantity
+            ) -> Canvas:
+                return _panels(numbers, scenes, quantity, width)[0]
+
+            figures.append(Figure.of_both_widths(name, title, caption, draw))
     return figures
 
 
@@ -254,26 +267,31 @@ def _legends(
     style.legends_below(canvas, solvers, [*samples, *marks])
 
 
-def _panels(
-    numbers: pd.DataFrame, scenes: Sequence[str], quantity: str, name: str, title: str
-) -> Figure:
-    """A quantity along the bed, or over the load steps, of scenes of the pack."""
+def _drawn(scenes: Sequence[str]) -> list[str]:
+    """The scenes of a figure, of all that a solver has answered."""
     places = np.unique(np.linspace(0, len(scenes) - 1, PANELS).astype(int))
-    drawn = [scenes[place] for place in places]
+    return [scenes[place] for place in places]
+
+
+def _panels(
+    numbers: pd.DataFrame, scenes: Sequence[str], quantity: str, width: float
+) -> tuple[Canvas, int]:
+    """Draw a quantity along the bed, or over the load steps, of scenes of the pack.
+
+    The second value is the number of answers that are left out.
+    """
+    drawn = _drawn(scenes)
     looks = _looks(numbers)
     del looks[OURS]
     x_label, y_label, limits = AXES[quantity]
-    canvas, axes = style.grid(
-        drawn, 1.7, x_label, y_label, columns=3, width=style.WIDTH
-    )
+    columns = 2 if width >= style.WIDE else 1
+    canvas, axes = style.grid(drawn, 2.0, x_label, y_label, columns, width=width)
     outside = 0
     for ax, scene in zip(axes, drawn, strict=True):
         outside += _panel(ax, numbers[numbers["scene"] == scene], quantity, looks)
         ax.set(**limits)
     _legends(canvas, looks, (), style.entry("expected, interval", EXPECTED))
-    caption = f"{len(drawn)} of {len(scenes)} scenes"
-    caption = f"{caption}: expected answers, and rings of the solvers."
-    return Figure(name, title, caption + _left_out(outside), (), canvas)
+    return canvas, outside
 
 
 def _panel(
@@ -316,7 +334,7 @@ def _shields(chosen: Pack, numbers: pd.DataFrame) -> list[Figure]:
     given = pd.DataFrame([chosen.scenes[name] for name in asked["scene"]], asked.index)
     asked = asked.assign(level=given["level"], unit=_reynolds_unit(given))
     looks = _looks(numbers)
-    canvas = style.canvas(3.8)
+    canvas = style.canvas(4.2, style.NARROW)
     ax = canvas.subplots()
     for curve in curves.WATER:
         ax.plot(*curve.points(), color=WATER, lw=0.8)
@@ -381,7 +399,7 @@ def _speed(verdicts: pd.DataFrame) -> list[Figure]:
     if timed.empty:
         return []
     looks = _looks(verdicts)
-    canvas = style.canvas(3.8)
+    canvas = style.canvas(4.2, style.NARROW)
     ax = canvas.subplots()
     groups: Any = timed.groupby(["solver", "level"])
     for (solver, level), rows in groups:

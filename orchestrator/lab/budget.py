@@ -5,12 +5,15 @@ A choice is changed alone, by the cheapest fidelity that feels it.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
+from matplotlib.patches import Patch
 
 from orchestrator import plan
 from orchestrator.digits import percent
@@ -44,17 +47,22 @@ QUANTITIES = {
     "ustar0": "undisturbed friction velocity $u^*_0$",
 }
 """What a choice moves, with its label in figures."""
-COLOURS = {
-    "shields": "#0072b2",
-    "ustar0": "#d55e00",
+BARS: dict[str, style.Look] = {
+    "shields": {"fc": "white", "ec": style.FLOW, "hatch": "////", "lw": 0.8},
+    "ustar0": {"fc": style.ANSWER, "ec": style.ANSWER, "lw": 0.8},
 }
-BAR = 0.38
+"""How their bars look."""
+BAR = 0.4
 """Height of a bar, rows of a figure."""
 OFFSETS = {
     "shields": BAR / 2,
     "ustar0": -BAR / 2,
 }
 """Middles of the bars over that of their row, rows."""
+ROW = 0.42
+"""Height of a row of a figure, inches."""
+FELT = 0.005
+"""Relative change that is felt: a choice of less has no number at its bar."""
 ENDS = ["shields_low", "shields_high", "ustar0_low", "ustar0_high"]
 """Columns: how far each quantity moves down and up, relative."""
 BASE = "as asked"
@@ -542,7 +550,7 @@ def _of_scene(
     theta = _interval(largest, "shields", shields(base.scene, at.tau))
     ustar0 = _interval(largest, "ustar0", at.ustar0)
     name = str(shared["scene"].iloc[0])
-    chart = Figure(figure, ALONE, SCENE_TEXT, (), tornado(largest))
+    chart = Figure.of_both_widths(figure, ALONE, SCENE_TEXT, partial(tornado, largest))
     told = _in_words(name, fraction, theta, ustar0)
     said = f"{name}; criterion: {base.scene.threshold.criterion}"
     card = _card(said, fraction, theta, ustar0)
@@ -651,18 +659,21 @@ def _alternatives(moved: pd.DataFrame) -> Section:
     return Section("The choices and their alternatives", [Table.of(table)])
 
 
-def tornado(largest: pd.DataFrame) -> Canvas:
+def tornado(largest: pd.DataFrame, width: float) -> Canvas:
     """Draw what each choice moves at one scene.
 
     Parameters
     ----------
     largest
         The largest share of each choice over the fractions; rows are the choices.
+    width
+        Width of the drawing, inches.
 
     Returns
     -------
     Canvas
-        A bar for each choice and quantity, the widest on top, and all together.
+        A bar with its ends for each choice and quantity, the widest on top, and all
+        together.
     """
     rising = largest.max(axis=1).sort_values()
     largest = largest.loc[rising.index]
@@ -671,19 +682,39 @@ def tornado(largest: pd.DataFrame) -> Canvas:
         total += spread.combined_shares(largest, name)
     together = pd.DataFrame([total], columns=ENDS, index=["all together"])
     rows = pd.concat([largest, together])
-    canvas = style.canvas(0.28 * len(rows) + 1.0)
+    canvas = style.canvas(ROW * len(rows) + 1.3, width)
     ax = canvas.subplots()
     for name, offset in OFFSETS.items():
         low = 100 * rows[f"{name}_low"]
-        width = low + 100 * rows[f"{name}_high"]
+        high = 100 * rows[f"{name}_high"]
         y = np.arange(len(rows)) + offset
-        ax.barh(y, width, BAR, left=-low, color=COLOURS[name], lw=0)
-    ax.use_sticky_edges = False  # no bar ends on the frame
+        ax.barh(y, low + high, BAR, left=-low, label=f"_{name}", gid=name, **BARS[name])
+        _ends(ax, y, low, high, BARS[name]["ec"])
     ax.axvline(0.0, color="0.2", lw=0.8)
     ax.axhline(len(largest) - 0.5, color="0.7", lw=0.6)
     ax.set_yticks(range(len(rows)), list(rows.index))
+    ax.set_ylim(-0.6, len(rows) - 0.4)
     ax.set_xlabel("change of the threshold, %")
-    ax.grid(axis="x", lw=0.4, color="0.85")
-    entries = [style.entry(text, COLOURS[name]) for name, text in QUANTITIES.items()]
+    # room for the numbers beside the longest bars
+    most = 100 * float(rows.filter(like="high").to_numpy().max())
+    least = -100 * float(rows.filter(like="low").to_numpy().max())
+    room = (0.75 if width < style.WIDE else 0.3) * (most - least)
+    ax.set_xlim(least - 0.05 * (most - least), most + room)
+    entries = [Patch(label=text, **BARS[name]) for name, text in QUANTITIES.items()]
     style.legends_below(canvas, entries, [])
     return canvas
+
+
+def _ends(
+    ax: Axes,
+    y: "np.ndarray[Any, Any]",
+    low: "pd.Series[float]",
+    high: "pd.Series[float]",
+    colour: str,
+) -> None:
+    """Write both ends of each bar that is felt beside it."""
+    for place, down, up in zip(y, low, high, strict=True):
+        if max(down, up) >= 100 * FELT:
+            ends = f" −{down:.0f} … +{up:.0f}".replace("−0 …", "0 …")
+            text = ends.replace("… +0", "… 0")
+            ax.text(up, place, text, va="center", color=colour)

@@ -2,7 +2,9 @@
 
 import json
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -32,6 +34,8 @@ from orchestrator.report.page import Element, Lines, Paragraphs, Section, Table
 from orchestrator.report.style import Figure, Look
 from orchestrator.study.fidelities import Fields
 
+Place = tuple[float, float]
+"""A cost and a share."""
 SHARE = 0.95
 """Share of them that is to be within it."""
 LOOKS: Mapping[str, Look] = {
@@ -50,6 +54,10 @@ BESIDE = tuple(one for one in WITHIN if one != AIM)
 """The other errors, a panel for each."""
 PANEL, LANE = 1.6, 0.2
 """Heights of the points of a panel and of the line of a name, inches."""
+MOST_LOW = 80.0
+"""Share below which a panel begins at least, so that its axis has two numbers, %."""
+LETTERS_OF_NAME = 5.2
+"""Letters of a name that a panel has room for, for each inch of its figure."""
 
 
 TEXTS = page_texts(__file__, "choices")
@@ -104,15 +112,16 @@ def sections(found: Sequence[Kind], table: pd.DataFrame, study: str) -> list[Sec
         title = f"Thresholds within {_percent(AIM)} against cost"
         content: list[Element] = [
             _card(rows),
-            Figure(name, title, TEXTS["caption"], (), draw(rows, [AIM]), place="lead"),
+            Figure.of_both_widths(
+                name, title, TEXTS["caption"], partial(draw, rows, [AIM])
+            ),
             Paragraphs(_reference(rows)),
             Lines("\n".join(advice(kind, rows, study))),
-            Figure(
+            Figure.of_both_widths(
                 f"{name}-within",
                 "Thresholds within other errors",
                 TEXTS["caption"],
-                (),
-                draw(rows, BESIDE),
+                partial(draw, rows, BESIDE),
             ),
             Table.of(_listed(rows)),
         ]
@@ -236,7 +245,9 @@ def _method(fields: Fields) -> list[str]:
     return lines
 
 
-def draw(rows: pd.DataFrame, within: Sequence[float]) -> Canvas:
+def draw(
+    rows: pd.DataFrame, within: Sequence[float], width: float = style.NARROW
+) -> Canvas:
     """Draw the share of thresholds within some errors against cost.
 
     Parameters
@@ -246,33 +257,43 @@ def draw(rows: pd.DataFrame, within: Sequence[float]) -> Canvas:
     within
         The errors, a panel for each. Of a single one the choices of the study itself
         and the reference are named, too.
+    width
+        Width of the drawing, inches.
 
     Returns
     -------
     Figure
         The chart.
     """
-    named = [_named(rows, error, own=len(within) == 1) for error in within]
-    heights = [PANEL + LANE * len(each) for each in named]
-    canvas = style.canvas(0.9 + sum(heights), style.NARROW)
+    is_narrow = width < style.WIDE
+    fits = int(LETTERS_OF_NAME * width)
+    named = []
+    for error in within:
+        names = _named(rows, error, own=len(within) == 1)
+        named.append({at: textwrap.fill(name, fits) for at, name in names.items()})
+    heights = [PANEL + LANE * _lines(each) for each in named]
+    above = 1.4 if is_narrow else 1.0
+    canvas = style.canvas(above + sum(heights), width)
     panels = canvas.subplots(
         len(within), 1, sharex=True, squeeze=False, height_ratios=heights
     ).ravel()
     for ax, error, labels in zip(panels, within, named, strict=True):
         _panel(ax, rows, error, labels)
-    panels[-1].set_xlabel("cost, core-s", fontsize=style.LETTERS)
+    panels[-1].set_xlabel("cost, core-s")
     samples = []
     for name, look in LOOKS.items():
         if (rows["grains"] == name).any():
             samples.append(Line2D([], [], label=name or OTHER, ls="", **look))
     samples.append(Line2D([], [], label=OF_REFERENCE, **KNOWN))
     canvas.legend(
-        handles=samples, loc="outside upper left", ncols=2, fontsize=style.LETTERS
+        handles=samples, loc="outside upper left", ncols=2 if is_narrow else 5
     )
     return canvas
 
 
-Place = tuple[float, float]
+def _lines(labels: Mapping[Place, str]) -> int:
+    """How many lines some names have together."""
+    return sum(name.count("\n") + 1 for name in labels.values())
 
 
 def _named(rows: pd.DataFrame, within: float, *, own: bool) -> dict[Place, str]:
@@ -303,10 +324,9 @@ def _panel(
     ax.set_xscale("log")
     ax.margins(x=0.08)
     style.plain_ticks(ax.xaxis)
-    ax.tick_params(which="both", labelsize=style.LETTERS)
-    ax.set_ylabel(f"% within {_percent(within)}", fontsize=style.LETTERS)
-    low = 20 * math.floor(min(share.min(), known) / 20) - 5
-    ax.set_ylim(low, 105 + (105 - low) * LANE * len(labels) / PANEL)
+    ax.set_ylabel(f"% within {_percent(within)}")
+    low = 20 * math.floor(min(share.min(), known, MOST_LOW) / 20) - 5
+    ax.set_ylim(low, 105 + (105 - low) * LANE * _lines(labels) / PANEL)
     ax.set_yticks(range(low + 5, 101, 20))
     _name(ax, labels, (105 - low) * LANE / PANEL)
 
@@ -321,17 +341,20 @@ def _name(ax: Axes, labels: Mapping[Place, str], lane: float) -> None:
     cheap = [place for place in labels if place[0] < middle]
     dear = [place for place in labels if place[0] >= middle]
     # no line leads through a name of its own half
-    for line, (cost_s, share) in enumerate((*cheap, *dear[::-1])):
-        y = 105 + lane * (len(labels) - line - 0.5)
-        ax.plot([cost_s, cost_s], [share, y], color="0.6", lw=0.7, zorder=0)
+    top = 105 + lane * _lines(labels)
+    for cost_s, share in (*cheap, *dear[::-1]):
         name = labels[cost_s, share]
+        high = lane * (name.count("\n") + 1)
+        y = top - high / 2
+        top -= high
+        ax.plot([cost_s, cost_s], [share, y], color="0.6", lw=0.7, zorder=0)
         ax.text(
             cost_s,
             y,
-            f" {name}" if cost_s < middle else f"{name} ",
+            name,
             ha="left" if cost_s < middle else "right",
             va="center",
-            fontsize=style.LETTERS,
+            linespacing=1.0,
             path_effects=halo,
         )
 

@@ -666,8 +666,8 @@ def chart_of(found: pd.DataFrame, judged: pd.DataFrame) -> Canvas:
     panels = canvas.subplots(len(names), 1, squeeze=False, sharey=True).ravel()
     for ax, name in zip(panels, names, strict=True):
         _panel(ax, found[found["series"] == name], colours)
-        ax.set_title(name, loc="left", fontsize=style.LETTERS)
-        ax.set_ylabel("change, %", fontsize=style.LETTERS)
+        ax.set_title(name, loc="left")
+        ax.set_ylabel("change, %")
     drawn = set(found["quantity"])
     looks = [
         Line2D([], [], color=OTHER, ls=look, label=LABELS[name])
@@ -678,9 +678,8 @@ def chart_of(found: pd.DataFrame, judged: pd.DataFrame) -> Canvas:
     if not set(verdicts["verdict"]) <= set(GOOD):
         looks.append(Line2D([], [], mfc="white", label="open: no order", **mark))
     entries = [style.entry(*each) for each in colours.items()]
-    size = style.LETTERS
-    canvas.legend(handles=entries, loc="outside upper left", ncols=2, fontsize=size)
-    canvas.legend(handles=looks, loc="outside lower left", fontsize=size)
+    canvas.legend(handles=entries, loc="outside upper left", ncols=2)
+    canvas.legend(handles=looks, loc="outside lower left")
     return canvas
 
 
@@ -700,5 +699,4 @@ def _panel(ax: Axes, rows: pd.DataFrame, colours: Mapping[str, str]) -> None:
     told = rows.drop_duplicates("finer").sort_values("finer")
     ax.set_xscale("log", base=2)
     ax.set_xticks(told["finer"], told["told"])
-    ax.tick_params(labelsize=style.LETTERS)
     ax.minorticks_off()

@@ -5,7 +5,9 @@ than `WRONG` from the reference of its place.
 """
 
 import math
+import textwrap
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -37,6 +39,12 @@ MAPS_TEXT = """\
 Each cell is a real run. It is good where tau_c is within 5 % of its reference at \
 every fraction; wrong where it is not and nothing said so; noisy, exploded or stalled \
 where the run itself said so."""
+CAPTION = """\
+The worst verdict at each place, and where a number is below it the relative error of \
+the critical Shields number."""
+WHOLE_CAPTION = """\
+The worst verdict at each place of every map. The errors stand on the map of each \
+below."""
 TOLD_TITLE = "What a study says of the wrong ones"
 TOLD_TEXT = """\
 A run that is wrong looks like one that is good; what tells them apart is the study. \
@@ -113,7 +121,9 @@ def _sections(
     maps: Sequence[StabilityMap], table: pd.DataFrame, counts: pd.DataFrame
 ) -> list[Section]:
     """The page: all maps in one figure, what is told, each with its question."""
-    whole = Figure("maps", TITLE, "", (), draw_maps(maps, table))
+    whole = Figure.of_both_widths(
+        "maps", TITLE, WHOLE_CAPTION, partial(draw_maps, maps, table)
+    )
     sections = [
         Section("", [_card(table)]),
         Section("All maps", [whole, Paragraphs(MAPS_TEXT, "lead")]),
@@ -121,7 +131,9 @@ def _sections(
     ]
     for each in maps:
         title = each.data["title"]
-        figure = Figure(f"map-{each.name}", title, "", (), draw_maps([each], table))
+        figure = Figure.of_both_widths(
+            f"map-{each.name}", title, CAPTION, partial(draw_maps, [each], table)
+        )
         question = Paragraphs(each.data["question"], "lead")
         limits = each.data.get("limits", ())
         said = [Limits(limits)] if limits else []
@@ -276,10 +288,18 @@ def _errors_of_pile(
 
 
 COLUMNS = 2
-"""Maps beside each other in a figure of several."""
+"""Maps beside each other in a wide figure of several."""
+CELL = 0.36
+"""Height of a cell with one line of text, inches."""
+NAMES = 0.95
+"""Height of the title and the axis of a map, inches."""
+LEGENDS = 1.1
+"""Height of the legends of a figure, inches."""
 
 
-def draw_maps(maps: Sequence[StabilityMap], table: pd.DataFrame) -> Canvas:
+def draw_maps(
+    maps: Sequence[StabilityMap], table: pd.DataFrame, width: float = style.WIDE
+) -> Canvas:
     """Draw maps as grids of cells.
 
     Parameters
@@ -288,28 +308,31 @@ def draw_maps(maps: Sequence[StabilityMap], table: pd.DataFrame) -> Canvas:
         The maps.
     table
         The rows of `judge_map`.
+    width
+        Width of the drawing, inches.
 
     Returns
     -------
     Canvas
-        The worst verdict at each place, and its error.
+        The worst verdict at each place, and its error where a wide drawing has one map.
     """
     tables = [table[table["map"] == each.name] for each in maps]
     counts = [rows["y"].nunique() for rows in tables]
-    columns = min(len(maps), COLUMNS)
+    is_wide = width >= style.WIDE
+    columns = min(len(maps), COLUMNS) if is_wide else 1
     starts = range(0, len(maps), columns)
     ratios = [max(counts[start : start + columns]) for start in starts]
-    # height of a cell, inches, and size of its text, points
-    cell = 0.42
-    font = 9.0
-    if columns > 1:
-        cell = 0.31
-        font = 5.4
-    canvas = style.canvas(cell * sum(ratios) + 0.85 * len(ratios) + 0.55)
+    has_errors = is_wide and len(maps) == 1
+    cell = CELL * (1.5 if has_errors else 1.0)
+    canvas = style.canvas(cell * sum(ratios) + NAMES * len(ratios) + LEGENDS, width)
     grid = canvas.subplots(len(ratios), columns, squeeze=False, height_ratios=ratios)
     axes = grid.ravel()
     for ax, each, rows in zip(axes, maps, tables, strict=False):
-        _panel(ax, each, rows, font)
+        _panel(ax, each, rows, has_errors=has_errors)
+        fits = int(width / columns / style.inches(0.75))
+        ax.set_title(textwrap.fill(each.data["title"], fits), loc="left")
+        if not has_errors:
+            ax.tick_params(axis="x", rotation=90)
     for ax in axes[len(maps) :]:
         ax.set_axis_off()
     style.legends_below(canvas, _samples(set(table["verdict"])), [])
@@ -326,8 +349,10 @@ def _samples(verdicts: set[str]) -> list[Patch]:
     return samples
 
 
-def _panel(ax: Axes, one: StabilityMap, table: pd.DataFrame, font: float) -> None:
-    """Draw one map, with texts of some size (points)."""
+def _panel(
+    ax: Axes, one: StabilityMap, table: pd.DataFrame, *, has_errors: bool
+) -> None:
+    """Draw one map, with the errors below the letters of its verdicts or without."""
     columns = _ticked(ax.xaxis, table["x"], one.data["x"]["label"])
     lines = _ticked(ax.yaxis, table["y"], one.data["y"]["label"])
     cells: Any = _worst(table).itertuples(index=False)
@@ -340,14 +365,12 @@ def _panel(ax: Axes, one: StabilityMap, table: pd.DataFrame, font: float) -> Non
         ax.text(
             x + 0.5,
             y + 0.5,
-            _cell_text(look.letter, cell.error),
+            _cell_text(look.letter, cell.error) if has_errors else look.letter,
             ha="center",
             va="center",
-            fontsize=font,
             color=look.ink,
         )
     ax.set(xlim=(0, len(columns)), ylim=(0, len(lines)))
-    ax.set_title(one.data["title"], loc="left")
     ax.tick_params(length=0)
 
 

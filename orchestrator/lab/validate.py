@@ -6,13 +6,16 @@ model's value to the measured one.
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
+from matplotlib.lines import Line2D
 
 from orchestrator import plan
 from orchestrator.errors import InputError
@@ -57,8 +60,14 @@ NEAR, FAR = 1.5, 2.0
 """Factors within which rows are counted."""
 LEVEL = 0.01
 """Slope below which a bed is drawn as a level one."""
-BAND = 0.8
-"""Part of the height of a set in a figure over which its models stand."""
+SET = 0.66
+"""Height of a set in a figure, inches."""
+UNDER_NAME, BAND = 0.3, 0.78
+"""Parts of it between which its models stand, below its name."""
+ALIKE = 1e-9
+"""Ratios that differ by less do not depend on the model."""
+POINTS = "measured"
+"""What the measured points are called in a legend."""
 WINDWARD = (0.095, 0.605)
 """Part of the hump's chord on which its stress is compared.
 
@@ -180,21 +189,39 @@ MODELS = (
     Model("balanced", BALANCED),
     Model("balanced, gusts", BALANCED, GUST),
 )
-COLOURS = (
-    "#009e73",
-    "#cc79a7",
-    "#0072b2",
-    "#999999",
-    "#56b4e9",
-    "#e69f00",
-    "#d55e00",
-    "#000000",
-    "#8c564b",
-    "#f0e442",
-)
-"""Colours of the models in figures."""
-MARKERS = "os^DvPX*dh"
-"""Markers of the models."""
+
+
+class Drawn(NamedTuple):
+    """How a model of the figures looks.
+
+    Attributes
+    ----------
+    colour
+        Its colour.
+    marker
+        Its marker.
+    dash
+        Its line.
+    """
+
+    colour: str
+    marker: str
+    dash: Any
+
+
+LOOKS = {
+    DEFAULT: Drawn(style.ANSWER, "o", "-"),
+    "sustained": Drawn("#cc79a7", "P", (0, (1, 1))),
+    "formulas": Drawn(style.INK, "s", (0, (5, 2))),
+    "constants": Drawn(style.NONE, "d", (0, (2, 2))),
+    "paper": Drawn(style.FLOW, "^", (0, (6, 2, 1, 2))),
+    "entrained, steady": Drawn("#56b4e9", "v", "-"),
+    "bridged": Drawn("#009e73", "D", (0, (3, 1, 1, 1))),
+}
+"""The models of the figures: the default, what one would take without a model, the
+paper's, and those in a steady flow; the tables have all."""
+CURVES = ("formulas", "constants", "paper", "entrained, steady", "bridged", DEFAULT)
+"""Models whose curves are drawn beside the measured points, the last above all."""
 
 
 def by_paper(beds: pd.DataFrame) -> FloatArray:
@@ -768,9 +795,12 @@ def _sections(tables: Mapping[str, pd.DataFrame]) -> list[Section]:
     rows, scored = tables["measured"], tables["scores"]
     nearest = median_factors(scored)
     title = "Model over measurement"
-    chart = Figure("factors", title, FACTORS_TEXT, (), factors(scored))
+    draw = partial(factors, scored)
+    ratio = "Ratio of the model to each set of measurements"
+    chart = Figure.of_both_widths("factors", ratio, FACTORS_TEXT, draw)
     of_points = "Thresholds of level beds"
-    points = Figure("shields", of_points, SHIELDS_TEXT, (), validation_diagram(rows))
+    draw = partial(validation_diagram, rows)
+    points = Figure.of_both_widths("shields", of_points, SHIELDS_TEXT, draw)
     wide = scored.pivot(index="set", columns="model", values="factor")
     wide = wide.loc[scored["set"].unique(), [model.name for model in MODELS]]
     wide = wide.reset_index()
@@ -874,82 +904,105 @@ def _nearest_in_words(median: "pd.Series[float]") -> str:
     return said
 
 
-def factors(scored: pd.DataFrame) -> Canvas:
-    """Draw the ratio of each model to each set.
+def factors(scored: pd.DataFrame, width: float) -> Canvas:
+    """Draw the ratio of some models to each set.
 
     Parameters
     ----------
     scored
         The scores, as of `scores`.
+    width
+        Width of the drawing, inches.
 
     Returns
     -------
     Canvas
-        Median, and 10 to 90 % of the rows, in a row for each set.
+        Median, and 10 to 90 % of the rows, in a row for each set; one mark where the
+        set does not depend on the model.
     """
     sets = list(dict.fromkeys(scored["set"]))
-    canvas = style.canvas(0.6 * len(sets) + 1.0)
+    canvas = style.canvas(SET * len(sets) + 1.6, width)
     ax = canvas.subplots()
-    middle = (len(MODELS) - 1) / 2
-    for number, model in enumerate(MODELS):
-        part = scored[scored["model"] == model.name]
-        colour = COLOURS[number]
-        offset = BAND / len(MODELS) * (number - middle)
-        y = [sets.index(name) + offset for name in part["set"]]
-        ends = part["ratio_10"], part["ratio_90"]
-        ax.hlines(y, *ends, color=colour, lw=2.5, alpha=0.5)
-        marker = MARKERS[number]
-        ax.plot(part["ratio"], y, marker, ms=5, color=colour, label=model.name)
+    counts = scored.groupby("set")["rows"].first()
+    for place, name in enumerate(sets):
+        _of_set(ax, place, scored[scored["set"] == name])
+        words = f"{name} ({counts[name]})"
+        ax.text(0.01, place, words, transform=ax.get_yaxis_transform(), va="center")
+        ax.axhline(place - 0.5 * UNDER_NAME, color="0.85", lw=0.6)
     ax.axvline(1.0, color="0.2", lw=0.8)
     ax.axvspan(1 / ENOUGH, ENOUGH, color="0.93", zorder=0)
     ax.set_xscale("log")
+    ax.margins(x=0.05)
     style.plain_ticks(ax.xaxis)
-    counts = scored.groupby("set")["rows"].first()
-    labels = [f"{name} ({counts[name]})" for name in sets]
-    ax.set_yticks(range(len(sets)), labels)
-    ax.invert_yaxis()
+    ax.set_yticks([])
+    ax.set_ylim(len(sets) - 0.5 * UNDER_NAME, -0.5 * UNDER_NAME)
     ax.set_xlabel("model over measurement")
-    style.legends_below(canvas, ax.get_lines()[: len(MODELS)], [])
+    samples = []
+    for name, look in LOOKS.items():
+        mark = Line2D([], [], marker=look.marker, color=look.colour, label=name)
+        samples.append(mark)
+    style.legends_below(canvas, samples, [])
     return canvas
 
 
-def validation_diagram(rows: pd.DataFrame) -> Canvas:
+def _of_set(ax: Axes, place: int, rows: pd.DataFrame) -> None:
+    """Draw the ratios of one set, below its name."""
+    rows = rows[rows["ratio"].notna()]
+    shown = rows[rows["model"].isin(LOOKS)]
+    is_alike = len(rows) > 1 and np.ptp(rows["ratio"]) < ALIKE
+    for row in (shown[:1] if is_alike else shown).to_dict("records"):
+        name = row["model"]
+        look = LOOKS[name]
+        if is_alike:
+            look = Drawn(style.INK, "*", "-")
+        order = 0.5 if is_alike else [*LOOKS].index(name) / (len(LOOKS) - 1)
+        y = place + UNDER_NAME + (BAND - UNDER_NAME) * order
+        ends = (row["ratio_10"], row["ratio_90"])
+        ax.hlines(y, *ends, color=look.colour, lw=1.6, alpha=0.6)
+        gid = "every model" if is_alike else name
+        ax.plot(row["ratio"], y, look.marker, ms=5, color=look.colour, gid=gid)
+
+
+def validation_diagram(rows: pd.DataFrame, width: float) -> Canvas:
     """Draw thresholds of level beds over the Galileo number.
 
     Parameters
     ----------
     rows
         The comparison, as of `compare_models`.
+    width
+        Width of the drawing, inches.
 
     Returns
     -------
     Canvas
-        The measured thresholds, and the models' curves.
+        The measured thresholds and some models' curves, in liquids and in gases.
     """
-    canvas = style.canvas(3.6)
-    ax = canvas.subplots()
     is_bed = rows["galileo"].notna() & (rows["cohesion_n_m"] == 0)
     level = rows[is_bed & (rows["slope"] < LEVEL)]
     measured = level[level["model"] == MODELS[0].name]
-    sets = dict.fromkeys(level["set"])
-    for name, mark in zip(sets, "osv^D", strict=False):
-        part = measured[measured["set"] == name]
-        shown = {"ms": 3, "color": "0.6", "label": name}
-        ax.plot(part["galileo"], part["measured"], mark, **shown)
+    columns = 2 if width >= style.WIDE else 1
+    titles = ("in liquids", "in gases")
+    axes_of = ("Galileo number", "critical Shields number θ_c")
+    canvas, panels = style.grid(titles, 2.9, *axes_of, columns, width=width)
     is_gas = level["rho_f_kg_m3"] < GAS_BELOW
-    for model, colour in zip(MODELS, COLOURS, strict=True):
-        part = level[level["model"] == model.name].sort_values("galileo")
-        gas = is_gas.loc[part.index]
-        in_water = part[~gas]
-        in_air = part[gas]
-        shown = {"color": colour, "label": model.name}
-        ax.plot(in_water["galileo"], in_water["value"], **shown)
-        ax.plot(in_air["galileo"], in_air["value"], ":", color=colour)
-    ax.set(xscale="log", yscale="log")
-    ax.set(xlabel="Galileo number", ylabel="Shields number $θ$")
-    style.plain_ticks(ax.yaxis)
-    named = [
-        line for line in ax.get_lines() if not str(line.get_label()).startswith("_")
-    ]
-    style.legends_below(canvas, [], named)
+    for ax, is_here in zip(panels, (~is_gas, is_gas), strict=True):
+        points = measured[is_here.loc[measured.index]]
+        ax.plot(
+            points["galileo"], points["measured"], "o", ms=3, color="0.65", label=POINTS
+        )
+        for name in CURVES:
+            part = level[is_here & (level["model"] == name)].sort_values("galileo")
+            look = LOOKS[name]
+            ax.plot(
+                part["galileo"],
+                part["value"],
+                color=look.colour,
+                ls=look.dash,
+                lw=2.0 if name == DEFAULT else 1.2,
+                label=name,
+            )
+        ax.set(xscale="log", yscale="log")
+        style.plain_ticks(ax.yaxis)
+    style.legends_below(canvas, [], style.samples(panels))
     return canvas

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from io import BytesIO
 from typing import Any, Literal, TypeVar
 
@@ -198,6 +198,27 @@ class Figure:
     numbers: str = ""
     has_png: bool = False
     has_field: bool = False
+
+    @classmethod
+    def of_both_widths(
+        cls, name: str, title: str, caption: str, draw: Callable[[float], Canvas]
+    ) -> "Figure":
+        """Make a figure that is drawn anew for a narrow page.
+
+        Parameters
+        ----------
+        name, title, caption
+            As those of the figure.
+        draw
+            Draws it in a width, inches.
+
+        Returns
+        -------
+        Figure
+            The figure, as wide as a page, without cases.
+        """
+        wide, narrow = (partial(draw, width) for width in (WIDE, NARROW))
+        return cls(name, title, caption, (), wide, narrow=narrow)
 
     @cached_property
     def canvas(self) -> Canvas | None:

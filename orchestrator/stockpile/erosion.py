@@ -6,8 +6,10 @@ u_s/u_r, the speed 25 cm above a pile over that at 10 m, from a wind tunnel (Bil
 Arya, EPA/600/S3-85/059).
 """
 
+import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import log
 from pathlib import Path
 from typing import NamedTuple
@@ -16,6 +18,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
+from matplotlib.patches import Patch
 from numpy.typing import ArrayLike
 
 from orchestrator import plan
@@ -85,14 +88,30 @@ BASE_PLACES = 10_001
 """Places at which the length of a base is looked for."""
 IN_NAME = {"bed_shape", "profile", "h_m", "alpha_deg", "solve_z0_m", "obstacles"}
 """Columns of a scene that the name of its pile, or of its surface, has in any case."""
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
-"""Colours of the surfaces of a pile in the figure."""
-LINES = ("-", "--", "-.", ":")
-"""Line styles of the four piles of AP-42."""
-GREY = "0.3"
-"""Colour of AP-42."""
-DRAWN = 4
-"""Most piles of the figure."""
+LOOKS: tuple[style.Look, ...] = (
+    {"color": style.ANSWER, "ls": "-"},
+    {"color": style.FLOW, "ls": (0, (5, 2))},
+    {"color": style.INK, "ls": (0, (1.5, 1.5))},
+    {"color": style.NONE, "ls": (0, (6, 2, 1, 2))},
+)
+"""Looks of the surfaces of a pile in the figures."""
+AP42 = "AP-42, the range of its piles"
+"""What a legend calls its band."""
+DRAWN = len(LOOKS)
+"""Most piles of a figure, and most surfaces of a pile in it."""
+CLASS_COLOURS = ("#d0e1ee", "#82b1d4", "#2f7db8", "#0b3d63")
+"""Colours of the classes of u_s/u_r, from pale to dark."""
+CLASS_INKS = ("black", "black", "white", "white")
+"""Colours of the numbers in them."""
+LEAST_NAMED = 6.0
+"""Fraction of the surface from which its bar has a number, %."""
+LOG_FROM, LOG_OF = 8.0, 100.0
+"""Factor between two losses from which their axis is logarithmic, and that which such
+an axis shows at most below its largest; an arrow stands for what is further down."""
+ROOM = 0.3
+"""Room for numbers to the right of the largest loss, over the length of the axis."""
+BAR, NAMES = 0.42, 0.55
+"""Heights of a row and of the title of a panel, inches."""
 
 
 class PileSurface(NamedTuple):
@@ -111,6 +130,9 @@ class PileSurface(NamedTuple):
         u*_t, m/s.
     line
         Faces along the middle, which the figure has in place of all.
+    factors
+        Factors on u* by other flows over such a surface; None for those of a plane
+        flow over a heap.
     """
 
     name: str
@@ -118,6 +140,7 @@ class PileSurface(NamedTuple):
     ustar0_over_wind: float
     threshold: float
     line: pd.DataFrame | None = None
+    factors: tuple[float, ...] | None = None
 
     @property
     def drawn(self) -> pd.DataFrame:
@@ -487,19 +510,16 @@ def _results(
 ) -> ExperimentResults:
     """The table and the page of some piles."""
     table = erosion_rows(found, winds)
-    caption = TEXTS["figure"]
-    if len(found) > DRAWN:
-        caption += f" The first {DRAWN} of {len(found)} piles are drawn."
-    drawing = picture(found[:DRAWN], winds)
-    figure = Figure("erosion", "Stress and loss", caption, (), drawing)
+    loss, stress = pictures(found, winds)
     told = "\n\n".join([*erosion_sentences(found, winds, source), TEXTS["sure"]])
     in_sentences = Paragraphs(told, fold=IN_SENTENCES)
     parts = Paragraphs(TEXTS["rows"], "lead")
     limits = Limits(TEXTS["limits"].split("\n\n"))
     sources = Paragraphs(TEXTS["sources"], "lead")
     sections = [
-        Section("", [erosion_card(found, winds, source), figure, in_sentences]),
-        Section("Parts", [parts, limits, Table.of(table)]),
+        Section("", [erosion_card(found, winds, source), loss, in_sentences]),
+        Section("Stress on the pile", [stress]),
+        Section("Parts of the surface", [limits, parts, Table.of(table)]),
         Section("The tables of AP-42", [sources, *tables_of_epa()]),
     ]
     return ExperimentResults({"erosion": table}, sections)
@@ -580,8 +600,13 @@ def _row(part: PileSurface, whole: float, winds: ArrayLike) -> Row:
     apart = np.abs(ratio[:, None] - OVER_FLAT * CLASSES)
     shares = np.bincount(apart.argmin(axis=1), share, len(CLASSES))
     for us, near in zip(CLASSES, shares, strict=True):
-        row[f"{us:g} ({OVER_FLAT * us:.2f}), %"] = near
+        row[_class_head(us)] = near
     return row
+
+
+def _class_head(us: float) -> str:
+    """The column of the fraction of a surface that is nearest to a class of AP-42."""
+    return f"{us:g} ({OVER_FLAT * us:.2f}), %"
 
 
 def erosion_sentences(
@@ -709,20 +734,46 @@ def _change_by(
     )
 
 
+def loss_interval(
+    surface: PileSurface, winds: Sequence[float], *, has_obstacle: bool
+) -> tuple[float, float]:
+    """Find the interval of the loss of a surface by the solved flow.
+
+    Parameters
+    ----------
+    surface
+        The surface.
+    winds
+        Winds at 10 m, m/s.
+    has_obstacle
+        Whether it has one, behind which other flows differ otherwise.
+
+    Returns
+    -------
+    low, high : float
+        Its ends by other turbulence models and first cells, g/m2.
+    """
+    if surface.factors is not None:
+        factors = surface.factors
+    else:
+        factors = tuple(PAIRED_FACTORS["fence" if has_obstacle else "none"])
+    ends = [surface.under(factor).total(winds) for factor in (*factors, 1.0)]
+    return min(ends), max(ends)
+
+
 def _loss(
     surface: PileSurface, winds: Sequence[float], *, has_obstacle: bool
 ) -> Number:
     """The loss of a surface by the solved flow, with its interval."""
-    factors = PAIRED_FACTORS["fence" if has_obstacle else "none"]
-    ends = [surface.under(factor).total(winds) for factor in (*factors, 1.0)]
+    low, high = loss_interval(surface, winds, has_obstacle=has_obstacle)
     with_what = f", with {_named(surface)}" if has_obstacle else ", no obstacle"
     return Number(
         surface.total(winds),
         "g/m²",
         f"loss by the solved flow{with_what}",
         "mean over the surface",
-        low=min(ends),
-        high=max(ends),
+        low=low,
+        high=high,
         interval_of=TEXTS["flows"],
         not_in=TEXTS["tests"],
     )
@@ -746,62 +797,210 @@ def _named(surface: PileSurface) -> str:
     return f"a {surface.name}"
 
 
-def picture(found: Sequence[Stockpile], winds: Sequence[float]) -> Canvas:
-    """Draw a row for each pile: u*/u*_0 over it, its share of the surface, P.
+def pictures(found: Sequence[Stockpile], winds: Sequence[float]) -> list[Figure]:
+    """Make the figures of some piles: loss beside AP-42, and stress over each pile.
 
     Parameters
     ----------
     found
-        The piles.
+        The piles, of which the first `DRAWN` are drawn.
     winds
         Winds at 10 m, m/s.
 
     Returns
     -------
-    Figure
-        The figure.
+    list of Figure
+        The figures.
     """
-    canvas = style.canvas(2.3 * len(found) + 1.0)
-    grid = canvas.subplots(len(found), 3, squeeze=False, width_ratios=[1.3, 1, 1])
-    for axes, pile in zip(grid, found, strict=True):
-        _draw(axes, pile, winds)
-    style.legends_below(canvas, [], style.samples(grid[:, 1].tolist()))
+    drawn = found[:DRAWN]
+    more = ""
+    if len(found) > DRAWN:
+        more = f" The first {DRAWN} of {len(found)} piles are drawn."
+    return [
+        Figure.of_both_widths(
+            "loss",
+            "Loss beside AP-42, g/m², and the fractions of the surface behind it, %",
+            TEXTS["loss"] + more,
+            partial(_losses, drawn, winds),
+        ),
+        Figure.of_both_widths(
+            "erosion",
+            "Friction velocity on the pile over that of the flat ground",
+            TEXTS["stress"] + more,
+            partial(_stresses, drawn, winds),
+        ),
+    ]
+
+
+def _losses(found: Sequence[Stockpile], winds: Sequence[float], width: float) -> Canvas:
+    """Draw for each pile the classes of its surfaces, and their losses."""
+    is_wide = width >= style.WIDE
+    rows = [len(pile.surfaces[:DRAWN]) + len(pile.by_epa) for pile in found]
+    high = [BAR * count + NAMES for count in rows]
+    if is_wide:
+        canvas = style.canvas(sum(high) + 0.6, width)
+        panels = canvas.subplots(
+            len(found), 2, squeeze=False, height_ratios=rows, width_ratios=[1.5, 1]
+        )
+    else:
+        canvas = style.canvas(2 * sum(high) + 0.9, width)
+        ratios = [count for count in rows for _ in range(2)]
+        panels = canvas.subplots(2 * len(found), 1, squeeze=False, height_ratios=ratios)
+        panels = panels.reshape(-1, 2)
+    for (left, right), pile in zip(panels, found, strict=True):
+        names = [surface.name for surface in (*pile.surfaces[:DRAWN], *pile.by_epa)]
+        _classes(left, pile, winds)
+        _amounts(right, pile, winds, has_names=not is_wide)
+        left.set_title(textwrap.fill(pile.name, int(6.5 * width)), loc="left")
+        fits = 26 if is_wide else 13
+        left.set_yticks(range(len(names)), [textwrap.fill(one, fits) for one in names])
+    bottom, right = panels[-1]
+    bottom.set_xlabel("fraction of the surface, %")
+    right.set_xlabel(f"loss in {_speeds(winds)} m/s, g/m²")
+    samples = []
+    for us, colour in zip(CLASSES, CLASS_COLOURS, strict=True):
+        samples.append(
+            Patch(fc=colour, ec=style.EDGE, lw=0.5, label=f"$u_s/u_r$ {us:g}")
+        )
+    style.legends_below(canvas, samples, [])
     return canvas
 
 
-def _draw(axes: Sequence[Axes], pile: Stockpile, winds: Sequence[float]) -> None:
-    """Draw the row of one pile: three panels."""
-    left, middle, right = axes
-    axis = np.linspace(0, 1.4 * max(winds), 141)
-    for number, surface in enumerate(pile.surfaces):
-        colour = COLOURS[number % len(COLOURS)]
-        _draw_shares(middle, surface, colour, "-")
-        right.plot(axis, surface.potential(axis), color=colour)
-        line = surface.drawn
-        left.plot(line["x_m"], line["ratio"], ".", ms=2.5, color=colour)
-    for surface, line_style in zip(pile.by_epa, LINES, strict=False):
-        _draw_shares(middle, surface, GREY, line_style)
-        right.plot(axis, surface.potential(axis), color=GREY, ls=line_style)
+def _speeds(winds: Sequence[float]) -> str:
+    """Winds in words."""
+    return ", ".join(map("{:g}".format, winds))
+
+
+def _classes(ax: Axes, pile: Stockpile, winds: ArrayLike) -> None:
+    """Draw the fraction of each surface that is nearest to each class of AP-42."""
+    for place, surface in enumerate((*pile.surfaces[:DRAWN], *pile.by_epa)):
+        start = 0.0
+        row = _row(surface, surface.faces["share"].sum(), winds)
+        for us, colour, ink in zip(CLASSES, CLASS_COLOURS, CLASS_INKS, strict=True):
+            part = float(str(row[_class_head(us)]))
+            name = f"{surface.name}, class {us:g}"
+            look: style.Look = {"fc": colour, "ec": "white", "lw": 0.8, "gid": name}
+            ax.barh(place, part, 0.76, left=start, **look)
+            if part >= LEAST_NAMED:
+                middle = start + part / 2
+                ax.text(
+                    middle, place, f"{part:.0f}", ha="center", va="center", color=ink
+                )
+            start += part
+    ax.set(xlim=(0, 100))
+    ax.invert_yaxis()
+
+
+def _amounts(
+    ax: Axes, pile: Stockpile, winds: Sequence[float], *, has_names: bool
+) -> None:
+    """Draw the loss of each surface, those of the solved flow with their intervals."""
+    solved = pile.surfaces[:DRAWN]
+    every = (*solved, *pile.by_epa)
+    losses = [surface.total(winds) for surface in every]
+    intervals = []
+    for place, surface in enumerate(solved):
+        has_obstacle = _has_obstacle(pile, place)
+        intervals.append(loss_interval(surface, winds, has_obstacle=has_obstacle))
+    start = _start(ax, [*losses, *np.ravel(intervals).tolist()])
+    for place, (low, high) in enumerate(intervals):
+        name = f"{every[place].name}, interval"
+        ax.hlines(place, max(low, start), high, color=style.PALE, lw=7, gid=name)
+        if low < start:
+            ax.plot(start, place, "<", ms=8, color=style.PALE, clip_on=False)
+    for place, (surface, lost) in enumerate(zip(every, losses, strict=True)):
+        is_solved = place < len(solved)
+        colour = style.ANSWER if is_solved else style.INK
+        look: style.Look = {"marker": "o" if is_solved else "s", "mec": colour, "ms": 7}
+        ax.plot(
+            lost, place, mfc=colour if is_solved else "white", gid=surface.name, **look
+        )
+        end = intervals[place][1] if is_solved else lost
+        text = f"{lost:#.2g}".rstrip(".")
+        ax.annotate(text, (end, place), **_beside(colour))
+    count = len(every)
+    ax.set_ylim(count - 0.5, -0.5)
+    ax.set_yticks(range(count), [""] * count)
+    if has_names:
+        names = [textwrap.fill(surface.name, 13) for surface in every]
+        ax.set_yticks(range(count), names)
+    ax.grid(axis="x", lw=0.4, color="0.85")
+
+
+def _start(ax: Axes, losses: Sequence[float]) -> float:
+    """Set the axis of some losses; the loss at which it starts."""
+    most = max(losses)
+    above = [lost for lost in losses if lost > most / LOG_OF]
+    if min(losses) < most / LOG_FROM and len(above) > 1:
+        start = min(above) / 1.5
+        ax.set_xscale("log")
+        ax.set_xlim(start, most * (most / start) ** ROOM)
+        style.plain_ticks(ax.xaxis)
+        return start
+    ax.set_xlim(0, (1 + ROOM) * most or 1.0)
+    return 0.0
+
+
+def _beside(colour: str) -> style.Look:
+    """How a number stands to the right of its mark."""
+    return {
+        "xytext": (8, 0),
+        "textcoords": "offset points",
+        "va": "center",
+        "color": colour,
+    }
+
+
+def _has_obstacle(pile: Stockpile, place: int) -> bool:
+    """Whether a surface of a pile, by its place, has an obstacle."""
+    return place > 0 or not pile.has_bare
+
+
+def _stresses(
+    found: Sequence[Stockpile], winds: Sequence[float], width: float
+) -> Canvas:
+    """Draw for each pile u*/u*_0 over it, and the potential against the wind."""
+    is_wide = width >= style.WIDE
+    if is_wide:
+        canvas = style.canvas(2.9 * len(found) + 0.8, width)
+        panels = canvas.subplots(len(found), 2, squeeze=False, width_ratios=[1.4, 1])
+    else:
+        canvas = style.canvas(5.4 * len(found) + 1.2, width)
+        panels = canvas.subplots(2 * len(found), 1, squeeze=False).reshape(-1, 2)
+    for (left, right), pile in zip(panels, found, strict=True):
+        _over_pile(left, pile)
+        _potential(right, pile, winds)
+        left.set_title(textwrap.fill(pile.name, int(6 * width)), loc="left")
+    style.legends_below(canvas, [], style.samples(panels[:, 1].tolist()))
+    return canvas
+
+
+def _over_pile(left: Axes, pile: Stockpile) -> None:
+    """Draw u*/u*_0 over a pile, and the pile below it."""
+    for surface, look in zip(pile.surfaces, LOOKS, strict=False):
+        line = surface.drawn.sort_values("x_m")
+        left.plot(
+            line["x_m"], line["ratio"], marker=".", ms=4, gid=surface.name, **look
+        )
     bed = left.twinx()
-    first = pile.surfaces[0]
-    line = first.drawn
+    line = pile.surfaces[0].drawn.sort_values("x_m")
     x, z = line[["x_m", "z_m"]].to_numpy().T
-    bed.fill_between(x, z, color=style.BED, lw=0)
+    bed.fill_between(x, z, color=style.BED, lw=0, gid="the pile")
     bed.set(ylim=(0, 4 * (z.max() or 1)), yticks=[])
-    middle.set(xlim=(0, 100), ylim=(0, None), xlabel="share of the surface above, %")
-    left.set(zorder=1, frame_on=False, ylim=middle.get_ylim())
-    left.set(xlabel="x, m", ylabel=USTAR)
-    left.set_title(pile.name, loc="left")
+    left.set(zorder=1, frame_on=False, xlabel="x, m", ylabel=USTAR)
+    left.set_ylim(0, None)
+    left.axhline(1.0, color="0.6", lw=0.6)
+
+
+def _potential(right: Axes, pile: Stockpile, winds: Sequence[float]) -> None:
+    """Draw the erosion potential against the wind, AP-42 as the band of its piles."""
+    axis = np.linspace(0, 1.4 * max(winds), 141)
+    for surface, look in zip(pile.surfaces, LOOKS, strict=False):
+        right.plot(axis, surface.potential(axis), label=surface.name, **look)
+    of_epa = np.array([surface.potential(axis) for surface in pile.by_epa])
+    ends = of_epa.min(0), of_epa.max(0)
+    right.fill_between(axis, *ends, color=style.RANGE, ec=style.NONE, label=AP42)
     right.set(xlim=(0, axis[-1]), ylim=(0, None), xlabel="wind at 10 m, m/s")
-    right.set_title("P, g/m² of surface", loc="left")
-    right.vlines(winds, 0, right.get_ylim()[1], color="0.7", lw=0.8, zorder=0)
-
-
-def _draw_shares(ax: Axes, surface: PileSurface, colour: str, line_style: str) -> None:
-    """Draw u*/u*_0 over the share of the surface where it is larger."""
-    faces = surface.faces.sort_values("ratio", ascending=False)
-    above = 100 * faces["share"].cumsum() / faces["share"].sum()
-    first = faces["ratio"].max()
-    x = [0, *above]
-    y = [first, *faces["ratio"]]
-    ax.step(x, y, color=colour, ls=line_style, label=surface.name)
+    right.set_ylabel("P, g/m²")
+    for wind in winds:
+        right.axvline(wind, color="0.6", lw=0.8, ls=":", zorder=0)

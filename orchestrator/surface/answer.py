@@ -440,7 +440,9 @@ class SurfaceAnswer:
             found[HOURS] = onset.hours(by_way, self.rose.table)
         return found
 
-    def hours_of(self, share: float, factor: float = 1.0) -> float:
+    def hours_of(
+        self, share: float, factor: float = 1.0, rows: pd.DataFrame | None = None
+    ) -> float:
         """Give the hours a year in which at least a share of the surface moves.
 
         Parameters
@@ -449,18 +451,21 @@ class SurfaceAnswer:
             Share of the area, 0 to 1.
         factor
             What the winds in which it moves are multiplied by.
+        rows
+            Winds of its rose; None for all.
 
         Returns
         -------
         float
-            Hours a year, all directions of the rose together.
+            Hours a year, all these winds together.
         """
         assert self.rose is not None
         winds = {
             each.from_deg: np.array([each.shares().wind_for(share)])
             for each in self.directions
         }
-        return float(onset.hours(winds, self.rose.table, factor)[0])
+        table = self.rose.table if rows is None else rows
+        return float(onset.hours(winds, table, factor)[0])
 
     def left_out(self, share: float) -> "LeftOut | None":
         """Find how far flows between others are met, each left out once.

@@ -12,7 +12,6 @@ from orchestrator.experiment import ExperimentResults, page_texts
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.report.card import Card, Number, Worth
 from orchestrator.report.page import IN_SENTENCES, Limits, Paragraphs, Section, Table
-from orchestrator.report.style import Figure
 from orchestrator.stockpile import erosion
 from orchestrator.surface import cards, onset
 from orchestrator.surface.answer import HEAP, RATIO, Direction, SurfaceAnswer
@@ -21,8 +20,8 @@ from orchestrator.surface.mesh import wind_axes
 from orchestrator.surface.pipeline import OverSurfaces
 from orchestrator.surface.study import SurfaceStudy
 
-ROW = 1.5
-"""Distance from the middle up to which faces are of its row, over the least."""
+ROW = 0.5
+"""Distance from the middle up to which faces are of its row, cells of the flow."""
 GRAMS = 1000.0
 """Grams of a kilogram."""
 
@@ -156,17 +155,9 @@ class Heaps:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Ends of the loss by the worst direction, g/m2, by other flows over a cone.
-
-        Stress is inverse to the wind in which motion starts.
-        """
-        low, high = cards.factors_of_wind(onset.STARTS)
+        """Ends of the loss by the worst direction, g/m2, by other flows over a cone."""
         whole = self.worst.whole
-        ends = []
-        for factor in (1 / high, 1 / low):
-            other = whole._replace(ustar0_over_wind=factor * whole.ustar0_over_wind)
-            ends.append(other.total(self.speeds))
-        return ends[0], ends[1]
+        return erosion.loss_interval(whole, self.speeds, has_obstacle=False)
 
     @property
     def by_epa(self) -> tuple[float, float]:
@@ -200,10 +191,25 @@ class Heaps:
 def _surface_of(
     answer: SurfaceAnswer, from_deg: float, faces: pd.DataFrame, heap: Heap
 ) -> erosion.PileSurface:
-    """The surface of a pile by its faces, whose shares are areas.
+    """The surface of a pile by its faces, whose shares are areas."""
+    listed = _listed(answer, from_deg, faces, heap)
+    ground = answer.ground
+    # stress is inverse to the wind in which motion starts
+    low, high = cards.factors_of_wind(onset.STARTS)
+    return erosion.PileSurface(
+        f"wind from {from_deg:g}°",
+        listed,
+        float(log_law_ustar(1.0, onset.WIND_HEIGHT, ground.roughness)),
+        ground.level_ustar,
+        listed[listed["off_middle_m"] <= ROW * answer.cell_m],
+        (1 / high, 1 / low),
+    )
 
-    The figure is drawn over the middle of the heap.
-    """
+
+def _listed(
+    answer: SurfaceAnswer, from_deg: float, faces: pd.DataFrame, heap: Heap
+) -> pd.DataFrame:
+    """The faces of a heap along the wind, with their distances from its middle."""
     faces = faces.sort_values("along_m")
     is_level = faces["slope_deg"] < erosion.LEVEL_DEG
     side = np.where(faces["uphill"] > 0, "windward", "lee")
@@ -215,16 +221,9 @@ def _surface_of(
         "part": np.where(is_level, "top", side),
         "share": faces["area_m2"],
         "ratio": faces[RATIO],
+        "off_middle_m": (faces["across_m"] - across).abs(),
     }
-    name = f"wind from {from_deg:g}°"
-    ground = answer.ground
-    over_wind = float(log_law_ustar(1.0, onset.WIND_HEIGHT, ground.roughness))
-    threshold = ground.level_ustar
-    listed = pd.DataFrame(columns)
-    off_middle = (faces["across_m"] - across).abs()
-    # the middles of a row of faces lie within a part of a cell
-    is_middle = off_middle <= ROW * off_middle.min()
-    return erosion.PileSurface(name, listed, over_wind, threshold, listed[is_middle])
+    return pd.DataFrame(columns)
 
 
 class HeapErosion(OverSurfaces):
@@ -310,8 +309,7 @@ def erosion_sections(
     texts = erosion.TEXTS
     own = page_texts(__file__, "surface")
     piles = [pile for heaps in found for pile in heaps.piles]
-    drawing = erosion.picture(piles[: erosion.DRAWN], found[0].speeds)
-    figure = Figure("erosion", "Stress and loss", own["erosion"], (), drawing)
+    loss, stress = erosion.pictures(piles, found[0].speeds)
     said = [line for heaps in found for line in heaps_sentences(heaps, source)]
     told = "\n\n".join([*said, *read, own["erosion_sure"]])
     in_sentences = Paragraphs(told, fold=IN_SENTENCES)
@@ -319,8 +317,9 @@ def erosion_sections(
     limits = Limits(own["erosion_limits"].split("\n\n"))
     sources = Paragraphs(texts["sources"], "lead")
     return [
-        Section("", [heaps_card(found, source), figure, in_sentences]),
-        Section("Parts", [parts, limits, Table.of(heaps_rows(found))]),
+        Section("", [heaps_card(found, source), loss, in_sentences]),
+        Section("Stress on the pile", [stress]),
+        Section("Parts of the surface", [limits, parts, Table.of(heaps_rows(found))]),
         Section("The tables of AP-42", [sources, *erosion.tables_of_epa()]),
     ]
 

@@ -8,6 +8,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize, TwoSlopeNorm
 from matplotlib.figure import Figure as Canvas
+from matplotlib.ticker import MaxNLocator
 
 from orchestrator.report import style
 from orchestrator.types import BoolArray, FloatArray
@@ -15,13 +16,15 @@ from orchestrator.types import BoolArray, FloatArray
 CONTOURS = 6
 """Contours of height on a map."""
 COLUMNS = 3
-"""Maps beside each other, at most."""
+"""Maps beside each other in a wide figure, at most."""
 MOST_MAPS = 9
 """Maps of a figure, at most."""
-PANEL, LONE_PANEL = 2.2, 3.6
-"""Height of a map among others and of one alone, at most, inches."""
-BESIDE, BELOW, TITLE = 1.6, 0.5, 0.3
-"""Room beside all maps, below them and above each, inches."""
+PANEL = 3.6
+"""Height of a map, at most, inches."""
+BESIDE, SCALE, TITLE = 0.8, 1.5, 0.3
+"""Room beside all maps, below them with their scale, and above each, inches."""
+MOST_NUMBERS = 4
+"""Numbers of an axis, at most."""
 MARGIN = 0.12
 """Room around the form on a map, over its extent."""
 NICE = (1.0, 2.0, 5.0)
@@ -113,6 +116,7 @@ def figure(
     *,
     colours: str = "viridis_r",
     middle: float | None = None,
+    width: float = style.NARROW,
 ) -> Canvas:
     """Draw maps of one quantity, with one scale of colours.
 
@@ -128,6 +132,8 @@ def figure(
         A colour map of matplotlib.
     middle
         Value at the middle of the colours; None for that of the range.
+    width
+        Width of the drawing, inches; a narrow one has its maps below each other.
 
     Returns
     -------
@@ -135,9 +141,9 @@ def figure(
         The figure.
     """
     drawn = maps[:MOST_MAPS]
-    columns = min(len(drawn), COLUMNS)
+    columns = min(len(drawn), COLUMNS) if width >= style.WIDE else 1
     lines = -(-len(drawn) // columns)
-    canvas = _canvas(grid, columns, lines)
+    canvas = _canvas(grid, columns, lines, width)
     panels = canvas.subplots(lines, columns, squeeze=False, sharex=True, sharey=True)
     norm = _norm([each.values for each in drawn], middle)
     every = panels.ravel().tolist()
@@ -161,20 +167,23 @@ def figure(
         if each.from_deg is not None:
             _wind(ax, each.from_deg)
         if each.mark:
-            ax.plot(*each.mark, "o", mfc="none", color="crimson", ms=6, gid="start")
+            ax.plot(
+                *each.mark, "o", mfc="none", color="crimson", ms=7, mew=1.6, gid="start"
+            )
     _frame(axes, columns, grid)
-    canvas.colorbar(image, ax=axes, label=label, shrink=0.8, pad=0.02)
+    bar = canvas.colorbar(
+        image, ax=axes, label=label, location="bottom", shrink=0.8, pad=0.02, aspect=30
+    )
+    bar.ax.xaxis.set_major_locator(MaxNLocator(6))
     return canvas
 
 
-def _canvas(grid: MapGrid, columns: int, lines: int) -> Canvas:
-    """A canvas as wide and high as its maps are."""
+def _canvas(grid: MapGrid, columns: int, lines: int, width: float) -> Canvas:
+    """A canvas as high as its maps are."""
     (left, right), (bottom, top) = _limits(grid)
     aspect = (right - left) / (top - bottom)
-    height = PANEL if columns > 1 else LONE_PANEL
-    height = min(height, (style.WIDTH - BESIDE) / (columns * aspect))
-    width = min(BESIDE + columns * height * aspect, style.WIDTH)
-    return style.canvas(lines * (height + TITLE) + BELOW, width)
+    height = min(PANEL, (width - BESIDE) / (columns * aspect))
+    return style.canvas(lines * (height + TITLE) + SCALE, width)
 
 
 def _norm(values: Sequence[FloatArray], middle: float | None) -> Normalize:
@@ -195,7 +204,7 @@ def _ground(ax: Axes, grid: MapGrid) -> None:
     levels = np.arange(step, highest, step)
     look: style.Look = {"colors": "0.15", "linewidths": 0.5, "alpha": 0.7}
     lines = ax.contour(grid.x, grid.y, grid.height, levels, **look)
-    ax.clabel(lines, levels[1::2], fmt="%g", fontsize=5.5)
+    ax.clabel(lines, levels[1::2], fmt="%g", fontsize=style.LETTERS)
 
 
 def nice(length: float) -> float:
@@ -261,7 +270,8 @@ def _frame(axes: Sequence[Axes], columns: int, grid: MapGrid) -> None:
     for number, ax in enumerate(axes):
         ax.set_aspect("equal")
         ax.ticklabel_format(useOffset=False, style="plain")
-        ax.tick_params(axis="x", rotation=30)
+        for axis in (ax.xaxis, ax.yaxis):
+            axis.set_major_locator(MaxNLocator(MOST_NUMBERS))
         if number % columns == 0:
             ax.set_ylabel("y, m (north)")
         if number >= last:
@@ -277,7 +287,7 @@ def _scale(ax: Axes) -> None:
     right = high - 0.05 * (high - low)
     level = bottom + 0.06 * (top - bottom)
     ax.plot([right - length, right], [level, level], color="black", lw=2, gid="scale")
-    words: style.Look = {"fontsize": 6.5, "ha": "center", "va": "bottom"}
+    words: style.Look = {"ha": "center", "va": "bottom"}
     ax.text(
         right - length / 2, level + 0.015 * (top - bottom), f"{length:g} m", **words
     )
@@ -285,42 +295,122 @@ def _scale(ax: Axes) -> None:
     ax.text(0.93, 0.935, "N", transform=ax.transAxes, **words)
 
 
+@dataclass(frozen=True)
+class ShareCurve:
+    """The fraction of a surface above threshold against the wind of one direction.
+
+    Attributes
+    ----------
+    title
+        The direction in words.
+    moving
+        Fractions at the winds of the figure.
+    leaving
+        Those of grains that are entrained without a gust; empty where these are alike.
+    """
+
+    title: str
+    moving: FloatArray
+    leaving: FloatArray
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A wind that is named at the first curve, with its interval.
+
+    Attributes
+    ----------
+    wind, low, high
+        The wind and the ends of its interval, m/s.
+    share
+        The fraction of the surface.
+    words
+        What it is.
+    """
+
+    wind: float
+    low: float
+    high: float
+    share: float
+    words: str
+
+
+FIRST: style.Look = {"color": style.ANSWER, "lw": 2.0, "zorder": 3}
+LAST: style.Look = {"color": style.FLOW, "ls": (0, (5, 2)), "zorder": 2}
+BETWEEN: style.Look = {"color": "0.7", "lw": 0.8, "zorder": 1}
+"""Looks of the directions that move first and last, and of all others."""
+
+
+LOW = 0.1
+"""Fraction of the surface up to which a mark is named below the curve."""
+
+
 def shares(
-    curves: Sequence[tuple[str, FloatArray, FloatArray, str]],
+    curves: Sequence[ShareCurve],
     winds: FloatArray,
     speed: str,
+    marks: Sequence[Mark],
+    flat: float,
 ) -> Canvas:
-    """Draw the share of a surface that is above threshold against the wind.
+    """Draw the fraction of a surface that is above threshold against the wind.
 
     Parameters
     ----------
     curves
-        For each its label, its shares at the winds, those of grains that leave without
-        a gust or an empty array, and its colour.
+        A curve for each direction, the one that moves first at the beginning.
     winds
         The winds, m/s.
     speed
         What they are, in words.
+    marks
+        Winds of the first curve that are named.
+    flat
+        The wind in which flat ground moves, m/s.
 
     Returns
     -------
     Canvas
         The figure.
     """
-    canvas, (ax,) = style.grid(
-        [""],
-        2.6,
-        f"{speed} over flat ground, m/s",
-        "share that moves, %",
-        width=style.WIDTH,
-    )
-    colours = []
-    for label, moving, leaving, colour in curves:
-        ax.plot(winds, 100 * moving, color=colour, label="moves")
-        if len(leaving):
-            words = "entrained without a gust"
-            ax.plot(winds, 100 * leaving, color=colour, ls="--", label=words)
-        colours.append(style.entry(label, colour))
+    axes = (f"{speed}, m/s", "surface above threshold, %")
+    canvas, (ax,) = style.grid([""], 3.4, *axes)
+    first, *others = curves
+    ax.plot(winds, 100 * first.moving, label=f"{first.title}, the first", **FIRST)
+    if len(first.leaving):
+        look = {**FIRST, "ls": ":"}
+        words = "the same, entrained without a gust"
+        ax.plot(winds, 100 * first.leaving, label=words, **look)
+    for place, each in enumerate(others, 1):
+        is_last = place == len(others)
+        look = LAST if is_last else BETWEEN
+        label = f"{each.title}, the last" if is_last else "directions between"
+        ax.plot(winds, 100 * each.moving, label=label, **look)
+    ax.axvline(flat, color="0.4", lw=0.8, ls=":")
+    where = ax.get_xaxis_transform()
+    words = f" flat ground {flat:.3g}"
+    ax.text(flat, 0.97, words, transform=where, color="0.3", va="top")
+    for mark in marks:
+        _mark(ax, mark)
     ax.set(xlim=(0, float(winds[-1])), ylim=(0, 100))
-    style.legends_below(canvas, colours, style.samples([ax]))
+    has_several = others or len(first.leaving)
+    style.legends_below(canvas, [], style.samples([ax]) if has_several else [])
     return canvas
+
+
+def _mark(ax: Axes, mark: Mark) -> None:
+    """A point of the first curve with its interval and its number."""
+    y = 100 * mark.share
+    off = [[mark.wind - mark.low], [mark.high - mark.wind]]
+    look: style.Look = {"color": style.ANSWER, "zorder": 4, "clip_on": False}
+    ax.errorbar([mark.wind], [y], xerr=off, fmt="o", ms=6, capsize=3, **look)
+    # below the curve where that begins, else above it
+    is_low = mark.share < LOW
+    ax.annotate(
+        f"{mark.words} {mark.wind:.3g}",
+        (mark.high if is_low else mark.low, y),
+        xytext=(6, 4) if is_low else (-6, 4),
+        textcoords="offset points",
+        ha="left" if is_low else "right",
+        color=style.ANSWER,
+        weight="bold",
+    )

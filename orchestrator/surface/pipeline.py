@@ -6,6 +6,7 @@ the closed form the threshold of a grain on each of its faces.
 
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import MappingProxyType
@@ -13,8 +14,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib import colormaps
-from matplotlib.colors import to_hex
 from matplotlib.figure import Figure as Canvas
 
 from orchestrator import plan
@@ -23,7 +22,7 @@ from orchestrator.experiment import Experiment, ExperimentResults, Runs, page_te
 from orchestrator.flow.run import SPEED_HEIGHT, WALL_STRESS
 from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.velocity import log_law_ustar
-from orchestrator.report.page import IN_SENTENCES, Element, Paragraphs, Section, Table
+from orchestrator.report.page import IN_SENTENCES, Paragraphs, Section, Table
 from orchestrator.report.style import Figure
 from orchestrator.stockpile.erosion import given_threshold
 from orchestrator.study.scene import (
@@ -410,10 +409,12 @@ def surface_sections(
         table = table.drop(columns="surface")  # the card names it
     card = cards.surface_card(found, source)
     first, *others = listed
-    figure, told = first.content
+    *figures, told = first.content
     sure = Section("How sure it is", [Paragraphs(words["sure"], "lead")])
     return [
-        Section("", [card, figure, told, Table.of(table)]),
+        Section("", [card]),
+        Section("", figures, in_grid=True),
+        Section("", [told, Table.of(table)]),
         *others,
         sure,
     ]
@@ -458,27 +459,36 @@ def _sections(
         title = f"least {stream.word} of all directions"
     from_deg = None if several else answer.easiest.from_deg
     least = [maps.Map(title, answer.maps[LEAST], from_deg, mark)]
-    drawing = maps.figure(answer.grid, least, f"{stream.at}, m/s, at which it moves")
+    drawing = maps.figure(answer.grid, least, f"threshold {stream.at}, m/s")
     text = words["least"]
-    figure = Figure(f"least{end}", "Where motion starts", text, (), drawing)
-    yield Section("", [figure, Paragraphs(told, fold=IN_SENTENCES)])
-    figures: list[Element] = [
-        _figure(answer, RATIO, f"stress{end}", "Stress", words["stress"])
-    ]
-    if several:
-        title = f"{stream.word.capitalize()} from each direction"
-        figures.append(_figure(answer, MOVES, f"winds{end}", title, words["winds"]))
+    place = Figure(f"least{end}", "Where motion starts", text, (), drawing)
     curves = _curves(answer)
-    figures.append(Figure(f"shares{end}", "Share", words["shares"], (), curves))
-    if answer.rose is not None:
-        hours = [maps.Map("hours a year", answer.maps[HOURS])]
-        drawing = maps.figure(answer.grid, hours, "hours a year", colours="magma")
-        text = words["hours"]
-        figures.append(Figure(f"hours{end}", "Hours of motion", text, (), drawing))
-        drawing = winds.rose_figure(answer)
-        text = f"{words['rose']} {answer.rose.said}"
-        figures.append(Figure(f"rose{end}", "Winds of the place", text, (), drawing))
-    yield Section(answer.name, figures)
+    title = f"Fraction above threshold against the {stream.word}"
+    share = Figure(f"shares{end}", title, words["shares"], (), curves)
+    yield Section("", [place, share, Paragraphs(told, fold=IN_SENTENCES)])
+    yield Section(answer.name, [*_further(answer, end)])
+
+
+def _further(answer: SurfaceAnswer, end: str) -> Iterator[Figure]:
+    """The figures of one surface below its answer."""
+    words = _texts(answer.ground.stream)
+    title = "Friction velocity over that of the undisturbed flow"
+    yield _figure(answer, RATIO, f"stress{end}", title, words["stress"])
+    if len(answer.directions) > 1:
+        title = f"Threshold {answer.ground.stream.word} from each direction, m/s"
+        yield _figure(answer, MOVES, f"winds{end}", title, words["winds"])
+    if answer.rose is None:
+        return
+    hours = [maps.Map("hours a year", answer.maps[HOURS])]
+    drawing = maps.figure(answer.grid, hours, "hours a year", colours="magma")
+    title = "Hours a year above threshold"
+    yield Figure(f"hours{end}", title, words["hours"], (), drawing)
+    yield Figure.of_both_widths(
+        f"rose{end}",
+        "Wind rose, and hours a year in motion",
+        f"{words['rose']} {answer.rose.said}",
+        partial(winds.rose_figure, answer),
+    )
 
 
 def _figure(
@@ -489,25 +499,33 @@ def _figure(
     for each in answer.directions:
         values = answer.maps[f"{column}-{each.word}"]
         drawn.append(maps.Map(each.title, values, each.from_deg))
+    look: dict[str, Any] = {"label": f"threshold {answer.ground.stream.at}, m/s"}
     if column == RATIO:
-        drawing = maps.figure(
-            answer.grid, drawn, "u*/u*₀", colours="RdBu_r", middle=1.0
-        )
-    else:
-        axis = f"{answer.ground.stream.at}, m/s, at which it moves"
-        drawing = maps.figure(answer.grid, drawn, axis)
-    return Figure(name, title, text, (), drawing)
+        look = {"label": "u*/u*₀", "colours": "RdBu_r", "middle": 1.0}
+    if len(drawn) == 1:
+        return Figure(name, title, text, (), maps.figure(answer.grid, drawn, **look))
+
+    def draw(width: float) -> Canvas:
+        return maps.figure(answer.grid, drawn, width=width, **look)
+
+    return Figure.of_both_widths(name, title, text, draw)
 
 
 def _curves(answer: SurfaceAnswer) -> Canvas:
-    """The shares that move against the wind, a colour for each direction."""
-    winds = _winds(answer)
+    """The fractions above threshold against the wind, the first direction first."""
+    speeds = _winds(answer)
     drawn = []
-    count = max(len(answer.directions), 2)
-    for number, each in enumerate(answer.directions):
-        colour = to_hex(colormaps["turbo"](0.08 + 0.84 * number / (count - 1)))
+    for each in sorted(answer.directions, key=lambda each: each.starts):
         leaving = np.array([])
         if ENTRAINED in each.faces and answer.ground.is_natural:
-            leaving = each.shares(ENTRAINED).at(winds)
-        drawn.append((each.title, each.shares().at(winds), leaving, colour))
-    return maps.shares(drawn, winds, answer.ground.stream.at)
+            leaving = each.shares(ENTRAINED).at(speeds)
+        curve = maps.ShareCurve(each.title, each.shares().at(speeds), leaving)
+        drawn.append(curve)
+    marks = []
+    for share, words in ((onset.STARTS, "first"), (cards.HALF, "half")):
+        wind = answer.easiest.shares().wind_for(share)
+        low, high = cards.factors_of_wind(share)
+        if np.isfinite(wind):
+            marks.append(maps.Mark(wind, low * wind, high * wind, share, words))
+    flat = answer.ground.flat
+    return maps.shares(drawn, speeds, answer.ground.stream.at, marks, flat)

@@ -406,7 +406,7 @@ def _picture(opened: OpenedRaster, row: Row, unit: float) -> bytes:
     shape = (max(1, round(dataset.height / step)), max(1, round(dataset.width / step)))
     stress = _stress(opened, unit, WHERE, out_shape=shape)
     ratios = _ratios(stress, row)
-    with style.settings():
+    with style.settings(style.LETTERS):
         canvas = _drawn(opened, ratios)
         return style.as_png(canvas)
 
@@ -416,8 +416,9 @@ def _drawn(opened: OpenedRaster, ratios: FloatArray) -> Canvas:
     ratio = ratios[0]
     extent, labels = _extent(opened.dataset)
     aspect = abs(extent[3] - extent[2]) / abs(extent[1] - extent[0])
-    height = min(max(0.75 * style.WIDTH * aspect, 1.5), 1.4 * style.WIDTH)
-    canvas = style.canvas(height)
+    width = style.WIDE
+    height = min(max(0.75 * width * aspect, 2.0), 1.4 * width)
+    canvas = style.canvas(height, width)
     ax = canvas.subplots()
     ax.set_facecolor("0.9")
     highest = min(float(np.nanquantile(ratio, 0.99)), LARGEST)
@@ -440,10 +441,10 @@ def _drawn(opened: OpenedRaster, ratios: FloatArray) -> Canvas:
     ax.set(xlabel=labels[0], ylabel=labels[1])
     ax.ticklabel_format(useOffset=False, style="plain")
     ax.tick_params(axis="x", rotation=30)
-    words = "τ/τ_c; lines: 1 by the threshold (full), by its upper (dotted)\n"
-    words += "and lower end (dashed); grey: no stress"
-    canvas.colorbar(image, ax=ax, label="τ/τ_c = θ/θ_c", shrink=0.8, extend="max")
-    ax.set_title(words, loc="left", fontsize=7)
+    words = "lines: τ_b = τ_c (full), its upper (dotted) and lower end (dashed)\n"
+    words += "grey: no stress"
+    canvas.colorbar(image, ax=ax, label="τ_b/τ_c = θ/θ_c", shrink=0.8, extend="max")
+    ax.set_title(words, loc="left")
     return canvas
 
 

@@ -9,9 +9,11 @@ import pytest
 from orchestrator.errors import InputError
 from orchestrator.lab import budget
 from orchestrator.lab.budget import CHOICES
+from orchestrator.report import style
 from orchestrator.study import study
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import changed
+from tests import letters
 
 SMALL = """
 grain = { diameter = 1e-3, sizes = { sigma_g = 1.2 } }
@@ -112,6 +114,25 @@ def test_the_share_of_a_choice_is_the_range_of_its_alternatives() -> None:
         0.2,
         2.0,
     ]
+
+
+def test_the_tornado_has_both_ends_of_each_choice_in_letters_to_read() -> None:
+    moved = _moved(("law", "a", 0.2), ("law", "b", -0.1), ("cell", "half", 0.001))
+    shares = budget.shares_of_choices(moved)
+    largest = shares.groupby("choice", sort=False)[budget.ENDS].max()
+    with style.settings(style.LETTERS):
+        drawings = [budget.tornado(largest, width) for width in letters.SHOWN]
+        letters.check(*drawings)
+    for canvas in drawings:
+        (ax,) = canvas.axes
+        # what is not felt has no number; both are of one choice
+        said = [text.get_text().strip() for text in ax.texts]
+        assert sorted(set(said)) == ["−10 … +20", "−5 … +10"]
+        names = [mark.get_text() for mark in ax.get_yticklabels()]
+        assert names == ["cell", "law", "all together"]
+        low, high = ax.get_xlim()
+        assert low < -10
+        assert high > 20
 
 
 @pytest.mark.long

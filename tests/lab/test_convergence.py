@@ -20,6 +20,7 @@ from orchestrator.report import style
 from orchestrator.study import study
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study, value_of
+from tests import letters
 
 PILE = """
 title = "One"
@@ -210,15 +211,10 @@ def test_a_number_that_a_mesh_lacks_has_no_verdict() -> None:
 
 def test_the_letters_of_the_figure_are_large_on_a_narrow_page() -> None:
     found = _points(**{"ustar0": (1.16, 1.08, 1.04), "highest stress": (2.0, 2.1, 2.2)})
-    with style.settings():
+    with style.settings(style.LETTERS):
         canvas = convergence.chart_of(found, convergence.judge_all(found))
-    assert canvas.get_figwidth() == style.NARROW
-    texts = [text for legend in canvas.legends for text in legend.get_texts()]
-    for ax in canvas.axes:
-        texts += [ax.xaxis.label, ax.yaxis.label, ax.title]
-        texts += [*ax.get_xticklabels(), *ax.get_yticklabels()]
-    written = [text for text in texts if text.get_text()]
-    assert min(float(text.get_fontsize()) for text in written) >= style.LETTERS
+        assert canvas.get_figwidth() == style.NARROW
+        letters.check(canvas)
 
 
 def test_the_figure_has_a_line_for_each_number() -> None:

@@ -11,7 +11,9 @@ from orchestrator.fidelity import limits, measured
 from orchestrator.lab import stability, told
 from orchestrator.lab.map_file import FOLDER, StabilityMap, read_map
 from orchestrator.lab.stability import NOTICED
+from orchestrator.report import style
 from orchestrator.runs import workspace
+from tests import letters
 
 SMALL = """
 title = "Small"
@@ -91,6 +93,23 @@ def test_the_limits_were_read_off_the_maps() -> None:
     assert (pockets[~touching]["verdict"] != "good").mean() > 0.5
 
 
+WITH_ERRORS = {"G\n−1.2 %", "W\n+1.2e+03 %", "X"}
+
+
+def test_all_maps_are_drawn_in_letters_to_read() -> None:
+    table = pd.read_csv(measured.FOLDER / "maps.csv", keep_default_na=False)
+    table["error"] = pd.to_numeric(table["error"])
+    for name in ("x", "y"):
+        # numbers are kept as texts beside words
+        numbers = pd.to_numeric(table[name], errors="coerce")
+        table[name] = numbers.astype(object).where(numbers.notna(), table[name])
+    maps = [read_map(path) for path in sorted(FOLDER.glob("*.toml"))]
+    with style.settings(style.LETTERS):
+        for width in letters.SHOWN:
+            letters.check(stability.draw_maps(maps, table, width))
+            letters.check(stability.draw_maps(maps[:1], table, width))
+
+
 def test_each_cell_shows_its_worst_run() -> None:
     rows = [
         ("m", 2.0, 10.0, "exploded", True, math.nan, ""),
@@ -103,13 +122,13 @@ def test_each_cell_shows_its_worst_run() -> None:
     table = pd.DataFrame(rows, columns=columns)
     axes = {"x": {"label": "x"}, "y": {"label": "y"}}
     maps = [StabilityMap(name, {"title": name, **axes}, ()) for name in ("m", "words")]
-    for shown in (maps, maps[:1]):
+    for shown, said in ((maps, {"G", "W", "X"}), (maps[:1], WITH_ERRORS)):
         ax = stability.draw_maps(shown, table).axes[0]
         cells = [patch for patch in ax.patches if isinstance(patch, Rectangle)]
         drawn = {cell.get_xy(): cell.get_gid() for cell in cells}
         assert drawn == {(0, 0): "good", (0, 1): "wrong", (1, 0): "exploded"}
         texts = {text.get_text() for text in ax.texts}
-        assert texts == {"G\n−1.2 %", "W\n+1.2e+03 %", "X"}
+        assert texts == said
         assert [mark.get_text() for mark in ax.get_xticklabels()] == ["0.5", "2"]
 
 

@@ -19,10 +19,12 @@ from orchestrator.physics.curves import GAMMA, iversen_white
 from orchestrator.physics.grain import Grain
 from orchestrator.physics.measured import MEASURED_BEDS
 from orchestrator.physics.rolling import sustained
+from orchestrator.report import style
 from orchestrator.study import fields, scopes, study
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import changed
 from orchestrator.tables import kinds
+from tests import letters
 
 TOOL = Path(__file__).parents[2] / "tools" / "tested.py"
 DOCS = Path(__file__).parents[2] / "docs"
@@ -364,3 +366,37 @@ def test_a_shallow_flow_is_why_steep_beds_hold_their_grains() -> None:
     )
     assert in_deep.median() < 0.5
     assert in_shallow.median() == pytest.approx(1.0, abs=0.15)
+
+
+def test_the_figures_have_at_most_seven_models_in_letters_to_read() -> None:
+    scored = pd.read_csv(DOCS / "measured" / "validation-scores.csv")
+    names = {model.name for model in validate.MODELS}
+    assert set(validate.LOOKS) <= names
+    galileo = np.geomspace(2.0, 2e4, 7)
+    rows = pd.concat(
+        pd.DataFrame(
+            {
+                "galileo": galileo,
+                "cohesion_n_m": 0.0,
+                "slope": 0.0,
+                "rho_f_kg_m3": density,
+                "set": "flumes",
+                "model": name,
+                "measured": 0.05,
+                "value": 0.04,
+            }
+        )
+        for name in names
+        for density in (1000.0, 1.2)
+    )
+    rows = rows.reset_index(drop=True)
+    with style.settings(style.LETTERS):
+        for width in letters.SHOWN:
+            letters.check(validate.factors(scored, width))
+            letters.check(validate.validation_diagram(rows, width))
+        (ax,) = validate.factors(scored, style.WIDE).axes
+    assert len(ax.texts) == scored["set"].nunique()
+    # a set that no model changes has one mark
+    marks = [line for line in ax.lines if line.get_gid() == "every model"]
+    alike = scored.groupby("set")["ratio"].agg(lambda ratio: np.ptp(ratio.dropna()))
+    assert len(marks) == (alike < validate.ALIKE).sum() > 3

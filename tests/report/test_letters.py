@@ -6,17 +6,11 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure as Canvas
-from matplotlib.text import Text
 
 from orchestrator.report import figures, shields, style, theory
 from orchestrator.report.figures import where
 from orchestrator.report.results import Results
-
-SHOWN = {style.NARROW: (350, 480), style.WIDE: (1000,)}
-"""Widths at which a page of 400 and one of 1280 show drawings, pixels."""
-LEAST = 12
-MOST = 7
-POINTS = 72
+from tests import letters
 
 
 def drawings(results: Results) -> dict[str, Canvas]:
@@ -43,28 +37,16 @@ def test_every_letter_of_a_figure_is_12_pixels_high_as_it_is_shown(
     drawn: dict[str, Canvas],
 ) -> None:
     assert {"shields", "share", "flow"} <= drawn.keys()
-    small = []
-    for name, canvas in drawn.items():
-        width = float(canvas.get_figwidth())
-        (shown,) = (SHOWN[known] for known in SHOWN if np.isclose(known, width))
-        for text in canvas.findobj(Text):
-            if not text.get_text().strip() or not text.get_visible():
-                continue
-            pixels = float(text.get_fontsize()) * min(shown) / (POINTS * width)
-            if pixels < LEAST:
-                small.append((name, text.get_text(), round(pixels, 1)))
-    assert small == []
+    small = {name: letters.small(canvas) for name, canvas in drawn.items()}
+    assert {name: texts for name, texts in small.items() if texts} == {}
 
 
 def test_no_legend_has_more_entries_than_a_reader_tells_apart(
     drawn: dict[str, Canvas],
 ) -> None:
-    entries: dict[str, list[str]] = {}
-    for name, canvas in drawn.items():
-        for legend in canvas.legends:
-            said = [text.get_text() for text in legend.texts]
-            entries[name] = max(entries.get(name, []), said, key=len)
-    assert {name: said for name, said in entries.items() if len(said) > MOST} == {}
+    entries = {name: letters.entries(canvas) for name, canvas in drawn.items()}
+    most = letters.MOST
+    assert {name: said for name, said in entries.items() if len(said) > most} == {}
 
 
 def test_separation_and_reattachment_are_where_the_stress_changes_its_sign() -> None:

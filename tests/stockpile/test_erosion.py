@@ -9,9 +9,11 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.errors import InputError
+from orchestrator.report import style
 from orchestrator.report.card import lines
 from orchestrator.stockpile import erosion
 from orchestrator.study import study
+from tests import letters
 
 # meshes as coarse as these are warned of
 pytestmark = pytest.mark.filterwarnings("ignore:.*cells_per_face")
@@ -34,6 +36,38 @@ def test_the_classes_of_ap42_and_its_potential_by_hand() -> None:
     assert by_epa[2].faces["ratio"].tolist() == pytest.approx(
         [0.39, 1.17, 1.75, 2.14], abs=0.005
     )
+
+
+def test_losses_stand_beside_those_of_ap42_in_letters_to_read() -> None:
+    x = np.linspace(0.0, 20.0, 21)
+    bare = pd.DataFrame({"x_m": x, "z_m": 5.0, "part": "top", "share": 1.0})
+    bare["ratio"] = np.linspace(0.2, 2.2, 21)
+    calm = bare.assign(ratio=bare["ratio"] / 3)
+    over = erosion.PILE / erosion.OVER_FLAT
+    surfaces = [
+        erosion.PileSurface(name, faces, over, threshold=1.12)
+        for name, faces in (("no obstacle", bare), ("fence", calm))
+    ]
+    pile = erosion.Stockpile("heap", surfaces, is_flat=False, has_bare=True)
+    assert surfaces[1].total([20.0]) == 0.0
+    with style.settings(style.LETTERS):
+        loss, stress = erosion.pictures([pile], [20.0])
+        for figure in (loss, stress):
+            assert figure.canvas is not None
+            assert figure.narrow is not None
+            letters.check(figure.canvas, figure.narrow())
+    assert loss.canvas is not None
+    classes, amounts = loss.canvas.axes
+    bars = [patch for patch in classes.patches if patch.get_gid() == "fence, class 0.2"]
+    (row,) = (
+        row
+        for row in erosion.erosion_rows([pile], [20.0]).to_dict("records")
+        if (row["surface"], row["part"]) == ("fence", "all")
+    )
+    assert bars[0].get_width() == pytest.approx(row["0.2 (0.39), %"])  # type: ignore[attr-defined]
+    said = [text.get_text() for text in amounts.texts]
+    assert len(said) == 6
+    assert said[0] == f"{surfaces[0].total([20.0]):#.2g}".rstrip(".")
 
 
 def test_a_flat_bed_loses_what_the_log_law_takes(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from matplotlib.text import Annotation, Text
 from orchestrator.report import style
 from orchestrator.surface import maps
 from orchestrator.surface.maps import Map, MapGrid
+from tests import letters
 
 EAST, NORTH = 512_000.0, 5_640_000.0
 
@@ -56,7 +57,7 @@ def test_each_map_has_its_contours_the_wind_north_and_a_scale() -> None:
     with style.settings():
         canvas = maps.figure(of, drawn, "stress", middle=2.0)
     first, second, bar = canvas.axes
-    assert bar.get_ylabel() == "stress"
+    assert bar.get_xlabel() == "stress"
     scale = [line for line in first.lines if line.get_gid() == "scale"]
     assert np.ptp(np.asarray(scale[0].get_xdata(), float)) == pytest.approx(5.0)
     words = [text.get_text() for text in first.findobj(Text)]
@@ -77,22 +78,54 @@ def test_round_numbers_are_not_above_a_length(length: float, round_one: float) -
     assert maps.nice(length) == round_one
 
 
-@pytest.mark.parametrize(("stretched", "width"), [(1.0, 1.0), (4.0, 1.0), (0.25, 0.45)])
-def test_a_figure_is_no_wider_and_no_higher_than_its_map(
-    stretched: float, width: float
-) -> None:
+@pytest.mark.parametrize("stretched", [1.0, 4.0, 0.25])
+def test_a_figure_is_no_higher_than_its_map(stretched: float) -> None:
     of = grid()
     x = EAST + stretched * (of.x - EAST)
     wide = MapGrid(x, of.y, of.height, of.is_form)
-    with style.settings():
+    with style.settings(style.LETTERS):
         canvas = maps.figure(wide, [Map("", of.height)], "m")
-        canvas.draw_without_rendering()
-    assert canvas.get_figwidth() <= width * style.WIDTH
+        letters.check(canvas)
+    assert canvas.get_figwidth() == style.NARROW
     panel, _ = canvas.axes
     box = panel.get_window_extent()
     # what is left is for labels, the title and the scale of colours
-    room = canvas.bbox.width - box.width, canvas.bbox.height - box.height
-    assert max(room) < 1.9 * canvas.dpi
+    assert canvas.bbox.height - box.height < 2.1 * canvas.dpi
+
+
+def test_several_maps_stand_side_by_side_on_a_wide_page_alone() -> None:
+    of = grid()
+    several = [Map(f"wind from {90 * k}°", of.height, 90.0 * k) for k in range(4)]
+    rows = {}
+    with style.settings(style.LETTERS):
+        for width in letters.SHOWN:
+            canvas = maps.figure(of, several, "m", width=width)
+            letters.check(canvas)
+            places = [ax.get_position().y0 for ax in canvas.axes[:-1]]
+            rows[width] = len({round(place, 2) for place in places})
+    assert rows == {style.NARROW: 4, style.WIDE: 2}
+
+
+def test_the_first_direction_and_the_last_are_named_and_marked() -> None:
+    winds = np.linspace(0.0, 20.0, 41)
+    curves = [
+        maps.ShareCurve(
+            f"from {way}°", np.clip((winds - way / 20) / 10, 0, 1), winds[:0]
+        )
+        for way in (0, 45, 90, 135)
+    ]
+    marks = [maps.Mark(5.0, 4.0, 6.5, 0.5, "half")]
+    with style.settings(style.LETTERS):
+        canvas = maps.shares(curves, winds, "wind at 10 m", marks, 8.0)
+        letters.check(canvas)
+        (lone,) = maps.shares(curves[:1], winds, "wind", marks, 8.0).axes
+    said = letters.entries(canvas)
+    assert said == ["from 0°, the first", "directions between", "from 135°, the last"]
+    (ax,) = canvas.axes
+    assert {"half 5", " flat ground 8"} <= {text.get_text() for text in ax.texts}
+    bar = ax.containers[0].lines[2][0].get_segments()[0]  # type: ignore[attr-defined]
+    assert bar[:, 0].tolist() == [4.0, 6.5]
+    assert not letters.entries(lone.figure)
 
 
 @pytest.mark.parametrize(

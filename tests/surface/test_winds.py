@@ -8,10 +8,12 @@ import pandas as pd
 import pytest
 
 from orchestrator.physics.grain import Grain
+from orchestrator.report import style
 from orchestrator.surface import cards, onset, winds
 from orchestrator.surface.answer import HEAP, MOVES, Direction, Ground, SurfaceAnswer
 from orchestrator.surface.heights import cone
 from orchestrator.surface.rose import read_rose
+from tests import letters
 
 SAND = Grain(
     diameter=2.5e-4,
@@ -113,8 +115,16 @@ def test_a_flow_that_is_left_out_measures_what_lies_between() -> None:
 def test_the_rose_is_drawn_with_all_hours_of_its_year() -> None:
     circle = [direction(45.0 * k, 6.0) for k in range(8)]
     rows = "".join(f"{22.5 * k},{3 + k % 5},0.05\n" for k in range(16))
-    canvas = winds.rose_figure(answer(f"{rows}0,0,0.2\n", *circle))
+    found = answer(f"{rows}0,0,0.2\n", *circle)
+    with style.settings(style.LETTERS):
+        for width in letters.SHOWN:
+            letters.check(winds.rose_figure(found, width))
+    canvas = winds.rose_figure(found, style.WIDE)
     polar, bars = canvas.axes
+    # parts in which some of the bed moves, and half of it, are those of the card
+    heights = np.reshape([patch.get_height() for patch in polar.patches], (3, -1))  # type: ignore[attr-defined]
+    some, half = found.hours_of(onset.STARTS), found.hours_of(cards.HALF)
+    assert heights.sum(1)[1:] == pytest.approx([some - half, half])
     drawn = sum(patch.get_height() for patch in polar.patches)  # type: ignore[attr-defined]
     assert drawn == pytest.approx(0.8 * 8760)
     # calms are the disc in the middle
