@@ -12,7 +12,7 @@ from typing import Any
 import pandas as pd
 
 from orchestrator import pipeline, plan
-from orchestrator.digits import number
+from orchestrator.digits import number, plain_number
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.fidelity.decision import with_criterion, written
 from orchestrator.pipeline import Finished
@@ -375,7 +375,8 @@ def label(scene: Scene) -> str:
     size = f"{1e3 * scene.grain.diameter:g} mm"
     words = [
         *_form(bed),
-        f"{size}, ρ_f {fluid.density:g} kg/m³, ν {fluid.viscosity:g} m²/s",
+        f"{size}, ρ_f = {plain_number(fluid.density)} kg/m³, "
+        f"ν = {plain_number(fluid.viscosity)} m²/s",
         scene.forces.law,
         _packing(bed),
     ]

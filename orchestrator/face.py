@@ -311,14 +311,16 @@ def open(directory: str | Path) -> "Opened":
     Raises
     ------
     OrchestratorError
-        If it holds no study or no tables, or these have changed since.
+        If it holds no study or no tables, or these have changed since, or are of
+        another version of this program.
     """
     _check_path("directory", directory)
     space = Workspace(Path(directory).absolute())
     asked, planned = pipeline.reopen(space)
-    return Opened(
-        Results(asked, planned, tables.read_tables(space, "tables"), space.cases)
-    )
+    found = tables.read_tables(space, "tables")
+    results = Results(asked, planned, found, space.cases)
+    words.check_version(results)
+    return Opened(results)
 
 
 def _check_path(name: str, path: object) -> None:
@@ -424,7 +426,6 @@ class Opened:
     @property
     def card(self) -> Card:
         """The answer card: its question, its numbers with units, and its verdict."""
-        words.check_version(self._results)
         cards = guests.cards(self._results.study, self.tables)
         return words.answer_card(self._results, cards)
 

@@ -17,8 +17,8 @@ MEASURED = ROOT / "docs" / "measured" / "budget.csv"
 PAGE = ROOT / "docs" / "budget.md"
 BEGIN, END = "<!-- by tools/budget.py -->\n", "<!-- end -->\n"
 """Lines of the page between which its table stands."""
-AIR = "ρ_f 1 kg/m³, ν 1e-05 m²/s"
-WATER = "ρ_f 1000 kg/m³, ν 1e-06 m²/s"
+AIR = "ρ_f = 1 kg/m³, ν = 1.0 × 10⁻⁵ m²/s"
+WATER = "ρ_f = 1000 kg/m³, ν = 1.0 × 10⁻⁶ m²/s"
 SCENES = {
     f"15°, 1 mm, {AIR}, bridged, rows along the slope": (
         "15°, 1 mm in air, rows along the slope"

@@ -1,9 +1,10 @@
-"""The heap of docs/surface.md: its raster, its wind rose, its study and its map.
+"""The heaps of docs/surface.md and docs/stockpile.md: their studies, runs and pictures.
 
 python tools/heap.py DIRECTORY
 
-The heap is made up: three cones on level ground, with noise. The map of the page is
-written to docs/figures/surface.png.
+The heap of surface.md is made up: three cones on level ground, with noise; its map is
+written to docs/figures/surface.png. The study of stockpile.md stands in that page; its
+figure is written to docs/figures/erosion.svg.
 """
 
 import shutil
@@ -15,7 +16,9 @@ import numpy as np
 from orchestrator.cli import main
 from orchestrator.surface.raster import geotiff
 
-PICTURE = Path(__file__).parents[1] / "docs" / "figures" / "surface.png"
+DOCS = Path(__file__).parents[1] / "docs"
+PICTURE = DOCS / "figures" / "surface.png"
+RIDGE = DOCS / "figures" / "erosion.svg"
 EAST, NORTH = 512_300.0, 5_640_800.0
 EXTENT, STEP = 60.0, 0.5  # m
 CONES = ((22.0, 34.0, 8.0), (34.0, 26.0, 6.0), (36.0, 37.0, 5.0))
@@ -89,5 +92,17 @@ def run(directory: Path) -> None:
     shutil.copyfile(out / "figures" / "least.png", PICTURE)
 
 
+def run_ridge(directory: Path) -> None:
+    """Run the study that stands in docs/stockpile.md, and keep its figure."""
+    text = (DOCS / "stockpile.md").read_text(encoding="utf-8")
+    study = directory / "ridge.toml"
+    study.write_text(text.split("```toml\n")[1].split("```")[0], encoding="utf-8")
+    out = directory / "ridge"
+    if main(["erosion", str(study), "--out", str(out)]):
+        raise SystemExit("the erosion of the ridge has failed")
+    shutil.copyfile(out / "figures" / "loss.svg", RIDGE)
+
+
 if __name__ == "__main__":
     run(Path(sys.argv[1]))
+    run_ridge(Path(sys.argv[1]))

@@ -82,7 +82,9 @@ def spread(scene: Scene, fraction: float) -> Spread:
     """Look up the spread of the threshold of a pile.
 
     What the frozen bed does is the largest of the scenes of the class; it is not known
-    of a bed that changes already, nor of a flow that is not solved.
+    of a bed that changes already, nor of a flow that is not solved. Of a strip that DEM
+    follows, whose grains go on after a gust or stop, no choice was changed: the spread
+    of piles is none of it.
 
     Parameters
     ----------
@@ -96,6 +98,8 @@ def spread(scene: Scene, fraction: float) -> Spread:
     Spread
         The spread; NaN where it is not known.
     """
+    if scene.is_followed:
+        return Spread()
     of_class = _spread(model_class(scene), fraction)
     if scene.threshold.update or not scene.method.flow.facts.is_solved:
         return of_class._replace(frozen_bed=math.nan)

@@ -202,7 +202,7 @@ class _Packing(Choice):
 CHOICES: tuple[Choice, ...] = (
     _FirstCell(
         name="first cell",
-        why="A wall function asks for no one height of the cells on the bed.",
+        why="A wall function leaves the height of the first cell open.",
         field="method.flow.first_cell_height",
         times=[0.5, 2.0],
         of_solved_flow=True,
@@ -223,7 +223,7 @@ CHOICES: tuple[Choice, ...] = (
     ),
     Choice(
         name="averaging length",
-        why="The stress at a sharp crest has no limit; it is averaged on a length.",
+        why="The stress at a sharp crest diverges with the mesh; it is averaged.",
         field="forces.averaging_length",
         times=[0.5, 2.0],
         of_solved_flow=True,
@@ -235,31 +235,31 @@ CHOICES: tuple[Choice, ...] = (
     ),
     Choice(
         name="roughness length",
-        why="Measured ones of beds of equal grains are between d/30 and d/10.",
+        why="Measured values over beds of equal grains lie between d/30 and d/10.",
         field="bed.roughness",
         values=["d/10", "d/30"],
     ),
     Choice(
         name="entrainment angle",
-        why="The pockets of one bed differ by more than that.",
+        why="The pockets of one bed scatter by more than 5°.",
         field="bed.entrainment_angle_deg",
         beside=[-5.0, 5.0],
         packings="lattices",
     ),
     Choice(
         name="lift coefficient",
-        why="Saffman's is that of an unbounded shear; measured ones scatter by more.",
+        why="Saffman’s value is for an unbounded shear; measured values scatter more.",
         field="forces.lift_coefficient",
         times=[0.5, 1.5],
     ),
     _Packing(
         name="packing",
-        why="Of a bed that was not seen neither rows nor gaps are known.",
+        why="The packing of a bed that was not surveyed is not known.",
         field="bed.packing",
     ),
     Choice(
         name="exposure",
-        why="The flow meets all poured grains at one height, or each at its own.",
+        why="All poured grains protrude alike into the flow, or each by its height.",
         field="forces.exposure",
         values=["alike", "protrusion"],
         packings="poured",
@@ -272,15 +272,15 @@ CHOICES: tuple[Choice, ...] = (
     ),
     Choice(
         name="friction angle",
-        why="A sand's is known to a few degrees. A poured bed is poured anew by it.",
+        why="That of a sand is known to a few degrees; a poured bed is poured anew.",
         field="grain.friction_angle_deg",
         beside=[-5.0, 5.0],
         dynamic=True,
     ),
     Choice(
         name=FROZEN,
-        why="The paper, and every fidelity, keeps the flow over the initial pile until "
-        "the last grain is entrained. Else the bed is updated after each tenth.",
+        why="The article, and every method, keeps the flow over the initial pile until "
+        "the last grain is entrained; here the bed is updated after each tenth.",
         field="threshold.update",
         values=[0.1],
         of_solved_flow=True,
@@ -461,24 +461,24 @@ def largest_shares(shared: pd.DataFrame) -> pd.DataFrame:
 
 
 TOGETHER_TEXT = """\
-The fidelities are measured against the best one. What all of them share does \
-not show there: it is changed here, one choice at a time. Each bar spans the largest \
-change over the fractions, downwards and upwards; the top bar is the root of the sum \
-of squares, as if the choices had nothing to do with one another."""
+Numerical errors are measured against the finest method and do not contain the \
+assumptions that all methods share. These assumptions are changed here one at a time. \
+All together is the root of the sum of their squares, as if they were independent."""
 SCENE_TEXT = """\
-The fidelity `static` (peeling) except for the friction angle, which DEM \
-alone feels. The Shields number is that of the mean stress on the grains that moved; \
-u*₀ is that of the flow far from the bed. tables/shares.csv has the share of each \
-choice at each fraction."""
+The choices are sorted by their effect on the threshold. Each bar spans the largest \
+change over the fractions, down and up, %; the number is of both ends. Grains move by \
+peeling; where only DEM feels a choice, by DEM. The Shields number is that of the \
+mean stress on the grains that moved."""
 CHANGING_TEXT = """\
-All fidelities keep the flow over the whole pile to the end, as the paper does. Here \
-the bed line is drawn anew after each tenth of the counted grains, the flow is solved \
-again, and the grains go on by peeling. The table has the threshold on the bed that \
-changes over that on the frozen one, less 1."""
+All methods keep the flow over the whole pile until the last grain has gone, as the \
+article does. Here the bed line is updated after each tenth of the counted grains and \
+the flow is solved again; the grains move by peeling. The table has the relative \
+change of the threshold."""
 LIMIT_TEXT = """\
-The ranges of the choices are judgements, with the reason beside each; no statistics. \
-Alternatives that are refused at a scene, or do not hold at its Re*, are left out."""
-ALONE = "What each choice moves, changed alone"
+The ranges of the choices are judgements, with the reason beside each, and no \
+statistics. Alternatives that do not apply to a scene, or whose force law does not \
+hold at its Re*, are left out."""
+ALONE = "Change of the threshold by each choice alone, %"
 """Heading of the figure of a scene."""
 
 
@@ -586,7 +586,7 @@ def _row(name: str, theta: _Interval, ustar0: _Interval) -> dict[str, str]:
 def _card(name: str, fraction: float, theta: _Interval, ustar0: _Interval) -> Card:
     """The answer card: the numbers of a bed with all choices together."""
     part = percent(fraction)
-    of_what = "all choices that the models share, together"
+    of_what = "all choices that the methods share, combined"
     numbers = []
     for of, unit, meaning in (
         (ustar0, "m/s", "friction velocity u*, √(τ_b/ρ)"),
@@ -601,20 +601,24 @@ def _card(name: str, fraction: float, theta: _Interval, ustar0: _Interval) -> Ca
                 of.value,
                 unit,
                 meaning,
-                f"most by {of.most}",
+                f"largest effect: {of.most}",
                 low=of.value * (1 - of.low),
                 high=of.value * (1 + of.high),
                 interval_of=of_what,
-                decimals=3,
             )
         )
     return Card(
-        f"How far off may the flow be that moves {part} of the grains, by the model?",
+        f"How well is the flow known that moves {part} of these grains?",
         f"{name}.",
         tuple(numbers),
-        "Nothing is measured here: each choice of the model is changed alone, such as "
-        "how grains are packed, and the changes are added up.",
-        Worth("good", "usable", "Quote the interval beside a threshold of such a bed."),
+        "Nothing is measured here: each choice of the model, such as the packing, is "
+        "changed alone within what measurements and practice leave open.",
+        Worth(
+            "care",
+            "usable, with its interval",
+            "Quote the interval beside the threshold. A choice that is known of a bed, "
+            "such as its packing, need not be in it.",
+        ),
     )
 
 
@@ -625,7 +629,7 @@ def _in_words(
     ustar0: _Interval,
 ) -> str:
     """The same in a sentence."""
-    go = f"{name}: {percent(fraction)} of the exposed grains go at θ = {theta.number}"
+    go = f"{name}: {percent(fraction)} of the exposed grains move at θ = {theta.number}"
     together = f"{theta.ends} with all choices together, most by {theta.most}"
     return f"{go} ({together}), u*₀ = {ustar0.number} m/s ({ustar0.ends})."
 

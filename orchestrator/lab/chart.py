@@ -134,11 +134,11 @@ def _reference(rows: pd.DataFrame) -> str:
     first = rows.iloc[0]
     within, most = (first[column_of_reference(each)] for each in (AIM, WITHIN[-1]))
     text = (
-        f"The reference itself is known within {_percent(AIM)} at {_percent(within)} "
-        f"of these thresholds, and within {_percent(WITHIN[-1])} at {_percent(most)}."
+        f"The reference is known within {_percent(AIM)} for {_percent(within)} of the "
+        f"thresholds, and within {_percent(WITHIN[-1])} for {_percent(most)}."
     )
     if within < 1:
-        text += " At the others a choice that agrees with it is known no better."
+        text += " For the others a choice that agrees with it is known no better."
     return text
 
 

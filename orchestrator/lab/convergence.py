@@ -55,7 +55,7 @@ from orchestrator.types import Row
 FILE = "tables/convergence.csv"
 PANEL, LEGEND = 2.2, 1.9
 """Heights of a panel and of the legends of the chart, inches."""
-CHANGES = "Changes from the mesh and the load steps of the scene"
+CHANGES = "Change from the mesh and the load steps of the scene, %"
 TITLE = "What finer meshes and load steps change"
 REFINED = ((1.0, 2.0, 4.0), (0.5, 1.0, 2.0), (0.25, 0.5, 1.0))
 """How many times finer than those of the scene its three meshes are: the first of these
@@ -608,8 +608,9 @@ def _card(judged: pd.DataFrame) -> Card:
     numbers = []
     for at in (FIRST, *fractions[:1]):
         for row in _largest(judged, at).to_dict("records"):
-            meaning = f"largest change of u*₀ from the scene's own mesh: {at}"
-            note = f"refined: {row['series']}; {row['verdict']}"
+            what = at if at == FIRST else f"threshold of {at}"
+            meaning = f"change of u*₀ from the scene’s mesh to the finest, {what}"
+            note = f"the largest, by {row['series']}; {row['verdict']}"
             value = 100 * row["own_to_fine"]
             numbers.append(Number(value, "%", meaning, note, decimals=1))
     is_threshold = judged["quantity"].isin(["ustar0", "tau_c"])
@@ -619,8 +620,8 @@ def _card(judged: pd.DataFrame) -> Card:
         Number.counted(
             good,
             len(verdicts),
-            "thresholds have settled, or approach a limit",
-            "of the others no order can be given",
+            "thresholds have converged, or approach a limit",
+            "the others have no order of convergence",
         )
     )
     count = judged["scene_id"].nunique()
@@ -629,13 +630,13 @@ def _card(judged: pd.DataFrame) -> Card:
         worth = Worth(
             "care",
             "usable with its change",
-            "Where a threshold has no order, quote the change from the scene's own "
-            "mesh to the finest: it is no bound of the error.",
+            "Where a threshold has no order, quote the change from the mesh of the "
+            "scene to the finest; it is no bound of the error.",
         )
     return Card(
         "How far do finer meshes and load steps move the thresholds?",
-        f"{number(count, 'scene')}, each on three meshes and by three load steps, "
-        "as far as it has them.",
+        f"{number(count, 'scene')}, each on three meshes and with three load steps "
+        "where it has them.",
         tuple(numbers),
         "Nothing is measured here: each run is compared with finer ones.",
         worth,

@@ -36,21 +36,21 @@ from orchestrator.types import Row
 
 TITLE = "Where each method fails"
 MAPS_TEXT = """\
-Each cell is a real run. It is good where tau_c is within 5 % of its reference at \
-every fraction; wrong where it is not and nothing said so; noisy, exploded or stalled \
-where the run itself said so."""
+Each cell is a run. It is good where the critical stress is within 5 % of its \
+reference at every fraction. It is noisy, exploded or stalled where the run reports \
+so, and wrong where the error is larger and the run reports nothing."""
 CAPTION = """\
 The worst verdict at each place, and where a number is below it the relative error of \
 the critical Shields number."""
 WHOLE_CAPTION = """\
 The worst verdict at each place of every map. The errors stand on the map of each \
 below."""
-TOLD_TITLE = "What a study says of the wrong ones"
+TOLD_TITLE = "What a study reports of the wrong runs"
 TOLD_TEXT = """\
-A run that is wrong looks like one that is good; what tells them apart is the study. \
-It refuses, or warns of, a field that the map varies; it finds no numerical error for \
-such a scene, so that the threshold is not usable; or its interval has the reference. \
-Where a map compares two different beds, no run is at fault."""
+A wrong run looks like a good one; the study tells them apart. It refuses or warns of \
+a field that the map varies, or it knows no numerical error for such a scene, so that \
+the threshold is not usable, or its interval contains the reference. Where a map \
+compares two different beds, no run is at fault."""
 WRONG = 0.05
 """Relative error of tau_c from which an answer counts as wrong."""
 NOTICED = ("exploded", "noisy", "stalled")
@@ -152,18 +152,26 @@ def _card(table: pd.DataFrame) -> Card:
     kinds = "noisy, exploded or stalled"
     numbers = (
         Number.counted(good, of, "runs are good", within, "good"),
-        Number.counted(noticed, of, "runs say that they failed", kinds, "care"),
+        Number.counted(noticed, of, "runs report their failure", kinds, "care"),
         Number.counted(
-            silent, of, "runs are wrong and say nothing", "further off", "bad"
+            silent,
+            of,
+            "runs are wrong and report nothing",
+            f"off by more than {percent(WRONG)}",
+            "bad",
         ),
     )
     return Card(
-        "Where do the methods fail, and do they say so?",
-        f"{table['map'].nunique()} maps of two numbers each, taken far beyond what is "
-        "used.",
+        "Where do the methods fail, and do they report it?",
+        f"{table['map'].nunique()} maps of two parameters each, far beyond the ranges "
+        "in use.",
         numbers,
         "Nothing is measured here: each run is compared with a finer one.",
-        Worth("good", "usable", "Stay where the maps are good."),
+        Worth(
+            "care",
+            "usable where the maps are good",
+            "A study refuses, warns of or does not call usable what is not.",
+        ),
     )
 
 

@@ -752,41 +752,42 @@ def _reversed_flow(name: str, scene: Scene, runs: Runs) -> dict[str, float]:
 
 
 SETS_TEXT = """\
-Each row is a set of measurements with the number of its rows; the ratio is that of \
-the model's value to the measured one, its bar spans 10 to 90 % of the rows. Nothing \
-is fitted to these sets. The first table has the median, over the sets of beds on \
-which motion starts, of the factor in the median; the second the factor of each set. \
-The stress over the hump is compared over its windward side, each over its own mean: \
-the boundary layer of the experiment is thinner."""
+Each row is a set of measurements, with the number of its rows. Nothing is fitted to \
+these sets. The first table has for each model the median over the sets of beds on \
+which motion starts; the second has each set. The stress over the hump is compared \
+over its windward side, each over its own mean, since the boundary layer of the \
+experiment is thinner."""
 FACTORS_TEXT = """\
-Ratio of the model's value to the measured one: median, and 10 to 90 % of the rows of \
-each set. The grey band is a factor of 1.5."""
+A mark at 1 meets the measurement. Median ratio of the model to each set, and 10 to \
+90 % of its rows. Grey: a factor of 1.5. Star: a set that no model changes. The \
+tables have the other models."""
 ROWS_TEXT = """\
-The factor by which a model differs from each measured threshold, in the median of \
-the rows and at 90 % of them, and the share of the rows within 1.5 and 2. `formulas` \
-(Soulsby and Whitehouse 1997 in liquids, Shao and Lu 2000 in gases) and `constants` \
-(0.05 in liquids, 0.0123 in gases) are what one would take without a model."""
+The factor by which a model differs from the measured thresholds: its median over the \
+rows and its 90th percentile, and the fraction of the rows within 1.5 and 2. \
+“Formulas” (Soulsby and Whitehouse 1997 in liquids, Shao and Lu 2000 in gases) and \
+“constants” (0.05 in liquids, 0.0123 in gases) need no model."""
 THRESHOLDS_TEXT = """\
-Level beds are answered on three poured strips of sand, where a tenth of the exposed \
-grains has moved, each by its own pivot. `bridged` is the drag and lift of a grain \
-that stands alone, as high as all others; `protrusion` takes its own height over the \
-bed; `balanced` lets the drags on a patch add up to the stress of the flow; gusts are \
-the largest of 100 independent, log-normal stresses of intensity 0.4. `sustained` is \
-the least mean stress at which a grain that has left its pocket rolls and hops on \
-after such a gust, by a table; `entrained and sustained` asks as well that the gust \
-turns it over its neighbour."""
+Level beds are answered on three poured strips of sand; the threshold is that at \
+which a tenth of the exposed grains has moved, each out of its own pocket. “Bridged” \
+takes the drag and lift of a lone grain, all grains at one height; “protrusion” takes \
+each grain at its own height; “balanced” lets the drags on a patch add up to the \
+stress of the flow. Gusts are the largest of 100 independent log-normal stresses of \
+intensity 0.4. “Sustained” is the lowest mean stress at which an entrained grain \
+continues to roll and hop after such a gust; “entrained and sustained” requires \
+dislodgement by the gust, too."""
 SHIELDS_TEXT = """\
-Measured thresholds and those of the models, in water (solid) and in air (dotted). The \
-Galileo number has no threshold in it: both axes are independent."""
+Measured thresholds of level beds beside those of the models. The Galileo number \
+contains no threshold, so that both axes are independent. “Bridged” and “entrained, \
+steady” are without gusts."""
 HIDING_TEXT = """\
 Exponent p of θᵢ ~ (Dᵢ/d50)ᵖ over the size classes of forty poured strips of sand, \
-with its standard deviation. A class is read where the part 0.03 (Dᵢ/d50)⁻ᵐ of its \
-grains has moved, no class above 0.06: there the first balance of the drags holds. \
-The exponent m is 1 for steps of one length and 2 for steps as the diameter; which of \
-the two grains take is not known, so that both are a bracket. Measured exponents are \
-−0.67 to −0.98."""
+with its standard deviation. The threshold of a class is read where the fraction 0.03 \
+(Dᵢ/d50)⁻ᵐ of its grains has moved, and for no class above 0.06, where the first \
+balance of the drags holds. The exponent m is 1 for steps of one length and 2 for \
+steps in proportion to the diameter; which of the two applies is not known, so that \
+both are a bracket. Measured exponents are −0.67 to −0.98."""
 MEMORY_TEXT = """\
-Figures that are quoted from memory count in no score. They stand here beside the \
+Numbers that are quoted from memory count in no score. They are listed here beside the \
 last model."""
 
 
@@ -847,47 +848,52 @@ def median_factors(scored: pd.DataFrame) -> "pd.Series[float]":
 
 
 def _card(median: "pd.Series[float]") -> Card:
-    """The answer card: the nearest model, the usual one, and how many are near."""
-    least = float(median.min())
+    """The answer card: the default model, the paper's, and how many are near."""
     near = int((median <= ENOUGH).sum())
-    usual = float(median.iloc[0])
+    least = float(median.min())
+    beds = "median over the sets of level and steep beds, of the median of each"
     numbers = (
-        Number(
-            least,
-            "times",
-            "off the measurements: the nearest model",
-            f"in the median of their sets; it is “{median.idxmin()}”",
-            decimals=2,
-        ),
-        Number(
-            usual,
-            "times",
-            f"off the measurements: the model “{median.index[0]}”",
-            "the first of the list below; in the median of the sets",
-            decimals=2,
-        ),
-        Number(
-            near,
-            f"of {len(median)}",
-            f"models within a factor of {ENOUGH:g}",
-            "that is asked of a default",
-            decimals=0,
+        _misfit(float(median[DEFAULT]), f"default model, “{DEFAULT}”", beds),
+        _misfit(float(median[PAPER]), "the article’s laws", beds),
+        _misfit(
+            float(median["formulas"]),
+            "published formulas, no model",
+            f"{near} of {len(median)} models are within a factor of {ENOUGH:g}; the "
+            f"smallest misfit is a factor of {least:.2f}, of “{median.idxmin()}”",
         ),
     )
-    worth = Worth("good", "usable", "The nearest model is within what is asked.")
-    if least > ENOUGH:
+    worth = Worth(
+        "good",
+        "usable",
+        f"The default is within a factor of {ENOUGH:g} of the measurements in the "
+        "median; the sets differ by more.",
+    )
+    if median[DEFAULT] > ENOUGH:
         worth = Worth(
             "care",
             "usable, with a correction",
-            "No model is within what is asked; the default is kept.",
+            f"The default is not within a factor of {ENOUGH:g} of the measurements.",
         )
     return Card(
-        "Which model is nearest to measured thresholds, and how far off is it?",
+        "How far is the default model from measured thresholds?",
         f"{len(median)} models beside flumes, wind tunnels and field sites; nothing is "
         "fitted to them.",
         numbers,
-        "Each set and its source stands below; a factor of 1 is the measurement.",
+        "All sets were measured by others; each stands below with its source. A factor "
+        "of 1 meets the measurement.",
         worth,
+    )
+
+
+def _misfit(value: float, meaning: str, note: str) -> Number:
+    """A median misfit as a number of the card."""
+    return Number(
+        value,
+        "median misfit",
+        meaning,
+        note,
+        is_ratio=True,
+        decimals=2,
     )
 
 
@@ -895,12 +901,12 @@ def _nearest_in_words(median: "pd.Series[float]") -> str:
     """Which model is nearest to the measurements."""
     least = float(median.min())
     said = (
-        f"Of {len(median)} models “{median.idxmin()}” is nearest to the measurements, "
-        f"off by a factor of {least:.2f} in the median of their sets; "
-        f"asked is {ENOUGH:g}. "
+        f"Of {len(median)} models “{median.idxmin()}” has the smallest median misfit "
+        f"to the measured thresholds, a factor of {least:.2f}. A default should be "
+        f"within a factor of {ENOUGH:g}. "
     )
     if least > ENOUGH:
-        said += "The default model is kept: none is within."
+        said += "No model is; the default is kept."
     return said
 
 

@@ -21,6 +21,8 @@ from orchestrator.report.results import Results
 from orchestrator.report.sheets import Sheet
 from orchestrator.tables import missing
 
+MOST_LACKING = 3
+"""Columns that a message on tables of another version names."""
 MOST_LETTERS = 30
 """Letters of a column in a terminal; longer cells stand on several lines."""
 FEWER_LETTERS = (20, 14, 11)
@@ -75,7 +77,9 @@ def check_version(results: Results) -> None:
     """
     lacking = missing(results.tables)
     if lacking:
-        listed = ", ".join(lacking)
+        listed = ", ".join(lacking[:MOST_LACKING])
+        if len(lacking) > MOST_LACKING:
+            listed += f" and {len(lacking) - MOST_LACKING} more columns"
         what = f"its tables lack {listed}: another version of this program wrote them"
         where = str(results.cases.parent)
         remedy = "`orchestrator study` of the same file runs it again"

@@ -28,19 +28,19 @@ EXCEEDED = {
 LITTLE = 0.005
 """Share of the surface that is not worth a word."""
 NOT_MEASURED = (
-    "Wall stress over a bed in three dimensions has not been measured; the wind at the "
-    "masts of Askervein hill is met within {:.2f} to {:.2f} of the reference speed, in "
-    "root mean square."
+    "Solved flow. No measured wall stress over such a bed is known to us; the wind at "
+    "the masts of Askervein hill is met within {:.2f} to {:.2f} of the reference speed "
+    "(root mean square)."
 )
 RMS = "rms of the differences"
 """Its quantity in the table, of each line of masts."""
 INTERVAL_OF_FLOW = "that of the flow"
-INTERVAL_OF = "other first cells, meshes and models, on a cone"
+INTERVAL_OF = "other first cells, meshes and turbulence models, on a cone"
 WORTH = Worth(
     "care",
     "usable, to compare directions and parts",
-    "Quote the interval. It is that of the flow alone; the threshold of the grain has "
-    "an interval of its own.",
+    "Quote the interval. It is that of the flow; the uncertainty of the threshold of "
+    "the grain is not in it.",
 )
 
 
@@ -68,7 +68,7 @@ def surface_card(found: Sequence[SurfaceAnswer], source: str) -> Card:
     if len(directions) > 4:
         winds = f"{stream.word} from {len(directions)} directions"
     return Card(
-        f"In which {stream.word} does this surface start to move, and how much of it "
+        f"At what {stream.word} does this surface start to move, and how much of it "
         "moves?",
         f"{first.name}; {heaps(first)}; {_grain(first, source)}; {winds}{others}.",
         tuple(_numbers(first)),
@@ -131,7 +131,7 @@ def _numbers(answer: SurfaceAnswer) -> Iterator[Number]:
     first = answer.easiest
     flat = answer.ground.flat
     stream = answer.ground.stream
-    notes = [f"first at {_place(answer)}", f"on flat ground in {flat:.3g} m/s"]
+    notes = [f"at {_place(answer)}", f"flat ground: {flat:.3g} m/s"]
     high = factors_of_wind(onset.STARTS)[1] * first.starts
     alike = [each for each in answer.directions if each.starts <= high]
     tied = tie(
@@ -140,11 +140,11 @@ def _numbers(answer: SurfaceAnswer) -> Iterator[Number]:
     yield _wind(
         first,
         onset.STARTS,
-        f"{stream.at} from {first.from_deg:g}° in which motion starts",
+        f"threshold {stream.at} from {first.from_deg:g}°, first motion",
         "; ".join(filter(None, [*notes, tied])),
     )
     if isfinite(first.shares().wind_for(HALF)):
-        what = f"{stream.at} from {first.from_deg:g}° in which half of it moves"
+        what = f"threshold {stream.at} from {first.from_deg:g}°, half of the surface"
         yield _wind(first, HALF, what)
     if answer.rose is not None:
         some, half = hours(answer, onset.STARTS), hours(answer, HALF)
@@ -152,8 +152,8 @@ def _numbers(answer: SurfaceAnswer) -> Iterator[Number]:
         yield Number(
             tenth.value,
             "hours a year",
-            "in which a tenth of it moves or more, by the winds of the place",
-            f"some of it {some.text}, half of it {half.text} hours",
+            "with at least a tenth of the surface in motion, by the wind rose",
+            f"some of it: {some.text} hours; half of it: {half.text} hours",
             low=tenth.low,
             high=tenth.high,
             interval_of=tenth.of,
@@ -165,7 +165,8 @@ def _numbers(answer: SurfaceAnswer) -> Iterator[Number]:
     yield Number(
         100 * float(share),
         "%",
-        f"of it moves in {flat:.3g} m/s, the {stream.word} that moves flat ground",
+        "of the surface is above threshold",
+        f"at {flat:.3g} m/s, the threshold of flat ground",
         low=100 * float(least),
         high=100 * float(most),
         interval_of=INTERVAL_OF,
@@ -281,11 +282,11 @@ def tie(alike: Sequence[float], first: float, count: int) -> str:
     if not others:
         return ""
     if len(others) == count - 1 and count > 2:
-        return "no direction is told from another within the interval"
+        return "the directions differ by less than the interval"
     if len(others) > MOST_TIED:
-        return f"{len(others)} others are not told from it within the interval"
-    verb = "is" if len(others) == 1 else "are"
-    return f"{' and '.join(others)} {verb} not told from it within the interval"
+        return f"{len(others)} other directions lie within the interval"
+    verb = "lies" if len(others) == 1 else "lie"
+    return f"{' and '.join(others)} {verb} within the interval"
 
 
 @cache
@@ -321,7 +322,8 @@ def _place(answer: SurfaceAnswer) -> str:
     """Where motion starts, in the axes of the file."""
     row = answer.easiest.first
     x, y = (in_axes(float(row[name]), answer.cell_m) for name in ("x_m", "y_m"))
-    return f"x = {x} m, y = {y} m, {row['z_m']:.3g} m high"
+    where = f"x = {x} m, y = {y} m".replace("-", "−")
+    return f"{where}, {row['z_m']:.3g} m high"
 
 
 def in_axes(place: float, cell_m: float) -> str:

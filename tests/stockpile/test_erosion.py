@@ -168,7 +168,7 @@ method.flow = {{ roughness = 0.005, {flow} }}
 
 def _sentences(answer: str) -> list[str]:
     """The sentences of an answer, one for each pile."""
-    text = " ".join(answer.split()).partition(" The intervals take")[0]
+    text = " ".join(answer.split()).partition(" The intervals apply")[0]
     return [f"Wind of {part.strip()}" for part in text.split("Wind of ")[1:]]
 
 

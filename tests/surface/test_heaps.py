@@ -161,21 +161,21 @@ def test_directions_that_the_interval_does_not_tell_apart_are_a_tie(
     card = only(sections[0], Card)
     assert "2 heaps of " in card.scene
     first = card.numbers[0]
-    assert first.meaning.startswith("wind at 10 m from 90° in which motion starts")
-    assert "0° is not told from it within the interval" in first.note
+    assert first.meaning.startswith("threshold wind at 10 m from 90°, first motion")
+    assert "0° lies within the interval" in first.note
     assert "180°" not in first.note
-    assert "From 180° motion starts at" in only(sections[0], Paragraphs).text
-    assert "within the interval" not in only(sections[0], Paragraphs).text
+    assert "From 180° motion starts at" in only(sections[2], Paragraphs).text
+    assert "within the interval" not in only(sections[2], Paragraphs).text
 
 
 def test_a_tie_of_all_directions_has_no_worst() -> None:
     every = [0.0, 90.0, 180.0, 270.0]
     assert cards.tie(every, 90.0, 4) == (
-        "no direction is told from another within the interval"
+        "the directions differ by less than the interval"
     )
     assert cards.tie([90.0], 90.0, 4) == ""
     assert cards.tie([0.0, 90.0, 180.0], 90.0, 4) == (
-        "0° and 180° are not told from it within the interval"
+        "0° and 180° lie within the interval"
     )
     many = [float(angle) for angle in range(0, 330, 30)]
     assert cards.tie(many, 0.0, 12).startswith("10 others are not told")
@@ -186,7 +186,7 @@ def test_the_page_has_places_to_a_part_of_a_cell(tmp_path: Path) -> None:
     experiment = pipeline.SurfaceMotion(study)
     results = answered(study, experiment, tmp_path / "cases")
     made, sections = results.tables, results.page
-    shown = only(sections[0], Table).frame
+    shown = only(sections[2], Table).frame
     for place, exact in zip(
         shown["first at x, m"], made["directions"]["x_m"], strict=True
     ):
@@ -211,7 +211,7 @@ def eroded(
     results = answered(study, experiment, folder / "cases", strength)
     made, sections = results.tables, results.page
     card = only(sections[0], Card)
-    return made["erosion"], card, only(sections[0], Paragraphs).text
+    return made["erosion"], card, only(sections[2], Paragraphs).text
 
 
 def test_each_heap_is_a_pile_of_ap42(tmp_path: Path) -> None:
@@ -247,7 +247,7 @@ def test_a_low_heap_alone_is_flat_ground_to_ap42(tmp_path: Path) -> None:
     experiment = erosion.HeapErosion(study)
     results = answered(study, experiment, tmp_path / "cases")
     made, sections = results.tables, results.page
-    told = only(sections[0], Paragraphs).text.split("\n\n")
+    told = only(sections[2], Paragraphs).text.split("\n\n")
     assert "flat ground" not in told[0]
     assert "by AP-42, to which it is flat ground, " in told[1]
     rows = made["erosion"]
@@ -278,7 +278,7 @@ def test_the_worst_direction_leads_and_a_tie_is_said(tmp_path: Path) -> None:
     *_, card, said = eroded(tmp_path, TWO, strengths.__getitem__, [0.0, 90.0, 180.0])
     first, _, last = card.numbers
     assert first.meaning.endswith("with a wind from 180°, the worst of 3")
-    assert "90° is not told from it within the interval" in first.note
+    assert "90° lies within the interval" in first.note
     assert first.low < first.value < first.high
     assert last.meaning == "with a wind from 0°, the least of all"
     assert last.value < first.low

@@ -118,14 +118,14 @@ def test_the_first_direction_and_the_last_are_named_and_marked() -> None:
     with style.settings(style.LETTERS):
         canvas = maps.shares(curves, winds, "wind at 10 m", marks, 8.0)
         letters.check(canvas)
-        (lone,) = maps.shares(curves[:1], winds, "wind", marks, 8.0).axes
+        lone = maps.shares(curves[:1], winds, "wind", marks, 8.0)
     said = letters.entries(canvas)
     assert said == ["from 0°, the first", "directions between", "from 135°, the last"]
     (ax,) = canvas.axes
     assert {"half 5", " flat ground 8"} <= {text.get_text() for text in ax.texts}
     bar = ax.containers[0].lines[2][0].get_segments()[0]  # type: ignore[attr-defined]
     assert bar[:, 0].tolist() == [4.0, 6.5]
-    assert not letters.entries(lone.figure)
+    assert not letters.entries(lone)
 
 
 @pytest.mark.parametrize(

@@ -105,7 +105,7 @@ def test_motion_starts_where_the_answer_says(
     assert f"in a wind of {row['starts, m/s']:.3g} m/s at 10 m from 270°" in said
     # before the sentences stands the card
     card = said.partition("Where the numbers come from: ")[0]
-    assert card.startswith("In which wind does this surface start to move")
+    assert card.startswith("At what wind does this surface start to move")
     assert "hours a year" in card
     words = " ".join(said.split())
     assert "Wall stress over a bed in three dimensions has not been measured" in words
@@ -208,11 +208,11 @@ def test_in_water_the_answer_is_a_current(
     shutil.copytree(folder / "cases", out / "cases")
     assert main(["study", str(file), "--out", str(out)]) == 0
     said = capsys.readouterr().out
-    assert said.startswith("In which current does this surface start to move")
+    assert said.startswith("At what current does this surface start to move")
     assert "current at 1 m from 270°" in said
-    assert {line for line in said.splitlines() if "wind" in line} == {
-        line for line in said.splitlines() if "masts of Askervein" in line
-    }
+    # the masts alone stood in a wind
+    words = " ".join(said.split())
+    assert words.count("wind") == words.count("wind at the masts of Askervein") > 0
     (flow,) = (out / "cases").iterdir()
     assert flow.name in {path.name for path in (folder / "cases").iterdir()}
     every = pd.read_csv(out / "tables" / "faces-1-270.csv")
