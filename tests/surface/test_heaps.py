@@ -211,7 +211,7 @@ def eroded(
     results = answered(study, experiment, folder / "cases", strength)
     made, sections = results.tables, results.page
     card = only(sections[0], Card)
-    return made["erosion"], card, only(sections[2], Paragraphs).text
+    return made["erosion"], card, only(sections[0], Paragraphs).text
 
 
 def test_each_heap_is_a_pile_of_ap42(tmp_path: Path) -> None:
@@ -247,7 +247,7 @@ def test_a_low_heap_alone_is_flat_ground_to_ap42(tmp_path: Path) -> None:
     experiment = erosion.HeapErosion(study)
     results = answered(study, experiment, tmp_path / "cases")
     made, sections = results.tables, results.page
-    told = only(sections[2], Paragraphs).text.split("\n\n")
+    told = only(sections[0], Paragraphs).text.split("\n\n")
     assert "flat ground" not in told[0]
     assert "by AP-42, to which it is flat ground, " in told[1]
     rows = made["erosion"]
