@@ -97,7 +97,8 @@ def test_the_preset_is_run(tmp_path: Path) -> None:
     assert max(fenced / flat_top, behind / ridge) < 0.7
     assert min(by_epa) < flat_top < max(by_epa)
     told = _sentences(ended.answer)[0]
-    assert f"{flat_top:.3g} g/m²" in told in ended.page.read_text()
+    page = ended.page.read_text("utf-8").replace("\u00a0", " ")
+    assert f"{flat_top:.3g} g/m²" in told in page
     # no line is longer than a terminal
     lines = ended.answer.splitlines()
     assert max(map(len, lines)) < 80
