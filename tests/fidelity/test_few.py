@@ -1,7 +1,7 @@
 """Few piles by DEM that correct many others: which they are, what they hold, what they cost."""
 
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -83,6 +83,8 @@ def test_of_many_piles_that_need_dem_it_runs_on_some() -> None:
     assert {one.scene.method.kind for one in spared.values()} == {"pivot"}
     # the flow stays what it would be by DEM
     for one in spared.values():
+        slope = one.asked.bed.slope_deg
+        assert one.stratum == (slope, one.asked.forces.law)
         assert one.scene.method.flow == one.instead.scene.method.flow
         assert one.by_dem.scene == one.instead.scene
     # each slope gives factors, of its least pile and its largest
@@ -223,15 +225,83 @@ def test_factors_are_of_the_design_and_errors_of_those_kept_apart(
 ) -> None:
     design = [pair("a", 1.0, 2.0), pair("a", 1.0, 2.2), pair("a", 1.0, 9.0)]
     design += [pair("b", 2.0, 3.0)]
-    kept = [pair("a", 2.0, 4.0), pair("b", 1.0, 1.5)]
+    # one is below, the other above
+    kept = [pair("a", 2.0, 4.0), pair("a", 2.0, 5.0), pair("b", 1.0, 1.5)]
     made = made_of(design, kept, monkeypatch)
     # the median: a chain that goes at once does not move it
     assert made.factors("a", Path()) == pytest.approx([2.2])
     assert made.factors("b", Path()) == pytest.approx([1.5])
     assert (made.made_from("a"), made.made_from("b")) == (3, 1)
-    assert made.error(0.5, Path()) == pytest.approx(0.1)
+    assert made.error(0.5, Path()) == pytest.approx(0.12)
     assert made.error(0.1, Path()) == np.inf
-    assert made.confidence == pytest.approx(2 / 3)
+    assert made.confidence == pytest.approx(3 / 4)
+
+
+def test_between_two_fractions_the_larger_error_holds(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made = made_of([pair("a", 1, 2)], [], monkeypatch)
+    of_two = replace(made, fractions=(0.1, 0.5))
+    monkeypatch.setattr(Correction, "errors", lambda *_: np.array([0.3, 0.2]))
+    found = [of_two.error(fraction, Path()) for fraction in (0.1, 0.3, 0.5)]
+    assert found == [0.3, 0.3, 0.2]
+
+
+def test_factors_are_of_dem_over_what_is_corrected_and_name_their_runs() -> None:
+    made = plan.make(asked())
+    piles = [one for one in made.piles.values() if isinstance(one, CorrectedPile)]
+    assert len(piles) == 7
+    for pile in piles:
+        pairs = (*pile.correction.design, *pile.correction.kept)
+        assert len(pairs) == 6 + 19
+        for each in pairs:
+            assert each.by_dem.scene.method.is_resolved_in_time
+            assert each.plain.scene.method.kind == "pivot"
+            assert each.plain.scene.bed == each.by_dem.scene.bed
+        # an answer is not there before the runs are that its factor is read from
+        of_factors = {run.name for each in pairs for run in each.by_dem.runs}
+        named = {run.name for run in pile.runs}
+        assert of_factors | {run.name for run in pile.own_runs} == named
+        assert sum(name.startswith("pile-") for name in named) == 6 + 19
+
+
+def test_what_is_corrected_has_the_least_error_at_its_worst_fraction(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    (scene, *_) = asked().scenes
+    rungs = {pair.grains.name: pair for pair in few.PAIRS if pair.grains.takes(scene)}
+    plain = [name for name, pair in rungs.items() if not pair.is_resolved_in_time]
+    first, second, *_ = plain
+    errors = {first: {0.1: 0.01, 0.5: 0.5}, second: {0.1: 0.2, 0.5: 0.2}}
+
+    def at(name: str, fraction: float) -> SimpleNamespace:
+        return SimpleNamespace(total=errors[name][fraction])
+
+    known = {
+        (few.GRAINS, name, few.scene_class(few.GRAINS, scene)): SimpleNamespace(
+            at=partial(at, name)
+        )
+        for name in errors
+    }
+    monkeypatch.setattr(few.measured, "errors", lambda: known)
+    chosen = few._plain(scene, (0.1, 0.5))
+    assert chosen is not None
+    assert chosen.name == second
+
+
+def test_factors_are_not_judged_before_all_of_their_runs_are_done(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = plan.make(asked())
+    (first, *_) = [one for one in made.piles.values() if isinstance(one, CorrectedPile)]
+    last = first.runs[-1].name
+    monkeypatch.setattr(
+        few,
+        "done_state",
+        lambda run, _: None if run.name == last else {"ended": "done"},
+    )
+    monkeypatch.setattr(Correction, "error", lambda *_: 0.5)
+    assert plan.refined(made, tmp_path) is made
 
 
 def test_what_a_pile_did_not_reach_is_not_known(

@@ -21,6 +21,7 @@ from orchestrator.grains import followed
 from orchestrator.grains.followed import FollowedCase
 from orchestrator.grains.pile import Pile
 from orchestrator.physics import velocity
+from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import CLIFT_GAUVIN
 from orchestrator.runs import engine
 from orchestrator.runs.case import templates
@@ -253,6 +254,8 @@ def test_a_study_asks_for_grains_that_are_followed_by_its_criterion() -> None:
     alike = _scene(**{"forces.law": "profile", "threshold.fractions": [0.1, 0.3]})
     assert FollowedCase(alike).name == case.name
     assert FollowedCase(_scene(**{"bed.dropped_grains": 3})).name != case.name
+    shorter = {"intensity": 0.4, "events": 100, "duration": 9}
+    assert FollowedCase(_scene(**{"flow.gusts": shorter})).name != case.name
     with pytest.raises(InputError, match="exposure"):
         _scene(**{"forces.exposure": "protrusion"})
     with pytest.raises(InputError, match="dropped_grains"):
@@ -265,17 +268,54 @@ def test_a_study_asks_for_grains_that_are_followed_by_its_criterion() -> None:
         )
 
 
-def test_the_deck_has_the_dropped_grains_over_the_bed(tmp_path: Path) -> None:
-    scene = _scene(**{"bed.dropped_grains": 3})
-    case = FollowedCase(scene)
-    bed = tmp_path / case.needs[0].name
+def _with_deck(case: FollowedCase, folder: Path) -> tuple[Path, FloatArray]:
+    """The directory of a case on level grains, and these."""
+    bed = folder / case.needs[0].name
     bed.mkdir()
     flat = np.indices((6, 4)).reshape(2, -1).T + 0.5
     rows = np.column_stack([flat, np.zeros(24), np.ones(24), np.zeros(24)])
     heads = "x_over_d,y_over_d,z_over_d,size,fixed"
     np.savetxt(bed / poured.BED, rows, delimiter=",", header=heads, comments="")
-    directory = shutil.copytree(TEMPLATE, tmp_path / "case")
-    case.write(directory, tmp_path)
+    directory = shutil.copytree(TEMPLATE, folder / "case")
+    case.write(directory, folder)
+    return directory, rows
+
+
+def test_the_deck_has_the_numbers_of_its_scene(tmp_path: Path) -> None:
+    scene = _scene(**{"bed.roughness": 5e-5, "grain.friction_angle_deg": 31.0})
+    case = FollowedCase(scene)
+    directory, _ = _with_deck(case, tmp_path)
+    text = (directory / "parameters.liggghts").read_text()
+    found = {
+        name: float(value)
+        for name, value in re.findall(r"(?m)^variable +(\w+) +equal (\S+)", text)
+    }
+    expected = {
+        "diameter": 1e-3,
+        "grain_density": 2650.0,
+        "fluid_density": 1000.0,
+        # kinematic
+        "viscosity": 1e-6,
+        # Nikuradse's sand is thirty times the roughness length
+        "sand_grain": 30 * 5e-5,
+        "added_mass": 0.5,
+        "acceleration": 9.81,
+        "friction": math.tan(math.radians(31.0)),
+        # of the friction velocity, whose square is the stress
+        "gust": peak_over_mean(0.4, 100) ** 0.5,
+        "gust_time": 10.0,
+    }
+    assert {name: found[name] for name in expected} == pytest.approx(expected, rel=1e-6)
+    (alone,) = sustaining(scene, 0.0, 1.0).tolist()
+    shields = case.flows**2 / (9.81 * 1.65 * 1e-3)
+    assert shields[0] == pytest.approx(0.3 * alone, rel=1e-6)
+    assert shields[-2] < 4 * alone <= shields[-1] * (1 + 1e-6)
+
+
+def test_the_deck_has_the_dropped_grains_over_the_bed(tmp_path: Path) -> None:
+    scene = _scene(**{"bed.dropped_grains": 3})
+    case = FollowedCase(scene)
+    directory, rows = _with_deck(case, tmp_path)
     lines = (directory / "grains.data").read_text().split("Atoms\n\n")[1].split("\n")
     table = np.array([line.split() for line in lines if line], float)
     is_dropped = table[:, 1] == deck.PUSHED
