@@ -3,17 +3,20 @@
 The commands run the jobs on this machine; `test_cluster.py` has a real Slurm.
 """
 
+import importlib
 import importlib.util
 import os
 import re
 import tomllib
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
 from orchestrator.errors import OrchestratorError
 from orchestrator.runs import cluster, engine, processors
+from orchestrator.runs.case import Case
 from orchestrator.runs.queues import Queue
 from tests.waiting import HANGS_S, until
 
@@ -174,3 +177,33 @@ def test_a_job_with_fewer_cores_than_it_asked_for_runs_fewer_solvers(
     monkeypatch.setattr(engine, "Cores", held.append)
     cluster._share_of.__wrapped__(threads, cores)
     assert held == [expected]
+
+
+def test_jobs_have_as_many_cores_as_solvers_and_settings_of_the_study_come_first(
+    site: Site, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import dask
+
+    # its defaults are there before others are set
+    importlib.import_module("dask_jobqueue")
+    site.asks("", "nothing", "")
+    queue = Queue("slurm", {**SMALL, "cores": 2})
+    with (
+        dask.config.set({"jobqueue.slurm.cores": 5}),
+        cluster.pool(queue, tmp_path / "cases", workers=3, limit_s=HANGS_S) as pool,
+    ):
+        # two cases ahead for each of the four cores
+        assert pool.places == 8
+    assert "asked slurm for 2 jobs" in capsys.readouterr().err
+
+
+def test_a_case_that_another_job_has_done_does_not_run_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def runs(*_: object, **__: object) -> float:
+        raise AssertionError
+
+    monkeypatch.setattr(cluster, "done_state", lambda *_: {"wall_s": "7.5"})
+    monkeypatch.setattr(engine, "execute", runs)
+    case = cast(Case, SimpleNamespace(name="case"))
+    assert cluster.execute_unless_done(case, tmp_path, 1.0, 1) == 7.5

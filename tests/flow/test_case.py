@@ -1,6 +1,7 @@
 """Flow cases run by the real solver on a coarse mesh, and their failures."""
 
 import os
+import re
 import shutil
 import subprocess
 from dataclasses import replace
@@ -175,6 +176,17 @@ def test_a_flow_that_fails_is_tried_once_more_with_more_relaxation(
         assert "the second try converged, with the values of second_try" in said
         changes = (directory / "second_try").read_text()
         assert "relaxation       0.7;\n" in changes
+        asked = (directory / "parameters").read_text()
+        for name, factor in (
+            ("residual", 0.1),
+            ("residualOfK", 0.1),
+            ("iterations", 3),
+        ):
+            of_first, of_second = (
+                float(re.findall(rf"(?m)^{name} +(\S+);", text)[0])
+                for text in (asked, changes)
+            )
+            assert of_second == pytest.approx(factor * of_first)
         ends.append(read_json(directory / case.DONE)["results_sha256"])
         logs = {path.name for path in directory.glob("log.simpleFoam*")}
         assert logs == {"log.simpleFoam", "log.simpleFoam.first"}

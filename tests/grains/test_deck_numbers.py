@@ -220,7 +220,10 @@ def test_a_threshold_by_hand_lies_between_two_flows(tmp_path: Path) -> None:
     told = subprocess.run(
         [*words, *files], cwd=tmp_path, capture_output=True, text=True, check=True
     )
-    assert told.stdout.splitlines() == [
+    lines = told.stdout.splitlines()
+    # a reader who compares is told why the page of a study may have other numbers
+    assert "sustained motion" in " ".join(lines[4:])
+    assert lines[:4] == [
         "n/N = 10 % at u*_0 0.1414 m/s (0.1 ... 0.2)",
         "n/N = 30 % at u*_0 0.1414 m/s (0.1 ... 0.2)",
         "n/N = 50 % at u*_0 0.2449 m/s (0.2 ... 0.3)",

@@ -3,6 +3,8 @@
 import io
 import math
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -10,12 +12,13 @@ import pytest
 
 import orchestrator
 from orchestrator import cli, pipeline
-from orchestrator.grains.places import DunePlace
+from orchestrator.grains.places import DunePlace, places_of
 from orchestrator.hours.places import hours_above
 from orchestrator.physics.velocity import outer_roughness
 from orchestrator.report.by_place import places_sheet
 from orchestrator.report.results import Results
 from orchestrator.runs.workspace import Workspace
+from orchestrator.study.parts import Obstacle
 from orchestrator.study.wind import Winds
 
 STUDY = """\
@@ -64,6 +67,39 @@ def test_a_part_of_a_place_is_a_part_of_its_length() -> None:
     place = DunePlace("foot", np.array([0.5, 0.2, np.inf]), np.array([1.0, 2.0, 1.0]))
     assert [place.at(part) for part in (0.1, 0.5, 0.6, 0.75)] == [0.2, 0.2, 0.5, 0.5]
     assert place.at(0.9) == math.inf
+
+
+def test_places_are_ranges_of_the_bed_and_of_the_height_of_its_windward_side(
+    tmp_path: Path,
+) -> None:
+    """A form 2 m high, whose toe is at x = 3 m, whose crest is 8 m behind it."""
+    s = np.arange(-15.0, 16.0)
+    z = 0.5 + np.interp(s, [0.0, 8.0, 12.0], [0.0, 2.0, 0.0])
+    stress = SimpleNamespace(
+        s_m=s,
+        x_m=s + 3,
+        z_m=z,
+        length_m=np.where(s < -5, 1.0, 2.0),
+        ustar_over_ustar0_wall=np.where(s < -5, -0.5, 2.0),
+    )
+    fence = Obstacle(kind="fence", x=0.0, height=1.5)
+    bed = SimpleNamespace(height=2.0, obstacles=(fence,))
+    model = SimpleNamespace(line=SimpleNamespace(crest_s=8.0))
+    pile = SimpleNamespace(model=model, bed=bed, stress=lambda _: stress)
+    grains = pd.DataFrame({"s_m": [1.0, 3.0, 7.0, 11.0, 15.0]})
+    grains["ustar0_m_s"] = [0.5, 0.4, 0.3, 0.2, 0.1]
+    beach, foot, slope, brink = places_of(cast(Any, pile), grains, 0.25, tmp_path)
+    # five heights of it, but for what is within the reach of the fence, at s = -3 m
+    assert beach.length.tolist() == [1.0] * 5 + [2.0] * 4
+    # where the wind is half as strong, u*0 has to be twice as large
+    assert beach.ustar0.tolist() == [0.5] * 5 + [0.125] * 4
+    assert [foot.name, slope.name, brink.name] == ["foot", "slope", "brink"]
+    # grains behind the crest are in no place
+    assert [each.ustar0.tolist() for each in (foot, slope, brink)] == [
+        [0.5],
+        [0.4],
+        [0.3],
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -153,6 +189,41 @@ def test_rougher_ground_at_the_anemometer_needs_a_weaker_wind(
     rough = table(directory, capsys, "--ground-roughness", "1e-3")
     assert (rough["wind_half_m_s"] < bare["wind_half_m_s"]).all()
     assert (rough["hours_half"] >= bare["hours_half"]).all()
+
+
+def test_the_wind_is_that_at_the_height_of_the_anemometer(
+    directory: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    capsys.readouterr()
+    at_ten = table(directory, capsys)
+    low = tmp_path / "low.csv"
+    low.write_text(WINDS.replace("\n", ",2\n").replace("share,2", "share,z_m"))
+    words = ["hours", str(directory), "--wind", str(low), "--from", "270", "--csv"]
+    assert cli.main(words) == 0
+    at_two = pd.read_csv(io.StringIO(capsys.readouterr().out)).set_index("place")
+    assert (at_two["wind_half_m_s"] < 0.9 * at_ten["wind_half_m_s"]).all()
+
+
+def test_each_bed_has_the_winds_of_its_own_grains(
+    directory: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    axes = '[axes]\n"grain.diameter" = [3e-4, 6e-4]\n'
+    text = STUDY.replace("diameter = 3e-4\n", "")
+    file = directory.parent / "two.toml"
+    file.write_text(text + axes)
+    out = tmp_path / "two"
+    words = ["study", str(file), "--out", str(out), "--workers", "1"]
+    assert cli.main(words) == 0
+    capsys.readouterr()
+    winds = str(directory.parent / "winds.csv")
+    assert cli.main(["hours", str(out), "--wind", winds, "--from", "270", "--csv"]) == 0
+    both = pd.read_csv(io.StringIO(capsys.readouterr().out))
+    alone = table(directory, capsys)
+    fine, coarse = (part for _, part in both.groupby("scene_id", sort=False))
+    assert fine["wind_half_m_s"].tolist() == alone["wind_half_m_s"].tolist()
+    assert (
+        coarse["wind_half_m_s"].to_numpy() > 1.1 * fine["wind_half_m_s"].to_numpy()
+    ).all()
 
 
 def test_people_read_places_and_what_is_not_counted(

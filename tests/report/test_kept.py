@@ -5,14 +5,16 @@ import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
 from orchestrator import report
-from orchestrator.report import figures, style
+from orchestrator.report import figures, kept, style
 from orchestrator.report.figures import FigureKind
 from orchestrator.report.kept import KEPT, Drawn
-from orchestrator.report.results import Results
+from orchestrator.report.results import Reads, Results
 from orchestrator.runs import case, processors
 from orchestrator.runs.files import Folder
 from tests.report.conftest import changed
@@ -172,3 +174,46 @@ def test_whoever_asks_last_has_read_as_much_as_who_asks_first(
             [*kind.draw(own)]
         assert last == first, kind.name
         assert first.tables, kind.name
+
+
+ASKED = {"name": "a", "text": "b", "tolerance": 0.05, "errors": None}
+OTHER_ERRORS = SimpleNamespace(sha256="c")
+
+
+def _source(folder: Path, monkeypatch: pytest.MonkeyPatch, **changes: Any) -> str:
+    """What figures of a small study are drawn from, some of it changed."""
+    words = {"code": "d", "version": "1.0", "whole": True, "every": False}
+    words |= {"ids": {"case": "e"}, **ASKED, **changes}
+    monkeypatch.setattr(case, "code_of_all", lambda: words["code"])
+    monkeypatch.setattr(case, "digest_of_results", lambda *_: "f")
+    monkeypatch.setattr(case, "is_whole", lambda *_: words["whole"])
+    monkeypatch.setattr(kept.metadata, "version", lambda _: words["version"])
+    study = SimpleNamespace(**{name: words[name] for name in ASKED})
+    plan = SimpleNamespace(ids=words["ids"], cases={"case": None})
+    results = SimpleNamespace(study=study, plan=plan, tables={}, cases=folder)
+    asked = kept.Kept(Folder(folder), cast(Any, results), {}, every=words["every"])
+    return json.dumps(asked.sources(Reads(set(), {"case"})))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"name": "b"},
+        {"text": "c"},
+        {"tolerance": 0.2},
+        {"tolerance": None},
+        {"errors": OTHER_ERRORS},
+        {"code": "e"},
+        {"version": "1.1"},
+        {"ids": {"case": "g"}},
+        {"whole": False},
+        {"every": True},
+    ],
+    ids=str,
+)
+def test_all_that_a_figure_is_drawn_from_is_in_its_digest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, change: dict[str, Any]
+) -> None:
+    before = _source(tmp_path, monkeypatch)
+    assert _source(tmp_path, monkeypatch) == before
+    assert _source(tmp_path, monkeypatch, **change) != before

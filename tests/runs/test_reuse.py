@@ -10,7 +10,8 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -25,6 +26,7 @@ from orchestrator.grains.pile_case import PileCase
 from orchestrator.physics import laws
 from orchestrator.runs import case as case_states
 from orchestrator.runs import files, reuse
+from orchestrator.runs.case import Case
 from orchestrator.study import study
 from tests.small_study import run
 from tests.test_architecture import arrows, reached
@@ -396,3 +398,13 @@ def test_every_file_that_a_case_is_made_by_is_in_the_digest_of_its_code(
     case_states.code_of.cache_clear()
     assert tried > 100
     assert not changes(FlowCase, package / "grains" / "motion.py")
+
+
+def test_a_directory_that_has_not_the_finished_case_lends_nothing(
+    tmp_path: Path,
+) -> None:
+    wanted = {"flow-a": cast(Case, SimpleNamespace(name="flow-a", id="a"))}
+    here, beside = tmp_path / "out" / "cases", tmp_path / "other"
+    (beside / "cases" / "flow-a").mkdir(parents=True)
+    assert reuse.elsewhere(wanted, here, [beside]) == {}
+    assert reuse.taken(wanted, here, [beside]) == 0

@@ -52,6 +52,16 @@ def test_each_place_has_the_length_of_its_cell(tmp_path: Path) -> None:
     assert found.at(x, y, 0.03).tolist() == expected
 
 
+def test_the_same_lengths_at_other_places_are_another_map(tmp_path: Path) -> None:
+    path = written(tmp_path / "z0.tif", Z0)
+    digests = {read_roughness(path, "z0").digest}
+    for east, north in ((110.0, 220.0), (100.0, 230.0)):
+        with rasterio.open(path, "r+") as dataset:
+            dataset.transform = Affine(10.0, 0, east, 0, -10.0, north)
+        digests.add(read_roughness(path, "z0").digest)
+    assert len(digests) == 3
+
+
 @pytest.mark.parametrize(
     ("numbers", "said"),
     [
@@ -99,6 +109,13 @@ def test_faces_have_the_lengths_of_their_places_whatever_the_wind(
     inside[0] = False
     assert np.all(lengths[inside & (north > 1)] == 0.02)
     assert np.all(lengths[inside & (north < -1)] == 0.001)
+
+
+def test_the_slab_before_the_inlet_has_the_ground_of_the_approaching_flow() -> None:
+    one = flow(of_north(0.02, 0.001))
+    lengths = one.ground_roughness()
+    assert {*lengths[0].tolist()} == {one.roughness_m}
+    assert {*lengths[1].tolist()} >= {0.02, 0.001}
 
 
 def test_the_wall_has_the_friction_velocity_of_each_length(tmp_path: Path) -> None:
