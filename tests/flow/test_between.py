@@ -68,3 +68,16 @@ def test_the_wake_does_not_count() -> None:
         other = -0.1 if z0 == Z0[2] else 0.2
         solved[z0] = replace(each, tau_wall=np.where(falls, other, each.tau_wall))
     assert between.error(solved, "wall") < between.MOST_ERROR
+
+
+def test_both_stresses_are_put_between_their_own() -> None:
+    solved = {}
+    for z0 in (*Z0, 5.5e-5):
+        one = flow(z0)
+        solved[z0] = replace(one, ustar_over_ustar0_eq10=0.7 * one.tau_wall - 0.1)
+    expected = solved.pop(5.5e-5)
+    made = between.stress(5.5e-5, solved)
+    assert made.tau_wall == pytest.approx(expected.tau_wall, rel=1e-12)
+    assert made.ustar_over_ustar0_eq10 == pytest.approx(
+        expected.ustar_over_ustar0_eq10, rel=1e-12
+    )

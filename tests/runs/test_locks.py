@@ -9,8 +9,10 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+from filelock import Timeout
 
 from orchestrator.errors import OrchestratorError
 from orchestrator.runs import locks
@@ -56,6 +58,8 @@ def test_a_lock_that_is_held_says_by_whom_and_since_when(tmp_path: Path) -> None
         here = rf"process {os.getpid()} on \S+"
         _is_whole(_refusal(tmp_path / "a"), tmp_path / "a" / LOCK, here)
     assert not Workspace(tmp_path / "a").is_held()
+    # a file that nobody holds names nobody
+    assert (tmp_path / "a" / LOCK).read_text() == ""
     with claimed(tmp_path / "a", STUDY, "a"):
         pass
 
@@ -150,3 +154,27 @@ def test_a_note_of_any_content_is_one_line(tmp_path: Path) -> None:
     for text in ("", "\n\n", "two\nlines of\nsomething", "\x00\n"):
         path.write_text(text)
         assert "\n" not in locks.holder(path)
+
+
+def test_no_lock_is_waited_for_beyond_its_limit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    waited_s = [0.0]
+
+    def wait(_: object, timeout: float) -> None:
+        waited_s.append(timeout)
+        raise Timeout(str(tmp_path / "lock"))
+
+    clock = SimpleNamespace(monotonic=lambda: sum(waited_s))
+    clock.strftime, clock.localtime = time.strftime, time.localtime
+    monkeypatch.setattr(locks, "time", clock)
+    monkeypatch.setattr(locks.FileLock, "acquire", wait)
+    said: list[str] = []
+    with (
+        pytest.raises(OrchestratorError),
+        locks.lock_held(tmp_path / "lock", limit_s=500.0, else_="", say=said.append),
+    ):
+        pass
+    # a minute, two, four, and what is left of the limit
+    assert waited_s == [0.0, 60.0, 120.0, 240.0, 80.0]
+    assert len(said) == 3

@@ -45,6 +45,7 @@ def write(
     nodata: float | None = EMPTY,
     unit: str = "Pa",
     scale: float = 1.0,
+    offset: float = 0.0,
 ) -> Path:
     """Write a raster of stress."""
     rows, columns = stress.shape
@@ -65,6 +66,8 @@ def write(
             dataset.set_band_unit(1, unit)
         if scale != 1:
             dataset.scales = (scale,)
+        if offset:
+            dataset.offsets = (offset,)
     return path
 
 
@@ -172,6 +175,24 @@ def test_scaled_numbers_and_empty_cells_of_other_digits_are_read(
     np.testing.assert_allclose(bands[0], expected, rtol=1e-6)
 
 
+def test_the_offset_of_scaled_numbers_is_in_pascal(tmp_path: Path) -> None:
+    stored = np.array([[5.0, 20.0]])
+    path = write(tmp_path / "tau.tif", stored, scale=0.1, offset=1.5)
+    _, summary = mapped(path, tmp_path / "out")
+    assert summary["least_stress_pa"] == pytest.approx(2.0, rel=1e-6)
+    assert summary["most_stress_pa"] == pytest.approx(3.5, rel=1e-6)
+
+
+def test_the_picture_has_north_at_its_top(tmp_path: Path) -> None:
+    from orchestrator.surface import stress_map
+
+    with rasterio.open(write(tmp_path / "tau.tif")) as dataset:
+        ends, names = stress_map._extent(dataset)
+    # left, right, bottom, top
+    assert ends == (5e5, 5e5 + 8, 5.6e6 - 9, 5.6e6)
+    assert names == ("x", "y (north)")
+
+
 def test_an_esri_grid_is_the_same_map(tmp_path: Path) -> None:
     stress = np.tile(STRESS, (3, 2))
     lines = ["ncols 8", "nrows 9", "xllcorner 0", "yllcorner 0", "cellsize 2"]
@@ -194,6 +215,13 @@ def test_many_rows_are_read_in_parts(
     monkeypatch.setattr(stress_map, "CELLS_AT_ONCE", 5)
     parts, by_row = mapped(tmp_path / "tau.tif", tmp_path / "b")
     np.testing.assert_array_equal(whole, parts)
+    assert at_once.equals(by_row)
+    # rows of degrees have an area each
+    wide = Affine(20.0, 0.0, 0.0, 0.0, -20.0, 80.0)
+    path = write(tmp_path / "deg.tif", crs="EPSG:4326", transform=wide)
+    _, by_row = mapped(path, tmp_path / "c")
+    monkeypatch.undo()
+    _, at_once = mapped(path, tmp_path / "d")
     assert at_once.equals(by_row)
 
 
