@@ -27,7 +27,6 @@ END {
         low = flow[step - 1]; high = flow[step]; at = sqrt(low * high)
         printf "n/N = %d %% at u*_0 %.4g m/s (%.4g ... %.4g)\n", percent, at, low, high
     }
-    print "These are load steps in which grains left their pockets in the steady flow of the deck. Where a study asks"
-    print "for sustained motion, its page has a flow of its own for each grain: about a load step lower, or higher where"
-    print "sustaining the motion takes more than starting it."
+    print "These are load steps in which grains left their pockets in the flow of the deck. Where a study asks for"
+    print "sustained motion, its page has a flow of its own for each grain, between load steps, and other numbers."
 }
