@@ -27,7 +27,7 @@ LIBRARIES = ("jinja2", "matplotlib", "numpy", "pandas", "pillow", "scipy")
 """Libraries that draw, and that make numbers which are drawn."""
 ALWAYS = ("scenes", "methods")
 """Tables from which the plan of the study follows, which every figure may ask."""
-WORDS = ("name", "title", "caption", "data", "place", "follows", "part")
+WORDS = ("name", "title", "caption", "data", "place", "follows", "part", "lead")
 """What is kept of a figure as it is, beside its image."""
 ENDINGS = (".svg", "-narrow.svg", ".csv")
 """What follows the name of a figure in those of its files."""

@@ -153,7 +153,7 @@ class Figure:
     title
         Its heading.
     caption
-        What it shows.
+        What it shows; folded away where it has a `lead`.
     cases
         Names of the cases behind it.
     drawing
@@ -178,6 +178,8 @@ class Figure:
         The numbers that it shows, as CSV; empty until it is drawn, or without any.
     has_png
         Whether a file of it as PNG is beside the SVG.
+    lead
+        The sentence under it that is never folded, where its caption is long.
     has_field
         Whether a PNG that the page shows has a field of colours.
     """
@@ -197,6 +199,7 @@ class Figure:
     narrow_image: bytes = b""
     numbers: str = ""
     has_png: bool = False
+    lead: str = ""
     has_field: bool = False
 
     @classmethod

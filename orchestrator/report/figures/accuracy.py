@@ -16,6 +16,11 @@ from orchestrator.report.results import Results, case_names, split_by, valid
 from orchestrator.report.shields import SHOWN, DiagramSheet, Points
 from orchestrator.report.style import Figure
 
+LEAD = (
+    "Critical friction velocity by DEM over that of the closed form with the same "
+    "forces; at 1 both agree."
+)
+"""What stands under the drawing."""
 CAPTION = """\
 {% from "captions.j2" import laws, protocol, is_open %} Friction velocity at the
 threshold by DEM over that of the closed form with the same forces: {{ laws(about) }}. A
@@ -60,6 +65,7 @@ def draw(results: Results) -> Iterator[Figure]:
             case_names(sheet.rows),
             partial(_draw_accuracy, sheet, rows, colours),
             place="folded",
+            lead=LEAD,
         )
 
 

@@ -41,6 +41,11 @@ SHIFT = 0.02
 """Grains that have moved by less since they were last drawn stay, d."""
 BARS = (1, 2, 5, 10, 20, 50, 100)
 """Lengths of the bar of scale, d."""
+LEAD = (
+    "The bed from the side: orange grains are entrained at the flow that the title "
+    "names."
+)
+"""What stands under the drawing."""
 CAPTION = """\
 After Fig. 13 of the paper. Grains {% if width %}of all rows of a strip of {{
 "%g"|format(width) }} d, from the side, {% endif %} {% if by_dem %} at the end of a load
@@ -299,6 +304,7 @@ def draw(results: Results) -> Iterator[Figure]:
             place="" if seen else "lead",
             follows="Fig. 13",
             numbers=_numbers(steps, flows),
+            lead=LEAD,
         )
         seen.add(name)
 

@@ -9,6 +9,11 @@ from orchestrator.report.page import filled
 from orchestrator.report.results import Results, case_names, drawable, split_by
 from orchestrator.report.style import Figure
 
+LEAD = (
+    "Critical Shields number of the beds of this study against the grain Reynolds "
+    "number, by the fraction entrained."
+)
+"""What stands under the drawing."""
 CAPTION = """\
 {% from "captions.j2" import laws, protocol, is_open, low_regime, references %} After
 Figs. 15 and 16 of the paper. A marker shows the mean {{ about.stress }} over the grains
@@ -67,6 +72,7 @@ def draw(results: Results) -> Iterator[Figure]:
                     drawing,
                     place="folded" if is_folded else "",
                     follows=follows + part.after if is_followed else "",
+                    lead=LEAD,
                 )
 
 

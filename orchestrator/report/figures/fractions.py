@@ -72,6 +72,10 @@ Fraction of the exposed grains that is entrained, against the {{ told }}. Thick:
 numbers of the card; disc: its answer; pale bar: its interval. {% if seeds %}Thin:
 replicates (random seeds).{% endif %} {% if beside %}The other line: the same bed and
 flow {{ beside }}.{% endif %}"""
+LEAD = (
+    "Fraction of the exposed grains that is entrained, n/N, of each bed of this slope."
+)
+"""What stands under the drawing."""
 CAPTION = """\
 {% from "captions.j2" import laws, protocol, is_open, low_regime %} {% if along ==
 "flow" %}Fraction of the N(d) exposed grains that is entrained, n/N, against the {{ told
@@ -252,6 +256,7 @@ def _of_slope(
             drawing=partial(_draw_panels, sheet, curves, by, colours, along),
             place="folded" if sheet.name else "",
             follows=follows + part.after if is_of_paper and not sheet.name else "",
+            lead=LEAD,
         )
 
 

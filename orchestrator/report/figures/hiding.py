@@ -33,6 +33,10 @@ HIDING: tuple[tuple[str, Callable[[Any], Any], str], ...] = (
     ("equal mobility", _one_stress, ":"),
 )
 """Published functions of the size: label, function and dash of a line."""
+LEAD = (
+    "Critical Shields number of each size class in its own diameter, over that at d₅₀."
+)
+"""What stands under the drawing."""
 CAPTION = (
     "The Shields number of a size class, in its own diameter, at which a fraction of "
     "its exposed grains has moved, over that at d₅₀, which lies between two classes. "
@@ -79,6 +83,7 @@ def draw(results: Results) -> Iterator[Figure]:
         caption=CAPTION,
         cases=case_names(rows),
         drawing=shields.legends(sheet, "fraction", colours),
+        lead=LEAD,
     )
 
 

@@ -11,6 +11,11 @@ from orchestrator.report.page import filled
 from orchestrator.report.results import Results, case_names, split_by
 from orchestrator.report.style import Figure
 
+LEAD = (
+    "Critical Shields number of one grain against the grain Reynolds number, by the "
+    "closed form and, where it was run, by DEM."
+)
+"""What stands under the drawing."""
 CAPTION = """\
 {% from "captions.j2" import laws, protocol, is_open, references %} {% if by !=
 "force_law" %}After Fig. {{ 5 if by == "beta_deg" else 7 }} of the paper. {% endif %}
@@ -89,6 +94,7 @@ def _figures(
             drawing,
             place="folded" if is_further or by == "alpha_deg" else "",
             follows=numbers.get((by, bool(len(shown))), ""),
+            lead=LEAD,
         )
 
 

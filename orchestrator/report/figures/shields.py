@@ -37,6 +37,11 @@ EXACT = 60
 """Number of single grains up to which those by the closed form are points as well."""
 LINES = 3
 """Number of laws beyond which only those near the measurements are drawn."""
+LEAD = (
+    "Critical Shields number of the beds and grains of this study against the grain "
+    "Reynolds number, beside published curves and measurements."
+)
+"""What stands under the drawing."""
 CAPTION = """\
 {% from "captions.j2" import is_open, low_regime, references %} {% if piles %} Squares:
 beds. The stress is the mean wall stress over the grains that had moved when their
@@ -74,7 +79,7 @@ def draw(results: Results) -> Iterator[Figure]:
     )
     title = "Extended Shields diagram"
     cases = case_names(piles, grains)
-    yield Figure(NAME, title, text, cases, canvas, data=data, place="lead")
+    yield Figure(NAME, title, text, cases, canvas, data=data, place="lead", lead=LEAD)
 
 
 def _diagram(

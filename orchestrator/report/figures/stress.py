@@ -29,6 +29,11 @@ ESTIMATES: dict[str, Look] = {
     },
 }
 """Looks of the estimates of the friction velocity, by the ending of their column."""
+LEAD = (
+    "Signed friction velocity along the bed over that upstream, u*₀; below zero the "
+    "flow at the bed is reversed."
+)
+"""What stands under the drawing."""
 CAPTION = """\
 Signed friction velocity along the bed over the undisturbed u*₀ = 0.41 U_e/ln((10 h +
 z₀)/z₀). Black: from the wall shear stress of the OpenFOAM solution. Blue: Eq. 10 at the
@@ -68,7 +73,7 @@ def draw(results: Results) -> Iterator[Figure]:
     )
     title = "Friction velocity over the pile"
     drawing = partial(_stress, results, piles)
-    yield Figure("wall-stress", title, text, names, drawing, place="folded")
+    yield Figure("wall-stress", title, text, names, drawing, place="folded", lead=LEAD)
 
 
 def _stress(results: Results, piles: list[Pile]) -> Canvas:
