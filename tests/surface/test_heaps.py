@@ -178,7 +178,7 @@ def test_a_tie_of_all_directions_has_no_worst() -> None:
         "0° and 180° lie within the interval"
     )
     many = [float(angle) for angle in range(0, 330, 30)]
-    assert cards.tie(many, 0.0, 12).startswith("10 others are not told")
+    assert cards.tie(many, 0.0, 12).startswith("10 other directions lie")
 
 
 def test_the_page_has_places_to_a_part_of_a_cell(tmp_path: Path) -> None:
@@ -192,7 +192,7 @@ def test_the_page_has_places_to_a_part_of_a_cell(tmp_path: Path) -> None:
     ):
         assert place == f"{exact:.1f}"
     card = only(sections[0], Card)
-    assert card.numbers[0].note.startswith("first at x = 4312")
+    assert card.numbers[0].note.startswith("at x = 4312")
 
 
 COAL = 'threshold = "uncrusted coal pile"\n'
