@@ -240,9 +240,10 @@ def test_the_answer_of_a_picture_is_that_of_the_card() -> None:
     assert under == pytest.approx(leaves / math.sqrt(peak))
 
 
+@pytest.mark.parametrize("width", [style.WIDE, style.NARROW])
 @pytest.mark.parametrize("measured", [0.7, 1.0, 1.4])
 def test_labels_of_the_picture_of_a_grain_lie_on_no_points(
-    results: Results, measured: float
+    results: Results, measured: float, width: float
 ) -> None:
     grain = only(results, "grain").joined("single_grain").iloc[0].copy()
     # of this roughness the thresholds of grains in sustained motion are tabulated
@@ -251,13 +252,16 @@ def test_labels_of_the_picture_of_a_grain_lie_on_no_points(
     columns = in_units(ustar, grain)
     columns |= in_units(measured * ustar, grain, before="compared_")
     grain = pd.Series({**grain, **columns})
-    canvas = of_one.grain_panels(grain)
-    canvas.draw_without_rendering()
+    with style.settings(style.LETTERS):
+        canvas = of_one.grain_panels(grain, width)
+        canvas.draw_without_rendering()
     for ax in canvas.axes:
         labels = [text for text in ax.texts if text.get_text()]
         assert labels
         for label in labels:
             box = label.get_window_extent()
+            assert canvas.bbox.x0 <= box.x0
+            assert box.x1 <= canvas.bbox.x1
             for line in ax.lines:
                 if line.get_marker() == "None":
                     continue

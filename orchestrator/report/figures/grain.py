@@ -1,6 +1,7 @@
 """One grain: its threshold by force law and by size."""
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -27,6 +28,8 @@ from orchestrator.report.subjects import ReportedQuantity
 from orchestrator.tables.quoted import of_rows
 from orchestrator.types import FloatArray
 
+HEIGHT = 3.0
+"""Height of a panel with its labels, inches."""
 CAPTION = (
     "By law: orange, the answer; blue discs, other laws that hold; grey rings, laws "
     "outside their range. By size: the same law, each size on a bed of identical "
@@ -50,16 +53,21 @@ def draw(results: Results) -> Iterator[Figure]:
         told = single.quantity_of_row(row)
         title = f"The {told.name} that moves the grain, by force law and by size"
         cases = case_names(grains)
-        yield Figure("grain", title, CAPTION, cases, grain_panels(row), place="lead")
+        wide, narrow = (
+            partial(grain_panels, row, width) for width in (style.WIDE, style.NARROW)
+        )
+        yield Figure("grain", title, CAPTION, cases, wide, place="lead", narrow=narrow)
 
 
-def grain_panels(row: pd.Series) -> Canvas:
-    """Draw the two panels of a grain.
+def grain_panels(row: pd.Series, width: float) -> Canvas:
+    """Draw the two panels of a grain, on a narrow page one below the other.
 
     Parameters
     ----------
     row
         The threshold with the columns of its scene.
+    width
+        Width of the drawing, inches.
 
     Returns
     -------
@@ -75,10 +83,14 @@ def grain_panels(row: pd.Series) -> Canvas:
     grains = Grain.of_table(here)
     compared = units.told_by(here, grains.ustar_at(by_formula(grains)), told)
     curves = pd.DataFrame({"mm": 1e3 * d, "computed": computed, "formula": compared})
-    canvas = style.canvas(2.6)
-    left, right = canvas.subplots(1, 2)
-    _by_law(left, row, told)
-    _by_size(right, row, curves, told)
+    if width < style.WIDE:
+        canvas = style.canvas(2 * HEIGHT, width)
+        by_law, by_size = canvas.subplots(2, 1)
+    else:
+        canvas = style.canvas(HEIGHT, width)
+        by_law, by_size = canvas.subplots(1, 2)
+    _by_law(by_law, row, told)
+    _by_size(by_size, row, curves, told)
     return canvas
 
 
@@ -168,27 +180,30 @@ def _by_size(
     size = float(row["d_m"])
     mm, computed, compared = curves.to_numpy().T
     ax.plot(mm, computed, color=ANSWER, lw=1.5)
-    ax.plot(mm, compared, color=INK, lw=1.1, ls=MEASURED)
+    name = f"formula of {single.formula_of(row)}"
+    ax.plot(mm, compared, color=INK, lw=1.1, ls=MEASURED, label=name)
     value = float(row[told.column()])
     ax.plot([1e3 * size], [value], "o", color=ANSWER, ms=6, mec="white")
     # both curves rise to the right: what is below them is free there
     at = _middle(compared)
     is_below = at is None or value < compared[at]
-    below: Look = {"textcoords": "offset points"}
-    below |= {"xytext": (8, -6), "va": "top"}
-    above = {**below, "xytext": (-8, 6), "va": "bottom", "ha": "right"}
-    bold: Look = {"color": ANSWER, "weight": "bold"}
+    beside: Look = {"xytext": (8, -6), "va": "top"}
+    if not is_below:
+        beside = {"xytext": (-8, 6), "va": "bottom", "ha": "right"}
     ax.annotate(
-        f"this grain: {value:.3g}",
+        f"{value:.3g}",
         (1e3 * size, value),
-        **(below if is_below else above),
-        **bold,
+        textcoords="offset points",
+        color=ANSWER,
+        weight="bold",
+        **beside,
     )
     if at is not None:
-        name = f"formula of {single.formula_of(row)}"
-        ax.annotate(name, (mm[at], compared[at]), **(above if is_below else below))
+        ax.legend(loc="upper left", frameon=False)
     style.log_sizes(ax)
-    ax.set(ylim=(0, None), xlabel="the same for other sizes, mm")
+    # the name of the formula stands above both curves
+    highest = np.nanmax([*computed, *compared, value])
+    ax.set(ylim=(0, 1.2 * highest), xlabel="diameter, mm")
     ax.set_ylabel(f"{told.name}, {told.unit}")
 
 
