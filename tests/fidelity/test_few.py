@@ -14,9 +14,11 @@ from hypothesis import strategies as st
 
 from orchestrator import pipeline, plan
 from orchestrator.digits import percent
-from orchestrator.fidelity import choice, decision, few
+from orchestrator.fidelity import choice, decision, few, measured
+from orchestrator.fidelity.classes import GRAINS, scene_class
 from orchestrator.fidelity.decision import Decision, as_written
 from orchestrator.fidelity.few import Corrected
+from orchestrator.fidelity.fidelities import PAIRS
 from orchestrator.grains import corrected as corrections
 from orchestrator.grains.corrected import CorrectedPile, Correction, Pair
 from orchestrator.grains.motion import Motion
@@ -269,7 +271,7 @@ def test_what_is_corrected_has_the_least_error_at_its_worst_fraction(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     (scene, *_) = asked().scenes
-    rungs = {pair.grains.name: pair for pair in few.PAIRS if pair.grains.takes(scene)}
+    rungs = {pair.grains.name: pair for pair in PAIRS if pair.grains.takes(scene)}
     plain = [name for name, pair in rungs.items() if not pair.is_resolved_in_time]
     first, second, *_ = plain
     errors = {first: {0.1: 0.01, 0.5: 0.5}, second: {0.1: 0.2, 0.5: 0.2}}
@@ -278,12 +280,12 @@ def test_what_is_corrected_has_the_least_error_at_its_worst_fraction(
         return SimpleNamespace(total=errors[name][fraction])
 
     known = {
-        (few.GRAINS, name, few.scene_class(few.GRAINS, scene)): SimpleNamespace(
+        (GRAINS, name, scene_class(GRAINS, scene)): SimpleNamespace(
             at=partial(at, name)
         )
         for name in errors
     }
-    monkeypatch.setattr(few.measured, "errors", lambda: known)
+    monkeypatch.setattr(measured, "errors", lambda: known)
     chosen = few._plain(scene, (0.1, 0.5))
     assert chosen is not None
     assert chosen.name == second

@@ -4,6 +4,7 @@ import json
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
+from importlib import metadata
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -182,12 +183,12 @@ OTHER_ERRORS = SimpleNamespace(sha256="c")
 
 def _source(folder: Path, monkeypatch: pytest.MonkeyPatch, **changes: Any) -> str:
     """What figures of a small study are drawn from, some of it changed."""
-    words = {"code": "d", "version": "1.0", "whole": True, "every": False}
-    words |= {"ids": {"case": "e"}, **ASKED, **changes}
+    words: dict[str, Any] = {"code": "d", "version": "1.0", "whole": True}
+    words |= {"every": False, "ids": {"case": "e"}, **ASKED, **changes}
     monkeypatch.setattr(case, "code_of_all", lambda: words["code"])
     monkeypatch.setattr(case, "digest_of_results", lambda *_: "f")
     monkeypatch.setattr(case, "is_whole", lambda *_: words["whole"])
-    monkeypatch.setattr(kept.metadata, "version", lambda _: words["version"])
+    monkeypatch.setattr(metadata, "version", lambda _: words["version"])
     study = SimpleNamespace(**{name: words[name] for name in ASKED})
     plan = SimpleNamespace(ids=words["ids"], cases={"case": None})
     results = SimpleNamespace(study=study, plan=plan, tables={}, cases=folder)

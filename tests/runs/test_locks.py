@@ -12,7 +12,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from filelock import Timeout
+from filelock import FileLock, Timeout
 
 from orchestrator.errors import OrchestratorError
 from orchestrator.runs import locks
@@ -168,7 +168,7 @@ def test_no_lock_is_waited_for_beyond_its_limit(
     clock = SimpleNamespace(monotonic=lambda: sum(waited_s))
     clock.strftime, clock.localtime = time.strftime, time.localtime
     monkeypatch.setattr(locks, "time", clock)
-    monkeypatch.setattr(locks.FileLock, "acquire", wait)
+    monkeypatch.setattr(FileLock, "acquire", wait)
     said: list[str] = []
     with (
         pytest.raises(OrchestratorError),
