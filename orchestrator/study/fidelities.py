@@ -125,7 +125,8 @@ def fields_of(name: str, bed: Mapping[str, Any], where: str) -> Fields:
     if name not in WRITTEN:
         known = [AUTO, *WRITTEN]
         near = suggestion(str(name), known)
-        remedy = f"{near} Else write one of {', '.join(known)}".strip()
+        every = f"write one of {', '.join(known)}"
+        remedy = f"{near} Else {every}" if near else every
         raise InputError(f"{name!r} is no fidelity", place, remedy)
     written = WRITTEN[name]
     packing = packing_of(bed)

@@ -84,7 +84,7 @@ def test_where_nothing_meets_the_tolerance_the_message_says_what_would_help(
 @pytest.mark.parametrize(
     ("fields", "word"),
     [
-        ({"method.grains.waiting_time": 1.0}, "ramp"),
+        ({"method.grains.waiting_time": 1.0}, "rises steadily"),
         ({"method.kind": "peeling", "flow.gusts": GUSTS}, "peeling"),
         ({"method.kind": "peeling", "method.flow.model": "waves"}, "waves"),
         ({"method.flow.model": "waves"}, "waves"),

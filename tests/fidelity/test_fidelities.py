@@ -128,7 +128,7 @@ def test_a_level_bed_and_a_single_grain_take_what_concerns_them() -> None:
 
 def test_a_fidelity_that_does_not_exist_or_not_there_is_refused() -> None:
     with pytest.raises(
-        InputError, match=r"'fast' is no fidelity \(auto, quick, static"
+        InputError, match=r"'fast' is no fidelity \(write one of auto, quick, static"
     ):
         _named("fast")
     strip = ', packing = "poured", width = 6.0'
