@@ -6,6 +6,7 @@ the year follow from a table of winds.
 """
 
 import sys
+import warnings
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -25,7 +26,7 @@ from orchestrator.report.results import Results
 from orchestrator.runs.workspace import Workspace
 from orchestrator.study.parts import PileBed
 from orchestrator.study.source import decoded, read_bytes
-from orchestrator.study.wind import Winds, read_winds
+from orchestrator.study.wind import Winds, question_of, read_winds
 from orchestrator.types import FloatArray
 
 HOURS = 8760.0
@@ -98,6 +99,9 @@ def run_hours(options: Namespace) -> int:
     where = f"--wind {path}"
     content = read_bytes(path, LARGEST_WINDS, where)
     winds = read_winds(decoded(content, where, is_data=True), where)
+    asked = question_of(winds.rows, path.name)
+    if asked:
+        warnings.warn(asked, stacklevel=2)
     if not -360 <= options.from_deg <= 360:
         what = f"{options.from_deg:g} is no direction"
         raise InputError(what, "--from", "degrees from north over east, 0 to 360")

@@ -404,12 +404,15 @@ def _numbers(
     """The numbers of some cells of a line."""
     found = []
     for cell, name in zip(cells, names, strict=True):
+        is_amount = _kind_of(name) == "retained"
+        number = "the mass on this sieve, or 0" if is_amount else "its number"
+        remedy = f"write {number}, or remove the line"
         if not cell:
-            raise InputError(f"the cell of {name} is empty", place, "write its number")
+            raise InputError(f"the cell of {name} is empty", place, remedy)
         try:
             found.append(marks.number(cell))
         except ValueError as error:
-            raise InputError(f"{name}: {error}", place, REMEDY) from None
+            raise InputError(f"{name}: {error}", place, remedy) from None
     return found
 
 

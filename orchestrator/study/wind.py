@@ -20,7 +20,8 @@ from orchestrator.errors import InputError
 from orchestrator.study import compass
 from orchestrator.study.cells import Marks, TextTable, marks_of, read_cells
 from orchestrator.study.heads import name_of
-from orchestrator.study.lengths import FEET, FOOT, LENGTHS, METRE
+from orchestrator.study.lengths import FEET, LENGTHS, METRE
+from orchestrator.study.speeds import SPEED_UNIT, SPEEDS, unit_above
 from orchestrator.types import FloatArray
 
 USUAL_HEIGHT = 10.0
@@ -29,6 +30,9 @@ HOURS_OF_YEAR = 8760.0
 """Hours of a year."""
 OFF = 0.01
 """Largest difference of a sum of shares from the whole."""
+WINDIEST = 20.0
+"""Mean speed above which it is likelier in another unit, m/s: Cape Denison, of the
+windiest places, has 19."""
 FASTEST = 150.0
 """Largest speed, m/s."""
 MISSING = (
@@ -47,6 +51,8 @@ MISSING = (
 """Words for no observation."""
 NO_SPEED = (99.9, 99.99, 999.0, 999.9, 999.99, 9999.0, 9999.9, 32767.0)
 """Numbers for none, where no wind is so strong in the unit of the file."""
+SHORT_NO_SPEED = 99.0
+"""A number for none that may be a wind: it is one where others are half of it."""
 STRONGEST = 40.0
 """Mean speed above which such a number is no wind, m/s."""
 VARIABLE = (990.0, 999.0)
@@ -171,32 +177,6 @@ COUNTS = ("count", "counts", "occurrences", "observations", "anzahl")
 OF_HOURS = ("hours", "hrs", "stunden", "uren")
 EASTWARD, NORTHWARD = ("u", "u wind", "ugrd"), ("v", "v wind", "vgrd")
 """Parts of the wind towards the east and the north, as models give them."""
-SPEEDS: Mapping[str, float] = {
-    "0.1 m/s": 0.1,
-    "0,1 m/s": 0.1,
-    "dm/s": 0.1,
-    "cm/s": 0.01,
-    "m/s": 1.0,
-    "m s-1": 1.0,
-    "m.s-1": 1.0,
-    "ms-1": 1.0,
-    "m_s": 1.0,
-    "mps": 1.0,
-    "km/h": 1 / 3.6,
-    "km_h": 1 / 3.6,
-    "kmh": 1 / 3.6,
-    "kph": 1 / 3.6,
-    "knots": 1852 / 3600,
-    "kts": 1852 / 3600,
-    "kt": 1852 / 3600,
-    "kn": 1852 / 3600,
-    "mph": 0.44704,
-    "ft/s": FOOT,
-    "fps": FOOT,
-}
-"""Units of speeds, m/s."""
-_UNIT = "|".join(map(re.escape, SPEEDS))
-UNIT = re.compile(rf"(?<![a-z0-9])[(\[]?({_UNIT})[)\]]?(?![a-z0-9])", re.IGNORECASE)
 HEIGHT = re.compile(
     rf"(?:at|in|@|h ?=)? ?(?<![\d.,])(\d+(?:[.,]\d+)?) ?"
     rf"({'|'.join((*FEET, *METRE))})(?![a-z/]|_s\b)",
@@ -266,6 +246,28 @@ class Winds:
     rows: tuple[tuple[float, float, float], ...]
     height: float | None
     understood: str
+
+
+def question_of(rows: Iterable[tuple[float, float, float]], name: str) -> str:
+    """Ask about winds that are likelier in another unit.
+
+    Parameters
+    ----------
+    rows
+        Direction, speed, m/s, and share of time of each.
+    name
+        The name of their file.
+
+    Returns
+    -------
+    str
+        The question; empty for none.
+    """
+    mean = sum(speed * share for _, speed, share in rows)
+    if mean <= WINDIEST:
+        return ""
+    what = f"the wind of {name} is {mean:.3g} m/s in the mean"
+    return f"{what}: did you mean km/h, {mean / 3.6:.3g} m/s?"
 
 
 class _Column(NamedTuple):
@@ -352,7 +354,7 @@ def read_winds(text: str, where: str) -> Winds:
 def _column(name: str) -> _Column:
     """What the name of a column says of it."""
     words = TENS.sub(" ", name.strip().lower())
-    unit = UNIT.search(words.replace("_m_s", " m_s").replace("_km_h", " km_h"))
+    unit = SPEED_UNIT.search(words.replace("_m_s", " m_s").replace("_km_h", " km_h"))
     bare = words.replace("_m_s", " m_s").replace("_km_h", " km_h")
     if unit:
         bare = bare[: unit.start()] + " " + bare[unit.end() :]
@@ -402,7 +404,7 @@ def _is_dwd(cells: Sequence[str]) -> bool:
 
 def _class_of(cell: str) -> tuple[float, float] | None:
     """The ends of a class of speeds; None of another cell."""
-    bare = UNIT.sub("", cell.lower()).strip(" ()[]")
+    bare = SPEED_UNIT.sub("", cell.lower()).strip(" ()[]")
     bare = re.sub(r"^(ws|speed|v|u) ?", "", bare)
     if bare in compass.CALMS:
         return 0.0, 0.0
@@ -485,6 +487,7 @@ class _Reading:
     def _factor(self, at: int) -> float:
         """The unit of a column of speeds, m/s, which is said."""
         column = self.columns[at]
+        name = self.table.names[at]
         unit = column.unit
         by = ""
         if not unit and self.is_knmi:
@@ -495,11 +498,14 @@ class _Reading:
             unit, by = "km/h", ", as Meteostat gives them"
         elif not unit and _is_dwd(self.table.names):
             unit, by = "m/s", ", as Germany's service gives them"
+        above = unit_above(self.table.before, unit, name, self.where)
+        if not unit and above:
+            unit, by = above[0], f", by line {above[1]}"
         elif not unit:
             unit, by = "m/s", ", since it names no unit"
         shown = unit.replace("_", "/")
-        self.said.append(f"speeds from {self.table.names[at]!r} in {shown}{by}")
-        return SPEEDS[unit.lower()]
+        self.said.append(f"speeds from {name!r} in {shown}{by}")
+        return SPEEDS[unit]
 
     def _height(self, columns: Iterable[int]) -> float | None:
         """The height that names of columns, or a column of heights, say."""
@@ -547,7 +553,7 @@ class _Reading:
         if cell.lower() in MISSING:
             return None
         value = self._number(cell, name, place)
-        is_mark = value in NO_SPEED and factor * value > STRONGEST
+        is_mark = value in self.no_speed and factor * value > STRONGEST
         if is_mark or value <= -9 or math.isnan(value):
             self._note(name, f"{value:g}", "no speed")
             return None
@@ -620,6 +626,7 @@ class _Reading:
         self._named_ways(self.table.column(way))
         self.marks = self._marks_of([fast, way, *filter(None, [fields.get("share")])])
         factor = self._factor(fast)
+        self._tell_marks(self.table.column(fast))
         self.height = self._height([fast, way])
         self._check_degrees(self.table.column(way), self.table.names[way])
         if TENS.search(self.table.names[way].lower()):
@@ -630,6 +637,19 @@ class _Reading:
             speed = self._speed(cells[fast], factor, self.table.names[fast], place)
             direction = self._direction(cells[way], self.table.names[way], place)
             yield line, cells, direction, speed
+
+    def _tell_marks(self, cells: Sequence[str]) -> None:
+        """Tell by the other speeds which numbers stand for none."""
+        self.no_speed: tuple[float, ...] = NO_SPEED
+        values = []
+        for cell in cells:
+            try:
+                values.append(self.marks.number(cell))
+            except ValueError:
+                continue
+        known = [v for v in values if v not in (*NO_SPEED, SHORT_NO_SPEED)]
+        if known and max(known) < SHORT_NO_SPEED / 2:
+            self.no_speed = (*NO_SPEED, SHORT_NO_SPEED)
 
     def _of_parts(
         self, fields: Mapping[str, int]
@@ -646,10 +666,17 @@ class _Reading:
             if {cells[east].lower(), cells[north].lower()} & {*MISSING}:
                 yield line, cells, None, None
                 continue
-            u, v = (
-                factor * self._number(cells[at], self.table.names[at], place)
+            given = {
+                at: self._number(cells[at], self.table.names[at], place)
                 for at in (east, north)
-            )
+            }
+            none = [at for at, value in given.items() if _is_no_part(value, factor)]
+            if none:
+                first = none[0]
+                self._note(self.table.names[first], f"{given[first]:g}", "no speed")
+                yield line, cells, None, None
+                continue
+            u, v = (factor * value for value in given.values())
             speed = rounded(math.hypot(u, v))
             if speed > FASTEST:
                 yield line, cells, None, None
@@ -789,8 +816,11 @@ class _Reading:
             filter(None, (self.columns[0].unit, *map(_unit_of, of_classes))), ""
         )
         unit = "" if unit == "%" else unit
-        factor = SPEEDS.get(unit, 1.0)
+        above = unit_above(self.table.before, unit, of_classes[0], self.where)
         by = "" if unit else ", since they name no unit"
+        if not unit and above:
+            unit, by = above[0], f", by line {above[1]}"
+        factor = SPEEDS.get(unit, 1.0)
         self.said.append(f"classes of speeds in {unit or 'm/s'}{by}, spread evenly")
         self.height = self._height([0])
         for line, cells in self.table.rows:
@@ -860,9 +890,15 @@ def _is_no_direction(value: float) -> bool:
     return value in NO_DIRECTION or value <= -900 or math.isnan(value)
 
 
+def _is_no_part(value: float, factor: float) -> bool:
+    """Whether a part of a wind is a number for none, of either sign."""
+    is_mark = abs(value) in (*NO_SPEED, SHORT_NO_SPEED)
+    return is_mark and factor * abs(value) > STRONGEST
+
+
 def _unit_of(cell: str) -> str:
     """The unit of speeds in a cell; empty without one."""
-    found = UNIT.search(cell.lower())
+    found = SPEED_UNIT.search(cell.lower())
     return found[1] if found else ""
 
 

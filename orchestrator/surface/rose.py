@@ -11,7 +11,7 @@ from orchestrator.digits import SLACK
 from orchestrator.errors import InputError
 from orchestrator.physics.velocity import log_law_speed, log_law_ustar
 from orchestrator.runs.files import digest_text
-from orchestrator.study.wind import read_winds
+from orchestrator.study.wind import question_of, read_winds
 from orchestrator.surface.onset import WIND_HEIGHT
 from orchestrator.types import BoolArray, FloatArray
 
@@ -24,9 +24,6 @@ WIDEST_PART_DEG = 5.0
 """Width of the parts of a sector, at most."""
 LOWEST = 10.0
 """Least height of winds over the roughness length of the ground."""
-WINDIEST = 20.0
-"""Mean speed above which it is likelier in another unit, m/s: Cape Denison, of the
-windiest places, has 19."""
 FURTHEST_DEG = 30.0
 """Largest angle between a direction of a rose and the nearest flow, where none lie on
 both sides of it."""
@@ -70,11 +67,7 @@ class Rose:
     @property
     def question(self) -> str:
         """A question on speeds that are likelier in another unit; empty for none."""
-        mean = sum(speed * share for _, speed, share in self.rows)
-        if mean <= WINDIEST:
-            return ""
-        what = f"the wind of {self.name} is {mean:.3g} m/s in the mean"
-        return f"{what}: did you mean km/h, {mean / 3.6:.3g} m/s?"
+        return question_of(self.rows, self.name)
 
     def solved(
         self, flows: Sequence[float], where: str, roughness: float, height: float
@@ -265,7 +258,7 @@ def read_rose(text: str, name: str, where: str) -> Rose:
     Returns
     -------
     Rose
-        The rose.
+        The rose, with a question where its mean is likelier in another unit.
 
     Raises
     ------

@@ -204,6 +204,20 @@ def test_the_wind_is_that_at_the_height_of_the_anemometer(
     assert (at_two["wind_half_m_s"] < 0.9 * at_ten["wind_half_m_s"]).all()
 
 
+def test_winds_that_are_likelier_in_another_unit_are_asked_about(
+    directory: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    capsys.readouterr()
+    strong = tmp_path / "strong.csv"
+    strong.write_text("from_deg,speed_m_s,share\n270,36,0.75\n90,18,0.25\n")
+    words = ["hours", str(directory), "--wind", str(strong), "--from", "270"]
+    assert cli.main(words) == 0
+    said = " ".join(capsys.readouterr().err.split())
+    assert "strong.csv is 31.5 m/s in the mean: did you mean km/h, 8.75 m/s?" in said
+    assert cli.main(hours(directory)) == 0
+    assert "did you mean" not in capsys.readouterr().err
+
+
 def test_each_bed_has_the_winds_of_its_own_grains(
     directory: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

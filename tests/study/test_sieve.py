@@ -165,6 +165,14 @@ REFUSED = {
     ),
     "Sieve (mm),Passing (%)\n-1,100\n0,50\n1,0\n": "line 2: .*is the column phi",
     "Sieve (mm),Passing (%)\n4,100\n2,\n1,0\n": r"line 3: the cell of Passing \(%\) is empty",
+    "Sieve (mm),Retained (g)\n2,0\n1,NA\n0.5,100\n": (
+        r"line 3: Retained \(g\): 'NA' is no number "
+        r"\(write the mass on this sieve, or 0, or remove the line\)"
+    ),
+    "Sieve (mm),Passing (%)\n2,100\n1,n/a\n0.5,0\n": (
+        r"line 3: Passing \(%\): 'n/a' is no number"
+        r".*\(write its number, or remove the line\)"
+    ),
     "Sieve (mm),Passing\n4,50\n2,20\n1,0\n": "Passing: of which whole",
     "Sieve (mm),Passing (%)\n4,100\n2,120\n1,0\n": "line 3: .*120 is no part",
     "Sieve (mm),Weight (g)\n4,0\n2,-1\n1,5\n": "line 3: .*-1 is no part",

@@ -288,6 +288,112 @@ def test_a_usual_wind_is_no_mark_of_its_unit() -> None:
     ]
 
 
+def of_speeds(unit: str, speeds: list[float], above: str = "") -> str:
+    """A series of some speeds, each from another direction."""
+    rows = [
+        f"2020-01-01 {hour:02d}:00,{speed:g},{30 * hour + 10}"
+        for hour, speed in enumerate(speeds)
+    ]
+    return "\n".join([*([above] if above else []), f"date,ws{unit},wd", *rows, ""])
+
+
+def test_99_is_no_speed_where_all_others_are_far_below() -> None:
+    found = read_winds(of_speeds("", [5, 99, 3, 99, 12]), WHERE)
+    shares = {(way, speed): share for way, speed, share in found.rows}
+    assert shares == pytest.approx(
+        {(10.0, 5.0): 1 / 3, (70.0, 3.0): 1 / 3, (130.0, 12.0): 1 / 3}
+    )
+    assert "3 hours with a wind, 2 without" in found.understood
+    assert "99 in 'ws' stands for no speed, 2 lines" in found.understood
+    assert "mean 6.67 m/s" in found.understood
+
+
+def test_99_is_a_speed_where_others_are_like_it_or_its_unit_is_small() -> None:
+    found = read_winds(of_speeds(" (knots)", [5, 99, 72]), WHERE)
+    assert [speed for _, speed, _ in found.rows] == pytest.approx(
+        [5 * 1852 / 3600, 99 * 1852 / 3600, 72 * 1852 / 3600]
+    )
+    found = read_winds(of_speeds(" (km/h)", [5, 99, 18]), WHERE)
+    assert [speed for _, speed, _ in found.rows] == pytest.approx([5 / 3.6, 27.5, 5])
+
+
+def test_parts_that_stand_for_none_are_no_wind() -> None:
+    rows = ["3,4", "-99,-99", "-999,2", "0,99.9", "-5,12"]
+    lines = [f"2020-01-01 {hour:02d}:00,{row}" for hour, row in enumerate(rows)]
+    found = read_winds("\n".join(["time,u10,v10", *lines, ""]), WHERE)
+    assert [(speed, share) for _, speed, share in found.rows] == [(5, 0.5), (13, 0.5)]
+    assert "-99 in 'u10' stands for no speed, 1 line" in found.understood
+    assert "99.9 in 'v10' stands for no speed, 1 line" in found.understood
+
+
+@pytest.mark.parametrize(
+    ("above", "factor", "said"),
+    [
+        ("# speeds in knots", 1852 / 3600, "in knots, by line 1"),
+        ("# Wind speed: km/h", 1 / 3.6, "in km/h, by line 1"),
+        ("Units: mph", 0.44704, "in mph, by line 1"),
+        ("Station 7\n# speed at 10 m (kn)", 1852 / 3600, "in kn, by line 2"),
+        ("# 10 min mean wind speed in miles per hour", 0.44704, "in miles per hour"),
+        ("# FF: wind speed in 0.1 m/s", 0.1, "in 0.1 m/s, by line 1"),
+        ("# speeds in m/s", 1.0, "in m/s, by line 1"),
+        ("# knots", 1852 / 3600, "in knots, by line 1"),
+        ("# speeds below 2 kt are calm; 1 kt = 0.514 m/s", 1.0, "names no unit"),
+        ("# starting speed of the anemometer 0.4 m/s", 1.0, "names no unit"),
+    ],
+)
+def test_a_line_above_may_name_the_unit_of_all_speeds(
+    above: str, factor: float, said: str
+) -> None:
+    found = read_winds(of_speeds("", [5, 10, 18], above), WHERE)
+    assert [speed for _, speed, _ in found.rows] == pytest.approx(
+        [5 * factor, 10 * factor, 18 * factor]
+    )
+    assert said in found.understood
+
+
+def test_a_line_above_names_the_unit_of_classes_and_of_parts() -> None:
+    table = "Direction,0-20,20-40\nN,40,10\nS,30,20\n"
+    found = read_winds(f"# Wind rose, speeds in km/h\n{table}", WHERE)
+    assert max(speed for _, speed, _ in found.rows) == pytest.approx(39 / 3.6)
+    assert "classes of speeds in km/h, by line 1" in found.understood
+    series = "time,u10,v10\n2020-01-01 00:00,3,4\n2020-01-01 01:00,5,12\n"
+    found = read_winds(f"# units: knots\n{series}", WHERE)
+    assert [speed for _, speed, _ in found.rows] == pytest.approx(
+        [5 * 1852 / 3600, 13 * 1852 / 3600]
+    )
+
+
+@pytest.mark.parametrize(
+    ("above", "unit", "message"),
+    [
+        (
+            "# speeds in knots",
+            " (m/s)",
+            r"line 1: speeds in knots, and 'ws \(m/s\)' is",
+        ),
+        ("# speeds in mph\n# wind in km/h", "", "line 2: which unit .* mph or km/h"),
+        ("# ws: m/s, wind: kt", "", "line 1: which unit have the speeds: m/s or kt"),
+        ("# gusts in knots", "", r"line 1: it speaks of knots.*ws \(m/s\)"),
+        ("# converted from mph", "", "line 1: it speaks of mph"),
+        ("# speeds in Beaufort", "", "line 1: it speaks of beaufort"),
+        ("# wind speed in tenths of m/s", "", "line 1: it speaks of tenths"),
+    ],
+)
+def test_a_line_above_that_is_not_certain_is_asked_about(
+    above: str, unit: str, message: str
+) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        read_winds(of_speeds(unit, [5, 10, 18], above), WHERE)
+    assert str(caught.value).startswith(WHERE)
+    assert caught.value.remedy
+
+
+@pytest.mark.parametrize("above", ["# speeds in kt", "# gusts in km/h"])
+def test_a_line_above_may_say_what_a_column_says(above: str) -> None:
+    found = read_winds(of_speeds(" (knots)", [5, 18], above), WHERE)
+    assert max(speed for _, speed, _ in found.rows) == pytest.approx(18 * 1852 / 3600)
+
+
 @pytest.mark.parametrize(
     ("head", "unit"),
     [

@@ -211,3 +211,13 @@ def test_what_is_no_rose_is_refused(text: str, message: str) -> None:
         read_rose(text, "a.csv", WHERE)
     assert str(caught.value).startswith(WHERE)
     assert caught.value.remedy
+
+
+def test_a_mean_that_is_likelier_in_another_unit_is_a_question() -> None:
+    rows = "\n".join(f"2024-01-01 {hour:02d}:00,{18 + hour},270" for hour in range(8))
+    asked = read_rose(f"date,ws,wd\n{rows}\n", "year.csv", "s.toml: erosion.wind")
+    assert asked.question == (
+        "the wind of year.csv is 21.5 m/s in the mean: did you mean km/h, 5.97 m/s?"
+    )
+    text = f"# speeds in km/h\ndate,ws,wd\n{rows}\n"
+    assert read_rose(text, "year.csv", "s.toml: erosion.wind").question == ""
