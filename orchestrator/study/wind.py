@@ -498,6 +498,9 @@ class _Reading:
             unit, by = "km/h", ", as Meteostat gives them"
         elif not unit and _is_dwd(self.table.names):
             unit, by = "m/s", ", as Germany's service gives them"
+        if unit and unit not in SPEEDS:
+            place = self._place(self.table.head)
+            raise InputError(f"{name}: speeds in {unit}", place, "name m/s or km/h")
         above = unit_above(self.table.before, unit, name, self.where)
         if not unit and above:
             unit, by = above[0], f", by line {above[1]}"

@@ -547,6 +547,7 @@ REFUSED = {
     "date,ws,wd\n2020-01-01 00:00,5,90\n": "one time is no series",
     "date,ws,wd\n2020-01-01 00:00,5,\n2020-01-01 01:00,5,\n": "no wind has a direction",
     "time,ws_10m,ws_80m,wd\n": "no line has a wind",
+    "date,wind speed (%),wd\n2020-01-01 00:00,5,9\n": r"line 1: wind speed \(%\): speeds in %",
     "time,ws_10m,ws_80m,wd\n2020-01-01 00:00,5,6,90\n": "which column is the speed: ws_10m or ws_80m",
     "time,ws_10m,wd_80m\n2020-01-01 00:00,5,90\n": "its columns are of 10 m and 80 m",
     "date,ws,wd,z\n2020-01-01 00:00,5,90,2\n2020-01-01 01:00,5,90,10\n": "winds of one height",
