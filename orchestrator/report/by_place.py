@@ -8,7 +8,7 @@ import pandas as pd
 from orchestrator.grains.places import PARTS, PLACES_IN_WORDS, places_of
 from orchestrator.physics.fluids import is_gas
 from orchestrator.report import labels, sheets, single, units
-from orchestrator.report.results import Results
+from orchestrator.report.results import Results, valid
 from orchestrator.report.sheets import Sheet
 from orchestrator.report.subjects import ReportedQuantity, length
 from orchestrator.types import FloatArray
@@ -60,6 +60,7 @@ def places_sheet(results: Results) -> Sheet | None:
         (PLACES_IN_WORDS,),
         "tables/pile_grain.csv",
         main=f"half at, {told.unit}",
+        is_grey=not valid(shown).any(),
     )
 
 

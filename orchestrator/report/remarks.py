@@ -412,7 +412,8 @@ def _counted(scene: Scene, bed: PileBed, x: pd.Series) -> Iterator[Remark]:
         where = "A range of the bed is counted"
         rest = "fractions are of the grains in it"
     elif counts == "windward":
-        where = "The sides that rise in the wind are counted"
+        flow = "wind" if is_gas(scene.fluid.density) else "flow"
+        where = f"The sides that rise in the {flow} are counted"
         rest = "so are ripples and noise of level ground beside the form"
         alone = bed.profile and counted.way_up(bed.profile)
         if alone:

@@ -345,20 +345,24 @@ def _sheet(rows: pd.DataFrame, keys: Sequence[str], name: str) -> Sheet:
         TITLES[told_by],
         frame,
         tuple(shared),
-        terms_of(frame),
+        terms_of(frame, is_of_beds=name == "pile_threshold"),
         f"tables/{name}.csv",
         notes,
         main,
+        is_grey=not valid(rows).any(),
     )
 
 
-def terms_of(frame: pd.DataFrame) -> tuple[str, ...]:
+def terms_of(frame: pd.DataFrame, *, is_of_beds: bool) -> tuple[str, ...]:
     """Choose the terms that the heads of a table have.
 
     Parameters
     ----------
     frame
         The table, with heads as columns.
+    is_of_beds
+        Whether its Shields numbers are of the stress on the grains of a bed: that on a
+        single grain is the stress of the undisturbed flow.
 
     Returns
     -------
@@ -366,7 +370,8 @@ def terms_of(frame: pd.DataFrame) -> tuple[str, ...]:
         What they mean: of those that are there, and of no others.
     """
     heads = " ".join(map(str, frame))
-    signs = {"u*": "u*", "shields": "θ", "re": "Re*"}
+    shields = "shields_of_bed" if is_of_beds else "shields"
+    signs = {"u*": "u*", shields: "θ", "re": "Re*"}
     return tuple(TERMS[name] for name, sign in signs.items() if sign in heads)
 
 
@@ -608,7 +613,7 @@ def sizes_sheet(results: Results) -> Sheet | None:
         title="By size",
         frame=frame,
         shared=(f"fraction of each size entrained: {percent(fraction)}",),
-        terms=terms_of(frame),
+        terms=terms_of(frame, is_of_beds=True),
         file="tables/size_class.csv",
         main="bed shear stress, Pa",
         is_grey=not valid(rows).any(),

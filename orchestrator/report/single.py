@@ -615,6 +615,12 @@ def _of_reference(rows: Sequence[Row]) -> str:
     is_bed = row["bed"] != "grain" and not is_level(row)
     same = "the same bed and flow" if is_bed else "a level bed"
     said = f"Numbers {with_threshold(row)} are those of {same} with {_thetas(rows)}"
+    if all(each["verdict"] == verdict.UNUSABLE for each in rows):
+        # such a card has the grey numbers of the model alone
+        said = f"A level bed has {_thetas(rows)}"
+        if is_bed:
+            said = f"In the table, numbers {with_threshold(row)} are those of {same} "
+            said += f"with {_thetas(rows)}"
     if not is_by_formula(row):
         of = _each(f"{each['measured_rows']:.0f}" for each in rows)
         spans = _each(

@@ -26,6 +26,9 @@ TERMS = {
     "density ρ of the fluid",
     "shields": "Shields number θ: τ_b/((ρ_s − ρ) g d), with the density ρ_s of the "
     "grains",
+    "shields_of_bed": "Shields number θ: the mean wall stress on the entrained grains "
+    "over (ρ_s − ρ) g d, with the density ρ_s of the grains; on a form it is not that "
+    "of the undisturbed flow",
     "re": "grain Reynolds number Re*: u*d/ν",
 }
 """Terms in plain words."""

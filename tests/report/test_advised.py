@@ -134,9 +134,13 @@ def test_a_number_that_is_not_usable_is_grey_beside_what_was_measured(
     card = answers.card(changed(heap, pile_threshold=bad))
     # the flow over a pile is computed: nothing beside it is measured
     assert [number.is_grey for number in card.numbers] == [True] * len(card.numbers)
+    # the other numbers stand in the table alone
+    assert "In the table, numbers with" in card.source
+    assert "In the table" not in answers.card(heap).source
     level = heap.tables["scenes"].assign(bed_shape="flat")
     card = answers.card(changed(heap, pile_threshold=bad, scenes=level))
     assert card.numbers[0].is_measured
+    assert "A level bed has θ_c = " in card.source
     assert not card.numbers[0].is_grey
     assert card.numbers[1].is_grey
 

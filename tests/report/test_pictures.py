@@ -196,6 +196,11 @@ def test_grains_that_go_on_by_dem_are_drawn_at_the_flows_at_which_they_have_gone
     assert steps.totals[-1] == pile.packing.count
     (figure,) = bed.FIGURE.draw(results)
     assert figure.data["step"] == "flow"
+    assert "at which the grain leaves its place by DEM" in figure.caption
+    assert "without dynamics" not in figure.caption
+    # no grain is shown elsewhere than where it was packed
+    assert not figure.data["leaves"]
+    assert b"moved and left" not in figure.image
 
 
 def test_a_bed_without_dem_has_a_picture_of_few_stops(
@@ -214,6 +219,7 @@ def test_a_bed_without_dem_has_a_picture_of_few_stops(
     assert "model" not in found
     assert not any(found["frames"])
     assert found["step"] == "flow"
+    assert not found["leaves"]
     assert "load step" not in bed.bed_caption(results, peeled)
 
 

@@ -144,9 +144,13 @@ def test_the_first_motion_in_air_is_a_stress_beside_water(results: Results) -> N
 
 
 def test_terms_are_those_of_the_heads() -> None:
-    assert sheets.terms_of(pd.DataFrame(columns=["wind at 10 m, m/s", "verdict"])) == ()
-    (term,) = sheets.terms_of(pd.DataFrame(columns=["interval of θ_c"]))
-    assert term.startswith("Shields number")
+    wind = pd.DataFrame(columns=["wind at 10 m, m/s", "verdict"])
+    assert sheets.terms_of(wind, is_of_beds=False) == ()
+    interval = pd.DataFrame(columns=["interval of θ_c"])
+    (term,) = sheets.terms_of(interval, is_of_beds=False)
+    assert term.startswith("Shields number θ: τ_b/")
+    (of_beds,) = sheets.terms_of(interval, is_of_beds=True)
+    assert of_beds.startswith("Shields number θ: the mean wall stress on the entrained")
 
 
 def test_a_row_whose_seeds_are_all_not_usable_is_grey() -> None:

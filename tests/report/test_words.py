@@ -208,6 +208,11 @@ def test_a_threshold_that_is_not_usable_says_so(results: Results) -> None:
     sheet = sheets.short(study)
     assert sheet is not None
     assert "not usable (1)" in sheet.shared
+    # the rows have no cell for a verdict that they all have
+    assert sheet.is_grey
+    usable = sheets.short(results)
+    assert usable is not None
+    assert not usable.is_grey
     assert sheet.notes == ("Re* 2 is below 30",)
     # a number that is not usable is grey, with its reason on the card
     assert all(number.is_grey for number in answers.card(study).numbers)

@@ -51,7 +51,9 @@ After Fig. 13 of the paper. Grains {% if width %}of all rows of a strip of {{
 "%g"|format(width) }} d, from the side, {% endif %} {% if by_dem %} at the end of a load
 step. Orange: entrained, displaced by {{ criterion }} downstream along the bed. Pale
 orange: has left the domain; drawn at its initial place. {% else %} as they were packed.
-Orange: entrained at this flow, by {{ method }}, a method without dynamics. {% endif %}
+Orange: entrained at this flow, {% if goes_on %} the larger of that at which the grain
+leaves its place by DEM and that at which its motion is sustained. {% else %} by {{
+method }}, a method without dynamics. {% endif %} {% endif %}
 Pale yellow: exposed, at rest. Beige: mobile, under the exposed grains. Grey: fixed.
 {% if flow %} The shade of blue is the speed of the flow by OpenFOAM over the bed
 without grains, relative to that of the approaching flow at 10 h. {% endif %} {% if
@@ -379,6 +381,7 @@ def bed_caption(results: Results, pile: Pile) -> str:
         CAPTION,
         width=pile.bed.width,
         by_dem=_follows_dem(pile),
+        goes_on=pile.scene.method.facts.is_resolved_in_time,
         flow=bool(pile.solves),
         method=pile.scene.method.kind,
         update=pile.scene.threshold.update,
@@ -437,6 +440,7 @@ def data(steps: Steps, shown: int, flows: Flows) -> dict[str, Any]:
         "level": steps.level[mobile].tolist(),
         "start": np.round(steps.places[0, mobile] * [1, -1], 2).tolist(),
         "frames": frames,
+        "leaves": _some_leave(steps),
     }
     if flows.model:
         found["model"] = flows.model
@@ -444,6 +448,12 @@ def data(steps: Steps, shown: int, flows: Flows) -> dict[str, Any]:
     if len(steps.lines) > 1:
         found["lines"] = _paths(steps)
     return found
+
+
+def _some_leave(steps: Steps) -> bool:
+    """Whether a grain has left the box at some stop, which is drawn pale."""
+    mobile = steps.pile.packing.mobile[steps.grains]
+    return bool(np.isnan(steps.places[:, mobile]).any())
 
 
 def _numbers(steps: Steps, flows: Flows) -> str:
@@ -518,6 +528,7 @@ def _svg(steps: Steps, shown: int, cases: Path) -> str:
         wears=len(paths) > 1,
         flow=_flow(pile, cases, frame) if pile.solves else "",
         size=f"{(right - left) / 75:.3g}",
+        leaves=_some_leave(steps),
         d=labels.value("d_m", pile.scene.grain.diameter),
         case=pile.last_run or "",
         title=labels.value_text("alpha_deg", pile.bed.slope_deg),
