@@ -69,8 +69,8 @@ def test_a_card_says_which_metres_are_counted(tmp_path: Path) -> None:
     results = small_study.run(tmp_path / "windward", _text())
     windward = answers.card(results).scene
     assert "counted: x = 112 to 187 m" in windward
-    heads = " ".join(remark.head for remark in remarks.remarks(results))
-    assert "The sides that rise in the wind are counted" in heads
+    heads = [remark.head for remark in remarks.remarks(results)]
+    assert "The sides that rise in the wind are counted" in " ".join(heads)
     more = ", counted = [164.0, 186.0]"
     results = small_study.run(tmp_path / "range", _text(more=more))
     assert "counted: x = 164 to 186 m" in answers.card(results).scene
