@@ -91,8 +91,9 @@ class RasterUnits(NamedTuple):
                 "project it to metres, with gdalwarp -t_srs EPSG:326NN, NN the zone"
             )
             raise InputError(what, where, remedy)
-        is_metre = self.axes is None or _is_near(self.axes, 1.0)
-        return 1.0 if is_metre or self.axes is None else self.axes
+        if self.axes is None or _is_near(self.axes, 1.0):
+            return 1.0
+        return self.axes
 
     def of_heights(self, where: str) -> str:
         """Give the unit of its heights.

@@ -153,15 +153,8 @@ def test_terms_are_those_of_the_heads() -> None:
     assert of_beds.startswith("Shields number θ: the mean wall stress on the entrained")
 
 
-def test_a_row_whose_seeds_are_all_not_usable_is_grey() -> None:
-    frame = pd.DataFrame(
-        {
-            "slope": ["1°", "2°", "3°"],
-            "wind, m/s": ["1", "2", "3"],
-            "verdict": ["0 of 3 seeds usable", "2 of 3 seeds usable", "not usable (1)"],
-        }
-    )
-    sheet = Sheet("", frame, file="tables/a.csv", main="wind, m/s")
+def _body_of(sheet: Sheet) -> str:
+    """The rows of a table on a page of its own."""
     html = pages.fill(
         "page.html.j2",
         title="",
@@ -171,7 +164,19 @@ def test_a_row_whose_seeds_are_all_not_usable_is_grey() -> None:
         links={},
         is_paper=False,
     )
-    body = html[html.index("<tbody>") :]
+    return html[html.index("<tbody>") :]
+
+
+def test_a_row_whose_seeds_are_all_not_usable_is_grey() -> None:
+    frame = pd.DataFrame(
+        {
+            "slope": ["1°", "2°", "3°"],
+            "wind, m/s": ["1", "2", "3"],
+            "verdict": ["0 of 3 seeds usable", "2 of 3 seeds usable", "not usable (1)"],
+        }
+    )
+    sheet = Sheet("", frame, file="tables/a.csv", main="wind, m/s")
+    body = _body_of(sheet)
     rows = re.findall(r"<tr( class=\"unusable\")?>", body)
     assert [bool(row) for row in rows] == [True, False, True]
 
@@ -189,16 +194,7 @@ def test_a_narrow_table_keeps_names_answer_interval_and_verdict() -> None:
         }
     )
     sheet = Sheet("", frame, file="tables/a.csv", main="wind, m/s")
-    html = pages.fill(
-        "page.html.j2",
-        title="",
-        above="",
-        foot="",
-        sections=[Section("", [sheet])],
-        links={},
-        is_paper=False,
-    )
-    row = html[html.index("<tbody>") :].split("</tr>")[0]
+    row = _body_of(sheet).split("</tr>")[0]
     assert '<span class="all">air, pivot, 10\u00a0%</span>' in row
     kept = re.findall(r"<td(?: class=\"main\")?>(.*?)</td>", row)
     assert kept == ["1", "0\u00a0…\u00a02", "usable"]
