@@ -209,7 +209,7 @@ def over_u_e(
     return np.asarray(grid.swapaxes(0, 1) / pile.scene.method.flow.speed)
 
 
-class Lengths(NamedTuple):
+class LengthUnit(NamedTuple):
     """The unit of the lengths of a page: mm of a small bed, else m, or heights.
 
     Attributes
@@ -224,12 +224,12 @@ class Lengths(NamedTuple):
     scale: float
 
     @classmethod
-    def of(cls, pile: Pile) -> "Lengths":
+    def of(cls, pile: Pile) -> "LengthUnit":
         """Find the unit of a bed.
 
         Returns
         -------
-        Lengths
+        LengthUnit
             mm of a bed below half a metre; a profile has the metres of its file.
         """
         is_small = pile.bed.height < SMALL_M and not pile.bed.profile
@@ -246,7 +246,7 @@ class Lengths(NamedTuple):
         return self.scale * pile.bed.height if self.scale else 1.0
 
 
-OVER_H = Lengths("h", 0.0)
+OVER_H = LengthUnit("h", 0.0)
 
 
 def draw_bed(ax: Axes, pile: Pile) -> None:

@@ -99,7 +99,7 @@ def _draw(results: Results, piles: Sequence[Pile], width: float) -> Canvas:
     names = _names(results, piles)
     heights = {pile.bed.height for pile in piles}
     is_one = np.ptp([*heights]) < 1e-6 * max(heights)
-    unit = solved.Lengths.of(piles[0]) if is_one else solved.OVER_H
+    unit = solved.LengthUnit.of(piles[0]) if is_one else solved.OVER_H
     table = results.tables["speed_profile"]
     drawn: list[pd.DataFrame] = []
     for pile, name, look in zip(piles, names, LOOKS, strict=False):

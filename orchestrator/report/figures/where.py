@@ -20,7 +20,7 @@ from orchestrator.report.figures import FigureKind
 from orchestrator.report.figures.fractions import curves_of_card
 from orchestrator.report.page import filled
 from orchestrator.report.results import Results
-from orchestrator.report.solved import FELT, REVERSED, Lengths, stress_on
+from orchestrator.report.solved import FELT, REVERSED, LengthUnit, stress_on
 from orchestrator.report.style import (
     ANSWER,
     EDGE,
@@ -150,7 +150,7 @@ def _bed(results: Results, beds: Sequence[Bed], panels: tuple[Axes, ...]) -> Non
     top, middle, below = panels
     row, pile = beds[0]
     told = single.quantity_of_row(row)
-    unit = Lengths.of(pile)
+    unit = LengthUnit.of(pile)
     table = results.tables["pile_grain"].sort_values("x_m")
     limits = []
     for place, (each, other) in enumerate(beds):
@@ -204,7 +204,7 @@ def _thresholds(
     row: pd.Series,
     grains: pd.DataFrame,
     told: ReportedQuantity,
-    unit: Lengths,
+    unit: LengthUnit,
     place: int,
     name: str,
 ) -> tuple[float, float]:
@@ -272,7 +272,7 @@ def _stress(
     results: Results,
     pile: Pile,
     grains: pd.DataFrame,
-    unit: Lengths,
+    unit: LengthUnit,
     place: int,
 ) -> None:
     """The signed u* over the undisturbed one: of the flow, and as grains feel it."""
@@ -334,7 +334,7 @@ def _line(
     beds: Sequence[Bed],
     grains: pd.DataFrame,
     told: ReportedQuantity,
-    unit: Lengths,
+    unit: LengthUnit,
 ) -> None:
     """The bed with its obstacles, and what has moved at the fraction of the row."""
     row, pile = beds[0]
@@ -373,7 +373,7 @@ def _entrained(row: pd.Series, told: ReportedQuantity) -> str:
     return f"; thick: {percent(row['fraction'])} entrained at {flow:#.3g} {told.unit}"
 
 
-def _obstacles(ax: Axes, beds: Sequence[Bed], unit: Lengths) -> None:
+def _obstacles(ax: Axes, beds: Sequence[Bed], unit: LengthUnit) -> None:
     """The obstacles of all beds on a line, in the colours of these."""
     for place, (_, pile) in enumerate(beds):
         look: Look = OTHERS[place - 1] if place else {"color": ANSWER}
@@ -391,7 +391,7 @@ def _first(
     row: pd.Series,
     pile: Pile,
     told: ReportedQuantity,
-    unit: Lengths,
+    unit: LengthUnit,
 ) -> None:
     """Mark the place where motion starts, with its flow."""
     x = unit.scale * float(row["first_x_m"])
